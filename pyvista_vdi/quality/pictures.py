@@ -23,8 +23,8 @@ _FASTER_WITHIN = 10.0
 #: the view worth while: about as many as it takes the time of, so that what is made in vain at most
 #: doubles the cost.
 _NEAR, _WORTH_A_VDI = 0.09, 12
-#: Views that are remembered.
-_REMEMBERED = 64
+#: Pictures by the volume, and estimates, that are remembered.
+_PICTURES, _ESTIMATES = 2 * _WORTH_A_VDI, 64
 #: An estimate holds for views as near as this to its own (about radians).
 _ANOTHER_ESTIMATE = 0.02
 
@@ -37,7 +37,7 @@ class Pictures:
     """
 
     def __init__(self) -> None:
-        self._by_volume: deque[View] = deque(maxlen=_REMEMBERED)
+        self._by_volume: deque[View] = deque(maxlen=_PICTURES)
         self._judged: list[tuple[View, Any, ViewError]] = []
         self._of: Callable[[], VDI | None] = lambda: None  # a weak reference
         self._poor_from = float("inf")  # degrees from V_O, of the nearest view that the VDI fails
@@ -93,7 +93,7 @@ class Pictures:
         )
         if error is None or nearest > _ANOTHER_ESTIMATE:
             error = estimate()
-            self._judged = [*self._judged[1 - _REMEMBERED :], (view, options, error)]
+            self._judged = [*self._judged[1 - _ESTIMATES :], (view, options, error)]
         does = error.ssim >= (SIMILAR if bound is None else bound)
         if bound is None:
             does = does and abs(error.contrast - 1) <= _SAME_CONTRAST

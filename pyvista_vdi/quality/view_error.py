@@ -182,9 +182,13 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
     V_O's window and what lies before its eye are convex: they contain a part of a ray if they
     contain its two ends.
     """
+    box = _homogeneous(bounds_corners(vdi.bounds))
+    to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
+    if _in_window(to_lists @ box).all():  # all of the volume, as with coverage="bounds"
+        return 1.0
     camera = Camera.from_any(camera)
     to_window = camera.viewport_matrix(window_size) @ camera.model_to_view
-    u, v, _, w = to_window @ _homogeneous(bounds_corners(vdi.bounds))
+    u, v, _, w = to_window @ box
     before = w > 0
     corners = np.stack([u[before], v[before]]) / w[before]
     across = np.linspace(-1.0, 1.0, _COVERAGE_RAYS)
@@ -208,10 +212,14 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
     if not meets.any():
         return 1.0
     near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
-    to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
-    u, v, _, w = to_lists @ _homogeneous(np.hstack([near, far]).T)
-    held = np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max()
+    held = _in_window(to_lists @ _homogeneous(np.hstack([near, far]).T))
     return float(held.reshape(2, -1).all(axis=0).mean())
+
+
+def _in_window(places: Floats) -> NDArray[np.bool_]:
+    """Whether points in homogeneous viewport coordinates, (4, n), lie in the window."""
+    u, v, _, w = places
+    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max())
 
 
 def _homogeneous(points: Floats) -> Floats:

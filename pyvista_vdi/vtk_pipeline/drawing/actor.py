@@ -55,7 +55,7 @@ class VDIActorMethods(PlayingMethods):
         frame on, and takes the place of what made the one before: a volume, which is let go of.
         """
         mapper = self.GetMapper()
-        return None if mapper is None else mapper.painter.asked_for()
+        return None if mapper is None else mapper.painter.upkeep.asked_for()  # type: ignore[no-any-return]
 
     @vdi.setter
     def vdi(self: Any, vdi: VDI) -> None:

@@ -206,10 +206,6 @@ class Painter:
             time=None if self.upkeep.player is None else self.upkeep.player.time,
         )
 
-    def asked_for(self) -> VDI | None:
-        """Return the VDI, made now where pictures were drawn without one."""
-        return self.upkeep.asked_for()
-
     def before_frame(self) -> None:
         """Take a VDI that was made in the background; between two frames of a window only."""
         if self.upkeep.collect():

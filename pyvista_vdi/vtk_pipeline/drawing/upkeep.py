@@ -198,7 +198,11 @@ class Upkeep:
             vdi = self._updated(source)
             self._say_what_is_lacking(vdi, frame)
             return vdi
-        if self.draw == "volume" and not joint and (volume := self._volume(source)):
+        if (
+            self.draw == "volume"
+            and not joint
+            and (volume := self._volume(source.source.MakeRequest()))
+        ):
             return volume
         # Once for both eyes of a stereo pair, and not between the tiles of a picture
         now = (frame.clock.number, id(frame.clock))
@@ -239,8 +243,9 @@ class Upkeep:
         if decide or self.regeneration.unseen(source.source, source.stamp()):
             self._look(source, frame, ask)
         if first:
-            self._prepare(self.regeneration.changed)
-            return self._volume(source) or self._updated(source)
+            wanted = self.regeneration.changed or source.source.MakeRequest()
+            self._prepare(wanted)
+            return self._volume(wanted) or self._updated(source)
         return self._standing_in() or self._better(source, frame, joint) or source.last()
 
     def _faithful(
@@ -264,7 +269,7 @@ class Upkeep:
                 source.take_size(frame.renderer)
                 return self._updated(source)
             self._pictures.drawn_by_volume(frame.view)
-        return self._volume(source, in_bricks=True) or self._updated(source)
+        return self._volume(wanted, in_bricks=True) or self._updated(source)
 
     def _serves(self, vdi: VDI | None, made: Request | None, frame: Frame, *, joint: bool) -> bool:
         """Whether the VDI's picture of the frame's view is as good as the volume's."""
@@ -368,14 +373,14 @@ class Upkeep:
 
     def _better(self, source: SourceInput, frame: Frame, joint: bool) -> StandIn | None:
         """Return the volume where it is expected to give the better frame; None: the VDI does."""
-        vdi = source.last()
-        if self.draw != "auto" or joint or vdi is None:
+        vdi, made = source.last(), source.source.GetCurrentRequest()
+        if self.draw != "auto" or joint or vdi is None or made is None:
             return None
         window, camera = frame.renderer.GetRenderWindow(), frame.view.camera
         moves = self._interaction.wants_preview(window)
         fine = moves or magnification(vdi, frame.camera, frame.full_size) <= FINE_ENOUGH
         if coverage(vdi, camera, frame.view.size) < 1 or not fine:
-            return self._volume(source)
+            return self._volume(made)
         bound = self.regeneration.bound
         way = self.ways.choose(
             angle_from_generating_view(vdi, camera),
@@ -384,11 +389,10 @@ class Upkeep:
             self.regeneration.ssim(vdi),
             SIMILAR if bound is None else bound,
         )
-        return self._volume(source) if way == "volume" else None
+        return self._volume(made) if way == "volume" else None
 
-    def _volume(self, source: SourceInput, *, in_bricks: bool = False) -> StandIn | None:
-        """Return the volume, to be drawn for its own sake; None if it cannot be."""
-        request = source.source.MakeRequest()
+    def _volume(self, request: Request, *, in_bricks: bool = False) -> StandIn | None:
+        """Return the volume of a request, to be drawn for its own sake; None if it cannot be."""
         if self._lasting is not None and self._lasting.request.content != request.content:
             self._lasting = None  # its buffers go before others are taken
         if self._lasting is None:
