@@ -396,6 +396,7 @@ KERNEL_MUTANTS = (
 
 OPTIONS, RENDER = "pyvista_vdi/model/options.py", "pyvista_vdi/model/render_options.py"
 SCENE, STRATEGIES = "pyvista_vdi/raycasting/scene.py", "pyvista_vdi/raycasting/strategies.py"
+PICTURES = "pyvista_vdi/quality/pictures.py"
 PACKING = "pyvista_vdi/model/packing.py"
 REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
 WHEN, WAYS = "pyvista_vdi/quality/when_anew.py", "pyvista_vdi/quality/ways.py"
@@ -641,6 +642,48 @@ PYTHON_MUTANTS = (
         "(bits + 0x8000 >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
         "(bits >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
         ("series",),
+    ),
+    _m(
+        "pictures: a VDI of which the view shows more than it has",
+        PICTURES,
+        " or coverage(vdi, view.camera, view.size) < 1:",
+        ":",
+        ("quality",),
+    ),
+    _m(
+        "pictures: contrast does not count",
+        PICTURES,
+        "does = does and abs(error.contrast - 1) <= _SAME_CONTRAST",
+        "pass",
+        ("quality",),
+    ),
+    _m(
+        "pictures: an estimate holds whatever else changed",
+        PICTURES,
+        "if shown == options",
+        "if True",
+        ("quality",),
+    ),
+    _m(
+        "pictures: lists as coarse as one likes",
+        PICTURES,
+        "if bound is None and detail > FINE_ENOUGH:",
+        "if False:",
+        ("quality",),
+    ),
+    _m(
+        "pictures: what failed is asked about again",
+        PICTURES,
+        "self._poor_from = angle",
+        "pass",
+        ("quality",),
+    ),
+    _m(
+        "pictures: pictures from anywhere make a VDI worth while",
+        PICTURES,
+        "view.distance(other, bounds) <= _NEAR",
+        "view.distance(other, bounds) >= 0",
+        ("quality",),
     ),
     _m(
         "viewer: zooming in takes one away",

@@ -108,6 +108,14 @@ def test_a_vdi_draws_what_it_shows_as_the_volume_does(ask):
     assert judge.asked == 2
 
 
+def test_what_lies_beside_v_o_is_not_left_out(ask):
+    """However well the rest is drawn: an estimate compares what both show."""
+    zoomed = vdi_of(along_z(0.5))
+    how = {"detail": 1.0, "bound": None, "options": None, "estimate": Judge()}
+    assert not ask.pictures.serves(zoomed, View(along_z(1.5), SIZE), **how)
+    assert ask.pictures.serves(zoomed, View(along_z(0.4), SIZE), **how)
+
+
 @pytest.mark.parametrize("judge", [Judge(SIMILAR - 0.001), Judge(1.0, 0.89), Judge(1.0, 1.11)])
 def test_what_fails_near_its_view_is_not_asked_about_farther_away(ask, judge):
     asked = judge.asked
