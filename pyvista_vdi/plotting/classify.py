@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import functools
 import sys
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -191,7 +190,6 @@ def transfer_function_from_arguments(
     return function.replace(unit_distance=None)
 
 
-@functools.cache  # one note is enough
 def note_mapper(mapper: str) -> None:
     """Say that a name of VTK's mappers means nothing here, and refuse another."""
     if mapper not in _MAPPERS:
