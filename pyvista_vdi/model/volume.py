@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -144,6 +145,10 @@ class Volume(Geometry):
         InvalidVolumeError
             If every value is NaN.
         """
+        return self._finite_range
+
+    @functools.cached_property
+    def _finite_range(self) -> tuple[float, float]:
         if self.chunks is not None:
             lows, highs = self.chunks.found_ranges()
             low, high = float(np.fmin.reduce(lows, None)), float(np.fmax.reduce(highs, None))
