@@ -264,13 +264,15 @@ class _Function:
             grid, exact = np.linspace(low, high, len(table)), self.exact(whole)
             of_table = [np.interp(whole, grid, v) for v in table.T]
             return float(np.abs(np.stack(of_table, axis=1) - exact).max())
-        inside = (self.x >= low) & (self.x <= high)
-        if high == low or not inside.any():
+        inside, last = (self.x >= low) & (self.x <= high), len(table) - 1
+        if high == low or not inside.any() or len(self.x) == 1:
             return 0.0
-        entry = (self.x[inside] - low) / (high - low) * (len(table) - 1)
-        beside = table[np.floor(entry).astype(int)], table[np.ceil(entry).astype(int)]
+        entry = (self.x[inside] - low) / (high - low) * last
+        before, after = np.ceil(entry).astype(int) - 1, np.floor(entry).astype(int) + 1
+        # On an entry, either neighbour may have it: one side of a step
+        beside = table[np.clip([before, (before + after + 1) // 2, after], 0, last)]
         values = np.clip(self.values[inside], 0, 1)
-        return float(np.maximum(np.minimum(*beside) - values, values - np.maximum(*beside)).max())
+        return float(np.maximum(beside.min(axis=0) - values, values - beside.max(axis=0)).max())
 
     def _colors_of_logarithms(self, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what ``GetColor`` has: on a logarithmic scale ``GetTable``'s steps are so, too."""
