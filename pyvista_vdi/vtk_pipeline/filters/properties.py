@@ -222,17 +222,17 @@ class _Function:
 
     def sampled(self, low: float, high: float, n: int) -> NDArray[np.float64]:
         """Return the values at n equidistant scalars, clipped to 0..1, (n, 1) or (n, 3)."""
-        table = np.empty((n, self.values.shape[1]))
+        scalars = np.linspace(low, high, n)
+        if self.linear:
+            return self._interpolated(scalars)
         if self._logarithmic:
-            table = self._colors_of_logarithms(np.linspace(low, high, n))
-        else:
-            self._function.GetTable(low, high, n, table.reshape(-1))
-        return np.clip(table, 0, 1)
+            return np.clip(self._colors_of_logarithms(scalars), 0, 1)
+        return np.clip(self._table(self._function, scalars), 0, 1)
 
     def exact(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values on a grid that holds all nodes, or else all whole numbers."""
         if self.linear:
-            return np.stack([np.interp(grid, self.x, v) for v in self.values.T], axis=1)
+            return self._interpolated(grid)
         # VTK divides, which is exact by a power of two: no whole number falls short of a node
         n = 1 << (len(grid) - 1).bit_length()
         return self.sampled(grid[0], grid[0] + n, n + 1)[: len(grid)]
@@ -274,6 +274,18 @@ class _Function:
         values = np.clip(self.values[inside], 0, 1)
         return float(np.maximum(beside.min(axis=0) - values, values - beside.max(axis=0)).max())
 
+    def _interpolated(self, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.stack([np.interp(scalars, self.x, v) for v in self.values.T], axis=1)
+
+    def _table(self, function: Any, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return VTK's table, by the one call, of which the scalars are."""
+        table = np.empty((len(scalars), self.values.shape[1]))
+        function.GetTable(scalars[0], scalars[-1], len(scalars), table.reshape(-1))
+        # Colours are 0 in VTK 9.7.2 where the first node is a sample, but not the first one
+        first = np.abs(scalars - self.x[0]) <= 1e-14 * np.abs(scalars).max()
+        table[first] = self.values[0]
+        return table
+
     def _colors_of_logarithms(self, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what ``GetColor`` has: on a logarithmic scale ``GetTable``'s steps are so, too."""
         function, first, last = self._function, self.x[0], self.x[-1]
@@ -284,8 +296,7 @@ class _Function:
         within.SetClamping(True)
         logarithms = np.log(np.clip(scalars, first, last))
         places = np.linspace(logarithms[0], logarithms[-1], 4 * len(scalars))
-        table = np.empty((len(places), 3))
-        within.GetTable(*np.exp(places[[0, -1]]), len(places), table.reshape(-1))
+        table = self._table(within, np.exp(places))
         colors = np.stack([np.interp(logarithms, places, v) for v in table.T], axis=1)
         below, above = scalars < first, scalars > last
         if not function.GetClamping():

@@ -288,7 +288,7 @@ class VDISource(SourceSettings):
         assert camera is not None
         assert window_size is not None
         volume = self._read(image)
-        table = self._classify(volume)
+        table = self._classify(volume, self.GetVolumeProperty())
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self._options, lights=lights)
         return Request(
@@ -323,10 +323,9 @@ class VDISource(SourceSettings):
             self._volume_key = key
         return self._volume
 
-    def _classify(self, volume: Volume) -> TransferFunction:
-        """Return the property's functions over the volume's scalars, read again after changes."""
-        prop = self.GetVolumeProperty()
-        key = (volume, prop and prop.GetMTime())
+    def _classify(self, volume: Volume, prop: Any) -> TransferFunction:
+        """Return the property's functions over the volume's scalars, the same until they change."""
+        key = (self._volume_key, prop.GetMTime())
         if self._table is None or key != self._table_key:
             self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
             self._table_key = key
