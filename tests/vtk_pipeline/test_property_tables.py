@@ -277,6 +277,10 @@ def test_what_no_table_resolves_is_said():
     opacity = function_of(*((100 + k * 1e-4, k % 2) for k in range(20)), (100.01, 0), (255, 0.3))
     with pytest.warns(VDIWarning, match="opacity function has nodes closer together than 1/65536"):
         transfer_function_from_property(property_of(opacity=opacity), volume)
+    crowd = function_of((-1e30, 0), (0, 0.1), (99, 0.3), (255, 0.6), (1e30, 1))
+    outlier = pvdi.Volume(np.where(volume.array == 0, 1e20, volume.array))
+    with pytest.warns(VDIWarning, match="opacity function has nodes closer"):
+        transfer_function_from_property(property_of(colors_of((0, 1, 1, 1)), crowd), outlier)
     steep = property_of(gradient=function_of((0, 0), (20, 2)))
     with pytest.warns(VDIWarning, match="gradient opacity above 1"):
         transfer_function_from_property(steep, volume)
@@ -309,3 +313,13 @@ def test_every_volume_has_the_table_of_its_own_scalars(kind):
         alone = pvdi.generate(volume, **view, volume_property=prop)
         assert vdi.metadata["transfer_function"] == alone.metadata["transfer_function"]
     assert made[0].counts.max() > 0
+
+
+def test_chunks_are_read_for_their_range_only_where_the_table_needs_it():
+    da = pytest.importorskip("dask.array")
+    volume = pvdi.Volume(da.from_array(ball().array, chunks=11))
+    smooth = function_of((-1e6, 0), (0, 0), (100.3, 0.2), (255, 0.5), (1e6, 0.5))
+    transfer_function_from_property(property_of(opacity=smooth), volume)
+    assert volume.chunks.ranges() is None
+    transfer_function_from_property(property_of(opacity=function_of(*PEAK, (1e6, 1))), volume)
+    assert volume.chunks.ranges() is not None

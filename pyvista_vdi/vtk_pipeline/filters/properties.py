@@ -256,23 +256,23 @@ class _Function:
         table: NDArray[np.float64],
         whole: NDArray[np.float64] | None = None,
     ) -> float:
-        """Return how far a node is at most from the values of a table's entries beside it.
+        """Return how far a table is at most from a node, or from all ``whole`` numbers.
 
-        Where the scalars are ``whole`` numbers, how far the table is from what these have.
+        A node may have the value of an entry beside it: a step between two is a ramp.
         """
+        grid = np.linspace(low, high, len(table))
         if whole is not None:
-            grid, exact = np.linspace(low, high, len(table)), self.exact(whole)
-            of_table = [np.interp(whole, grid, v) for v in table.T]
-            return float(np.abs(np.stack(of_table, axis=1) - exact).max())
-        inside, last = (self.x >= low) & (self.x <= high), len(table) - 1
-        if high == low or not inside.any() or len(self.x) == 1:
+            at_whole = np.stack([np.interp(whole, grid, v) for v in table.T], axis=1)
+            return float(np.abs(at_whole - self.exact(whole)).max())
+        inside = (self.x >= low) & (self.x <= high)
+        if high == low or len(self.x) == 1 or not inside.any():
             return 0.0
-        entry = (self.x[inside] - low) / (high - low) * last
-        before, after = np.ceil(entry).astype(int) - 1, np.floor(entry).astype(int) + 1
-        # On an entry, either neighbour may have it: one side of a step
-        beside = table[np.clip([before, (before + after + 1) // 2, after], 0, last)]
-        values = np.clip(self.values[inside], 0, 1)
-        return float(np.maximum(beside.min(axis=0) - values, values - beside.max(axis=0)).max())
+        x, values = self.x[inside], np.clip(self.values[inside], 0, 1)
+        entry = (x - low) / (high - low) * (len(table) - 1)
+        beside = np.stack([np.ceil(entry) - 1, np.floor(entry) + 1]).astype(int)
+        of_table = np.stack([np.interp(x, grid, v) for v in table.T], axis=1)
+        found = np.stack([of_table, *table[np.clip(beside, 0, len(table) - 1)]])
+        return float(np.abs(found - values).max(axis=2).min(axis=0).max())
 
     def _interpolated(self, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([np.interp(scalars, self.x, v) for v in self.values.T], axis=1)
@@ -347,10 +347,22 @@ def _domain(functions: Sequence[_Function], volume: Any) -> tuple[float, float]:
     if any(function.ends for function in functions):  # what is beyond has an entry, too
         beyond = (high - low) / SAMPLED_ENTRIES or 1e-6 * max(1.0, abs(low))
         low, high = low - beyond, high + beyond
-    if volume is not None:
-        least, largest = _data_range(volume)
-        low, high = min(max(low, least), largest), max(min(high, largest), least)
-    return low, high
+    if volume is None or (_is_unread(volume) and _are_plain(functions, low, high)):
+        return low, high
+    least, largest = _data_range(volume)
+    return min(max(low, least), largest), max(min(high, largest), least)
+
+
+def _is_unread(volume: Any) -> bool:
+    """Whether the volume's range would have to be found chunk by chunk."""
+    chunks = getattr(volume, "chunks", None)
+    return chunks is not None and chunks.ranges() is None
+
+
+def _are_plain(functions: Sequence[_Function], low: float, high: float) -> bool:
+    """Whether a sampled table shows the functions well wherever the data lie."""
+    apart = min(np.diff(function.varying).min(initial=np.inf) for function in functions)
+    return all(f.linear for f in functions) and apart >= 64 * (high - low) / SAMPLED_ENTRIES
 
 
 def _data_range(volume: Any) -> tuple[float, float]:
