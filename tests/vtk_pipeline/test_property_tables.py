@@ -323,3 +323,10 @@ def test_chunks_are_read_for_their_range_only_where_the_table_needs_it():
     assert volume.chunks.ranges() is None
     transfer_function_from_property(property_of(opacity=function_of(*PEAK, (1e6, 1))), volume)
     assert volume.chunks.ranges() is not None
+
+
+def test_thousands_of_colours_by_name():
+    volume = labels_of(5023, np.uint16)
+    view = {"camera": camera_at(60, 50, 70), "window_size": (8, 6)}
+    vdi = pvdi.generate(volume, **view, cmap="prism", clim=(0, 5022), n_colors=5023)
+    assert len(vdi.metadata["transfer_function"]["opacities"]) == 5023
