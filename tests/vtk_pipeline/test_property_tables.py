@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.colors import ListedColormap
 from vtk_sources import camera_at
 from watched_windows import on_screen
 
@@ -326,7 +327,8 @@ def test_chunks_are_read_for_their_range_only_where_the_table_needs_it():
 
 
 def test_thousands_of_colours_by_name():
-    volume = labels_of(5023, np.uint16)
+    colors = np.random.default_rng(5).integers(0, 256, (5023, 3)) / 255
     view = {"camera": camera_at(60, 50, 70), "window_size": (8, 6)}
-    vdi = pvdi.generate(volume, **view, cmap="prism", clim=(0, 5022), n_colors=5023)
-    assert len(vdi.metadata["transfer_function"]["opacities"]) == 5023
+    looks = {"cmap": ListedColormap(colors), "clim": (0, 5022), "n_colors": 5023, "opacity": 0.5}
+    vdi = pvdi.generate(labels_of(5023, np.uint16), **view, **looks)
+    np.testing.assert_allclose(vdi.metadata["transfer_function"]["colors"], colors, atol=1e-6)
