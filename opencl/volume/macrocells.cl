@@ -64,8 +64,8 @@ __kernel void macrocell_visibility(
         visible[item] = 0;
         return;
     }
-    // A thousandth of an entry on either side covers the rounding of scalars between two different ones
-    const float margin = range.x < range.y ? 1e-3f : 0.0f;
+    // So much of an entry on either side covers the rounding of scalars between two different ones, and of their places
+    const float margin = range.x < range.y ? fmax(1e-3f, 2.4e-7f * (float)entries) : 0.0f;
     const float last = (float)(entries - 1);
     const int first_entry = (int)floor(clamp((range.x - low) * per_scalar - margin, 0.0f, last));
     const int last_entry = (int)ceil(clamp((range.y - low) * per_scalar + margin, 0.0f, last));

@@ -264,9 +264,10 @@ class Task:
         per_scalar = (len(table) - 1) / (last - first) if last > first else np.inf
         with np.errstate(invalid="ignore"):
             at = np.nan_to_num((np.array([low, high], np.float64) - first) * per_scalar)
-        # A thousandth of an entry on either side covers the rounding of scalars
-        begin = np.clip(np.floor(at[0] - 1e-3), 0, len(table) - 1).astype(int)
-        end = np.clip(np.ceil(at[1] + 1e-3), 0, len(table) - 1).astype(int)
+        # So much of an entry on either side covers the rounding of scalars, and of their places
+        margin = max(1e-3, 2.4e-7 * len(table))
+        begin = np.clip(np.floor(at[0] - margin), 0, len(table) - 1).astype(int)
+        end = np.clip(np.ceil(at[1] + margin), 0, len(table) - 1).astype(int)
         before = np.concatenate([[0], np.cumsum(table > 0)])
         found: NDArray[np.bool_] = (before[end + 1] > before[begin]) & (
             np.asarray(low) <= np.asarray(high)

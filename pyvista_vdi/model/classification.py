@@ -163,7 +163,7 @@ class Classification:
         if "volume_property" in self._in_place:
             from_property = provider("transfer_function_from_property")
             return from_property(  # type: ignore[no-any-return]
-                self._in_place["volume_property"], rgba=volume.rgba
+                self._in_place["volume_property"], volume, rgba=volume.rgba
             )
         if find_spec("pyvista") is None:
             raise MissingDependencyError(

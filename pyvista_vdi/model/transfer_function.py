@@ -15,6 +15,9 @@ from pyvista_vdi.model.lighting import Shading
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
 OPAQUE_OPTICAL_DEPTH = 30.0
 
+#: Share of a volume's scalar range beyond which VTK tells no gradient magnitudes apart.
+GRADIENT_SHARE = 0.25
+
 
 class TransferFunction:
     """Colour and opacity by scalar, piecewise linear between equidistant nodes.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -144,19 +145,23 @@ class Volume(Geometry):
         InvalidVolumeError
             If every value is NaN.
         """
-        if self.chunks is not None:
+        if self.chunks is None:
+            low, high = self._range_in_memory
+        else:
             lows, highs = self.chunks.found_ranges()
             low, high = float(np.fmin.reduce(lows, None)), float(np.fmax.reduce(highs, None))
-        elif self.array.dtype.kind != "f":
-            return float(self.scalars.min()), float(self.scalars.max())
-        else:
-            low = float(np.fmin.reduce(self.array, axis=None))
-            high = float(np.fmax.reduce(self.array, axis=None))
         if np.isnan(low):
             raise InvalidVolumeError(
                 f"every value of {self.name!r} is NaN: there is nothing to render"
             )
         return low, high
+
+    @functools.cached_property
+    def _range_in_memory(self) -> tuple[float, float]:
+        if self.array.dtype.kind != "f":
+            return float(self.scalars.min()), float(self.scalars.max())
+        low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)
+        return float(low), float(high)
 
     def __repr__(self) -> str:
         nx, ny, nz = self.dimensions

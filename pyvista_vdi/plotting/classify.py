@@ -32,8 +32,8 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
     transfer_function_from_property,
 )
 
-#: Most entries of a table: building it takes PyVista time by the square, a second from here on.
-_MAX_COLORS = 4096
+#: Most entries of a table: building it takes PyVista time by the square, some seconds here.
+_MAX_COLORS = 16384
 
 #: ``add_volume``'s names of VTK's mappers.
 _MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")

@@ -89,9 +89,8 @@ def _by_headlight(
     if lights.two_sided:
         facing = np.abs(facing)
     diffuse = shading.diffuse * facing[:, None] * np.array(light.diffuse) * color
-    specular = (
-        shading.specular * reflected[:, None] ** shading.specular_power * np.array(light.specular)
-    )
+    highlight = np.where(reflected > 0, reflected**shading.specular_power, 0.0)
+    specular = shading.specular * highlight[:, None] * np.array(light.specular)
     return shading.ambient * color + np.where(facing[:, None] > 0, diffuse + specular, 0.0)
 
 

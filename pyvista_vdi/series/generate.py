@@ -179,7 +179,8 @@ class StepMaker:
             In place of the series' own.
         """
         volume = self.volume(volume)
-        if self._table is None:
+        # The first step's range is all steps', while a property's functions have theirs in each
+        if self._table is None or self._looks.in_place:
             self._table = self._looks.transfer_function(volume)
         vdi = generate_by_dial(
             volume,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ from pyvista_vdi.volume.grid_part import GridPart
 from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_defines
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
 from pyvista_vdi.volume.upload import (
+    ENTRY_BYTES,
     MACROCELL_BYTES,
     TABLE_BYTES,
     Scale,
@@ -165,6 +166,9 @@ class DeviceVolume:
             transfer_function.unit_distance or self.grid.default_unit_distance, self.sample_distance
         )
         low, high = transfer_function.scalar_range
+        longer = len(transfer_function.opacities) * ENTRY_BYTES - TABLE_BYTES // 10
+        if room is not None and longer > 0:
+            room = replace(room, working=room.working + longer)
         native = reads_natively(runtime, volume, transfer_function, room)
         scale = None if native else scale_of(volume, low, high)
         self.defines = voxel_defines(volume, native)

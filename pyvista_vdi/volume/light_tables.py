@@ -13,10 +13,11 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import LARGEST_POWER
 from pyvista_vdi.model.grid import Geometry
 from pyvista_vdi.model.lighting import Light, Lights, Shading
-from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
 
-#: Share of the scalar range beyond which VTK tells no gradient magnitudes apart.
-GRADIENT_SHARE = 0.25
+#: In place of a specular power of 0, as of which a highlight is where the ray is mirrored to the
+#: eye's side: what small powers tend to, while 0 to the power of 0 is 1.
+_LEAST_POWER = 1e-30
 #: In place of a cone's cosine: the light shines everywhere.
 _NO_CONE = -2.0
 
@@ -60,7 +61,7 @@ def lighting_table(
         shading.ambient,
         shading.diffuse,
         shading.specular,
-        shading.specular_power,
+        max(shading.specular_power, _LEAST_POWER),
         float(lights.two_sided),
         len(lights.lights),
     ]

@@ -36,6 +36,8 @@ _PART_BYTES, _PARTS = 64 * 2**20, 4
 MACROCELL_BYTES = 11
 #: Bytes that are kept for tables: transfer functions, lights, rays. They may be a tenth of it.
 TABLE_BYTES = 2**20
+#: Bytes of a transfer function's entry, and of how many before it are not transparent.
+ENTRY_BYTES = 20
 #: Scalars of 16 bits that are looked up and not classified at each sample: 64 KiB of media.
 _MOST_LOOKED_UP = 4096
 #: Where scaled voxels end, in ranges of the transfer function.

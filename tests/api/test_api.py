@@ -202,9 +202,9 @@ def test_a_vdi_composites(blending, volume, camera):
         ({"cmap": "viridys"}, "cmap='viridys'.*did you mean 'viridis'"),
         ({"opacity": "sigmoid_99x"}, "opacity='sigmoid_99x'"),
         ({"clim": (2, 1)}, "clim must be two finite numbers, the smaller first"),
-        ({"n_colors": 0}, "n_colors must be a whole number from 1 to 4096; got 0"),
+        ({"n_colors": 0}, "n_colors must be a whole number from 1 to 16384; got 0"),
         # Found by fuzzing: errors and warnings of NumPy and VTK came out
-        ({"n_colors": 2**31}, "n_colors must be a whole number from 1 to 4096; got 2147483648"),
+        ({"n_colors": 2**31}, "n_colors must be a whole number from 1 to 16384; got 2147483648"),
         ({"opacity": [7]}, "an opacity array beyond 0 to 1 is stretched .* got 7 to 7"),
         ({"opacity": [-1e308, 1e308]}, "stretched to that range, .* different values"),
         ({"clim": 10**400}, "clim must be two finite numbers"),

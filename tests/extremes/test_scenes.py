@@ -335,7 +335,7 @@ def test_a_light_inside_the_volume(runtime, worst, attenuation):
 
 @pytest.mark.parametrize("power", [0.0, 1e6])
 def test_specular_powers(runtime, worst, power):
-    """From a highlight everywhere to one that hardly a sample is in."""
+    """From a highlight wherever rays are mirrored to the eye's side to one of hardly a sample."""
     function = transfer(shading=Shading(0.1, 0.5, 1.0, power))
     check(runtime, worst, field_volume(), function, (0, 8))
 

@@ -81,6 +81,10 @@ class Part:
     ends: tuple[float, float]
     rgba: bool = False
 
+    def finite_range(self) -> tuple[float, float]:
+        """Return the least and the largest finite scalar of all ranks."""
+        return self.ends
+
 
 class RanksVDISource(VDISource):
     """A :class:`VDISource` that all ranks of a parallel program execute together.
@@ -117,7 +121,7 @@ class RanksVDISource(VDISource):
     def _scalar_range(self, image: Any) -> tuple[float, float]:
         """Return the least and the largest scalar of the whole input."""
         if communicator() is not None:
-            return self._read(image).ends  # type: ignore[attr-defined, no-any-return]
+            return self._read(image).finite_range()  # type: ignore[no-any-return]
         array = scalars_of(require_image(image), self.GetScalars(), self._preference)
         return array.GetFiniteRange()
 

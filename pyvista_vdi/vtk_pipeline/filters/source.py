@@ -100,6 +100,8 @@ class VDISource(SourceSettings):
         super().__init__()
         self._volume: Volume | None = None
         self._volume_key: Any = None
+        self._table: TransferFunction | None = None
+        self._table_key: Any = None
         self._vdi: VDI | None = None
         self._request: Request | None = None
         self.AddObserver("EndEvent", _end_abort)
@@ -286,7 +288,7 @@ class VDISource(SourceSettings):
         assert camera is not None
         assert window_size is not None
         volume = self._read(image)
-        table = transfer_function_from_property(self.GetVolumeProperty(), rgba=volume.rgba)
+        table = self._classify(volume, self.GetVolumeProperty())
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self._options, lights=lights)
         return Request(
@@ -320,6 +322,14 @@ class VDISource(SourceSettings):
             self._volume = volume_from_vtk(image, self._scalars, self._preference)
             self._volume_key = key
         return self._volume
+
+    def _classify(self, volume: Volume, prop: Any) -> TransferFunction:
+        """Return the property's functions over the volume's scalars, the same until they change."""
+        key = (self._volume_key, prop.GetMTime())
+        if self._table is None or key != self._table_key:
+            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
+            self._table_key = key
+        return self._table
 
     def _view(
         self, grid: vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool

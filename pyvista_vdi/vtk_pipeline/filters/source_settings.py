@@ -26,8 +26,8 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, require_image_port
 from pyvista_vdi.vtk_pipeline.filters.properties import (
+    check_property,
     color_function,
-    transfer_function_from_property,
 )
 from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -248,7 +248,7 @@ class SourceSettings(Algorithm):
             If it cannot be honoured: see ``transfer_function_from_property``.
         """
         if prop is not None:
-            transfer_function_from_property(prop, rgba=not prop.GetIndependentComponents())
+            check_property(prop, rgba=not prop.GetIndependentComponents())
         if prop is not self.GetVolumeProperty():
             self._property = None if prop is None else Held(prop)
             self._observe_property()
