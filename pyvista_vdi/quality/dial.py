@@ -318,6 +318,12 @@ def warn_missed(vdi: VDI) -> None:
         warn_external(missed)
 
 
+def taken(vdi: VDI, choice: Choice) -> int:
+    """Return the bytes on the device of the VDI that was chosen."""
+    counts = np.bincount(vdi.counts.reshape(-1), minlength=2)
+    return _bytes(counts, choice.prediction.setting, choice.window_size)
+
+
 def chosen(
     dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int], least: float = 0.0
 ) -> Choice:
@@ -330,9 +336,8 @@ def chosen(
     within = len(ladder)
     if dial.max_bytes is not None:
         free = (1 - _BYTES_MARGIN) * dial.max_bytes
-        within = sum(rung.nbytes <= free for rung in ladder)
-        if within == 0:
-            within = 1
+        within = max(1, sum(rung.nbytes <= free for rung in ladder))
+        if ladder[0].nbytes > dial.max_bytes:
             missed.append(
                 f"max_bytes={dial.max_bytes} cannot be kept: the smallest VDI that a dial makes "
                 f"is predicted to have {ladder[0].nbytes} bytes; allow more, or ask for a smaller "
@@ -459,7 +464,7 @@ def _exponent(sparse: float, dense: float) -> float:
 
 
 def _bytes(counts: NDArray[np.int64], setting: Setting, window_size: tuple[int, int]) -> int:
-    """Predict the bytes on the device of the 8-byte form."""
+    """Predict the bytes on the device of the 8-byte form, by some lists' lengths."""
     width, height = setting.window_size(window_size)
     share = width * height / counts.sum()
     lengths = np.minimum(np.arange(len(counts)), setting.max_supersegments)
