@@ -154,7 +154,8 @@ class Volume(Geometry):
             high = float(np.fmax.reduce(self.array, axis=None))
         if np.isnan(low):
             raise InvalidVolumeError(
-                f"every value of {self.name!r} is NaN: there is nothing to render"
+                f"every value of {self.name!r} is NaN: there is nothing to render; choose another "
+                "array, or leave this volume out"
             )
         return low, high
 

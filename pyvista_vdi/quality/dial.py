@@ -318,10 +318,11 @@ def warn_missed(vdi: VDI) -> None:
         warn_external(missed)
 
 
-def taken(vdi: VDI, choice: Choice) -> int:
-    """Return the bytes on the device of the VDI that was chosen."""
-    counts = np.bincount(vdi.counts.reshape(-1), minlength=2)
-    return _bytes(counts, choice.prediction.setting, choice.window_size)
+def bytes_of(vdi: VDI) -> int:
+    """Return the bytes of a VDI on the device in its 8-byte form, as they are predicted."""
+    occupied = int(np.count_nonzero(vdi.counts))
+    per_list = _SUPERSEGMENT_BYTES * vdi.n_supersegments + _HEADER_BYTES * occupied
+    return per_list + _LIST_BYTES * (vdi.counts.size + 1)
 
 
 def chosen(
@@ -464,7 +465,7 @@ def _exponent(sparse: float, dense: float) -> float:
 
 
 def _bytes(counts: NDArray[np.int64], setting: Setting, window_size: tuple[int, int]) -> int:
-    """Predict the bytes on the device of the 8-byte form, by some lists' lengths."""
+    """Predict the bytes on the device of the 8-byte form."""
     width, height = setting.window_size(window_size)
     share = width * height / counts.sum()
     lengths = np.minimum(np.arange(len(counts)), setting.max_supersegments)

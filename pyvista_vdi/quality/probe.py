@@ -36,10 +36,10 @@ from pyvista_vdi.quality.dial import (
     Dial,
     Measurement,
     Setting,
+    bytes_of,
     chosen,
     predictions,
     refuse_settings,
-    taken,
 )
 from pyvista_vdi.quality.tiles import REACH, TileSample, tiles_ssim, window_pixels
 from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
@@ -120,9 +120,9 @@ def generate_by_dial(
             progress=_rest(progress),
             metadata={**(metadata or {}), "dial": choice.to_dict()},
         )
-        if taken(vdi, choice) <= limit or expected > limit:  # that is said
+        if bytes_of(vdi) <= limit or expected > limit:  # that is said
             return vdi
-        overrun *= taken(vdi, choice) / expected
+        overrun *= bytes_of(vdi) / expected
 
 
 def _counted(progress: Progress | None) -> Progress | None:

@@ -107,7 +107,7 @@ def test_images_of_steps_are_written_as_asked_for(series, capsys, tmp_path):
     ("arguments", "message"),
     [
         ("series {0} {series} -o x.vdis", "not some of each"),
-        ("series {0} {1} -o x.vdis --times 1", "2 files and 1 times"),
+        ("series {0} {1} -o x.vdis --times 1", "2 steps and 1 times"),
         ("series {series} -o x.vdis --times 1", "own times"),
         ("series {0} -o x.vdi", ".vdis"),
         ("series {0} -o x.vdis --tolerance 2", "tolerance"),
