@@ -100,17 +100,22 @@ class SetSettings:
         V_Os to begin with.
     nbytes : float
         Expected bytes of their VDIs; NaN where nothing was measured.
+    growth : (float, float)
+        Lists along an edge, and the longest list, of a V_O that comes to help over the others': 1
+        where the user has said what they are.
     """
 
     lists: float
     max_supersegments: int
     views: int
     nbytes: float = math.nan
+    growth: tuple[float, float] = (_FINER, _FINER)
 
     def finer(self) -> SetSettings:
         """Return those of a V_O that comes to help where others did not do."""
-        longest = math.ceil(_FINER * self.max_supersegments)
-        return dataclasses.replace(self, lists=_FINER * self.lists, max_supersegments=longest)
+        denser, longer = self.growth
+        longest = math.ceil(longer * self.max_supersegments)
+        return dataclasses.replace(self, lists=denser * self.lists, max_supersegments=longest)
 
 
 def generate_set(
@@ -388,15 +393,20 @@ class _Placing:
         self._progress, self._done = progress, 0.0
         self._choices: list[_Choice] = []
         self._coarse: list[_Choice] = []
+        self._growth = (_FINER, _FINER)
 
     def measure(self, lists: float | None, max_supersegments: int | None, *, sphere: bool) -> None:
         """Find out by a few VDIs what settings are expected to give: the choices."""
+        self._growth = (
+            _FINER if lists is None else 1.0,
+            _FINER if max_supersegments is None else 1.0,
+        )
         if lists is None or max_supersegments is None:
             measured = self._measured(_MEASURED)
         elif sphere:
             measured = self._measured([(lists, max_supersegments)])
         else:
-            only = SetSettings(lists, max_supersegments, 1)
+            only = SetSettings(lists, max_supersegments, 1, growth=self._growth)
             self._choices = [_Choice(only, 0.0, np.zeros(len(_ANGLES)))]
             return
         lengths = _LENGTHS if max_supersegments is None else (max_supersegments,)
@@ -438,7 +448,8 @@ class _Placing:
         angle = max(angle, angles[0])
         views = min(self._max_views, math.ceil((_SPACING / angle) ** 2))
         loss = float(np.interp(angle, angles, worst))
-        settings = SetSettings(lists, longest, views, views * (nbytes + _VIEW_BYTES))
+        nbytes = views * (nbytes + _VIEW_BYTES)
+        settings = SetSettings(lists, longest, views, nbytes, self._growth)
         return _Choice(settings, loss, worst)
 
     def _measured(self, settings: Sequence[tuple[float, int]]) -> _Measured:

@@ -224,6 +224,12 @@ def test_limits_are_kept_and_what_is_missed_is_said(volume, monkeypatch):
     with pytest.warns(VDIWarning, match="not reached"):
         small = _generate(volume, max_bytes=40_000, **coarse)
     assert 1 <= len(small) < 40
+    with pytest.warns(VDIWarning, match="not reached"):
+        helped = _generate(volume, [VIEW, VIEW.azimuth(60)], **coarse)
+    for vdi in (*small, *few, *helped):  # those that come to help as well
+        assert vdi.metadata["max_supersegments"] == 4 >= vdi.counts.max()
+        assert np.prod(vdi.window_size) <= 0.25 * np.prod(SIZE)
+    assert len(helped) > 1
 
 
 #: Where views are that a volume of one long and detailed side looks larger from than from others.
