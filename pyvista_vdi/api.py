@@ -132,7 +132,8 @@ def generate(
     memory_limit : int, float or str, optional
         Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
         has. A volume that does not fit goes there brick by brick: that takes more time, and the
-        VDI is the same to the last bit. See docs/performance.md, "Larger than memory".
+        VDI is the same to the last bit. See docs/performance.md, "Larger than memory". Of a chunked
+        volume blocks are smaller.
     client : distributed.Client, optional
         Of a Dask cluster, whose workers make the VDI of a chunked volume (a :class:`Volume` of a
         Dask, zarr or h5py array, or of :func:`open_volume`). Without it such a volume is made
