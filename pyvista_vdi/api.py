@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import BLENDINGS, DEFAULTS, IN_PLACE, Classification
 from pyvista_vdi.model.inputs import as_vdi, as_volume
@@ -132,7 +132,8 @@ def generate(
     memory_limit : int, float or str, optional
         Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
         has. A volume that does not fit goes there brick by brick: that takes more time, and the
-        VDI is the same to the last bit. See docs/performance.md, "Larger than memory".
+        VDI is the same to the last bit. See docs/performance.md, "Larger than memory". Of a chunked
+        volume blocks are smaller.
     client : distributed.Client, optional
         Of a Dask cluster, whose workers make the VDI of a chunked volume (a :class:`Volume` of a
         Dask, zarr or h5py array, or of :func:`open_volume`). Without it such a volume is made
@@ -198,39 +199,16 @@ def generate(
     )
     volume = as_volume(volume, looks.scalars, looks.preference)
     metadata = {"classification": looks.describe(), "scalars": volume.name}
-    if volume.chunked:
-        from pyvista_vdi.large.entrance import generate_in_blocks
+    from pyvista_vdi.series.generate import generate_anywhere
 
-        if dial is not None:
-            raise UnsupportedError(
-                "quality, target_ssim, target_fps and max_bytes measure the scene, and "
-                f"{volume.name!r} is chunked: give max_supersegments, or load a coarse level"
-            )
-        return generate_in_blocks(
-            volume,
-            view,
-            window_size,
-            looks.transfer_function(volume),
-            options,
-            client=client,
-            device=device,
-            progress=progress,
-            metadata=metadata,
-        )
-    if client is not None:
-        raise InvalidArgumentError(
-            f"client is for chunked volumes, and {volume.name!r} is in memory: give a Volume of a "
-            "Dask array (dask.array.from_array), or leave client out"
-        )
-    from pyvista_vdi.quality.probe import generate_by_dial
-
-    vdi = generate_by_dial(
+    vdi = generate_anywhere(
         volume,
         view,
         window_size,
         looks.transfer_function(volume),
         dial,
         options,
+        client=client,
         device=device,
         progress=progress,
         metadata=metadata,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 __all__ = [
     "Cancelled",
@@ -124,6 +126,17 @@ class VDIFileError(VDIError, ValueError):
 
 class Cancelled(VDIError, RuntimeError):  # noqa: N818 - an outcome that a callback asked for
     """Work was cancelled by a progress callback; nothing was written."""
+
+
+@contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Say in the message of what is wrong with a volume which of several it is."""
+    try:
+        yield
+    except InvalidVolumeError as error:
+        if what in str(error):
+            raise
+        raise type(error)(f"{what}: {error}") from error
 
 
 class VDIWarning(UserWarning):

@@ -166,7 +166,10 @@ def volume(options: Options, *instead: tuple[str, str]) -> None:
 
 def volumes(options: Options) -> None:
     """Add volumes, the time steps of one."""
-    text = f"{VOLUME_FILE}; several are time steps"
+    text = (
+        f"{VOLUME_FILE}; several are time steps, step_2 before step_10, and so are those of a "
+        "store or a .pvd"
+    )
     _file_or_example(options, "files", text, "VOLUME", nargs="*", default=[])
 
 
@@ -207,7 +210,8 @@ def grid(options: Options) -> None:
     text = "of a multi-scale store: 0 is the finest; auto (default): what the view requires"
     option(options, "--level", text, "auto|N", parse_level)
     option(options, "--channel", "of a store (default: 0)", "N|NAME", parse_channel)
-    option(options, "--time-index", "of a store: which step (default: 0)", "N", int)
+    text = "of a store: which step (default: 0; of a series or a server all)"
+    option(options, "--time-index", text, "N", int)
 
 
 def array(options: Options) -> None:
@@ -388,7 +392,7 @@ def file_format(parser: argparse.ArgumentParser) -> None:
 
 def scheduler(options: Options) -> None:
     """Add the cluster."""
-    text = "of a store: its VDI is made by the workers of the Dask cluster with this scheduler"
+    text = "of stores: VDIs are made by the workers of the Dask cluster with this scheduler"
     option(options, "--scheduler", text, "ADDRESS")
 
 

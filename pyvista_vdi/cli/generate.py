@@ -44,12 +44,9 @@ def generate(options: argparse.Namespace) -> int:
     occlusion = ambient_occlusion(options)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
+    volume = as_seen(options, volume, view)
     if isinstance(volume, StoredVolume):
-        level = "auto" if options.level is None else options.level
-        volume = volume.at_level(level, view, options.size)
         print(volume.describe(), file=sys.stderr)
-    if options.scheduler is not None and not volume.chunked:
-        raise UnsupportedError("--scheduler is for stores of chunks, such as x.ome.zarr")
     nx, ny, nz = volume.dimensions
     width, height = options.size
     if volume.chunked:
@@ -97,6 +94,15 @@ def generate(options: argparse.Namespace) -> int:
     if chosen is not None:
         print(chosen)
     return 0
+
+
+def as_seen(options: argparse.Namespace, volume: Volume, view: Camera) -> Volume:
+    """Return a volume at the level that a view requires, where it is of a store with several."""
+    if options.scheduler is not None and not volume.chunked:
+        raise UnsupportedError("--scheduler is for stores of chunks, such as x.ome.zarr")
+    if not isinstance(volume, StoredVolume):
+        return volume
+    return volume.at_level("auto" if options.level is None else options.level, view, options.size)
 
 
 def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:

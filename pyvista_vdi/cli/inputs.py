@@ -46,10 +46,10 @@ CLASSIFICATION = (
 _OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")
 
 #: Options that say what is taken of a store of chunks.
-_OF_A_STORE = ("level", "channel", "time_index")
+OF_A_STORE = ("level", "channel", "time_index")
 
 #: Options that say what is read, and how a volume looks.
-OF_ANY_VOLUME = (*_OF_A_VOLUME, *_OF_A_STORE, "tf", "transfer_function", *CLASSIFICATION)
+OF_ANY_VOLUME = (*_OF_A_VOLUME, *OF_A_STORE, "tf", "transfer_function", *CLASSIFICATION)
 
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
@@ -61,20 +61,25 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
     A store is read whole, unless ``in_chunks``.
     """
     if options.example is None and is_store(options.file):
-        volume: Any = _open_store(options)
+        volume: Any = open_store(options)
         if len(volume.store.levels) > 1 and options.level in (None, "auto"):
             # Of another level they are others
             refuse(options, ("spacing", "origin"), "one level of a store, which --level chooses")
         if not in_chunks:
             volume = _loaded(volume)
     else:
-        refuse(options, _OF_A_STORE, "stores of chunks, such as x.ome.zarr, and this is none")
+        refuse(options, OF_A_STORE, "stores of chunks, such as x.ome.zarr, and this is none")
         if options.example is not None:
             from pyvista_vdi import examples
 
             volume = examples.load_data(options.example, as_volume=True)
         else:
             volume = read_file(Path(options.file), _read_quietly)
+    return laid_out(volume, options)
+
+
+def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
+    """Return a volume with the scalars, the spacing and the origin asked for."""
     taken = as_volume(volume, options.scalars, options.preference or "point")
     if options.spacing is None and options.origin is None:
         return taken
@@ -88,17 +93,24 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
 
 
 def _read_quietly(file: Path) -> Any:
-    """Read by PyVista, and let VTK's readers write nothing: the error says what is wrong."""
+    with quietly():
+        return provider("read_by_pyvista")(file)
+
+
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Let VTK's readers write nothing: the error says what is wrong."""
     before = logging.root.manager.disable
     logging.disable(logging.ERROR)
     try:
         with import_pyvista().vtk_verbosity("off"):
-            return provider("read_by_pyvista")(file)
+            yield
     finally:
         logging.disable(before)
 
 
-def _open_store(options: argparse.Namespace) -> StoredVolume:
+def open_store(options: argparse.Namespace) -> StoredVolume:
+    """Open the store that is named, with what is asked of it."""
     return open_volume(
         options.file,
         level="auto" if options.level is None else options.level,
@@ -134,7 +146,7 @@ def is_volume(options: argparse.Namespace) -> bool:
     if not (is_vdi_file(options.file) or is_series(options) or is_set(options)):
         return True
     is_vdi = f"{printable(options.file)} is a VDI: "
-    refuse(options, (*_OF_A_VOLUME, *_OF_A_STORE), "volumes", is_vdi)
+    refuse(options, (*_OF_A_VOLUME, *OF_A_STORE), "volumes", is_vdi)
     return False
 
 

@@ -26,6 +26,7 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
     refuse,
 )
+from pyvista_vdi.cli.steps import in_order
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError, VDIFileError
 from pyvista_vdi.io import check_writable, to_bytes, write_png
@@ -62,13 +63,14 @@ def movie(options: argparse.Namespace) -> int:
     if options.path is not None:
         turned = [name for name in ("azimuth", "elevation") if getattr(options, name)]
         refuse(options, (*PLACE, "view_angle", *turned), "movies without --path")
-    keys = [from_json(file, Camera.from_dict, "camera") for file in options.path or ()]
+    files = in_order(options.path or ())
+    keys = [from_json(file, Camera.from_dict, "camera") for file in files]
     if len({key.parallel_projection for key in keys}) > 1:
         raise InvalidArgumentError(
             "views of a path are all parallel or all perspective; got "
             + ", ".join(
                 f"{printable(file)}: {'parallel' if key.parallel_projection else 'perspective'}"
-                for file, key in zip(options.path, keys, strict=True)
+                for file, key in zip(files, keys, strict=True)
             )
         )
 

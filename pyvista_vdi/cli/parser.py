@@ -340,10 +340,14 @@ def _add_serve(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_series(parser: argparse.ArgumentParser) -> None:
-    text = f"VDIs, or other series, .vdis; or volumes, each {declare.VOLUME_FILE}"
+    text = (
+        f"VDIs, or other series, .vdis; or volumes, each {declare.VOLUME_FILE}. Of a store, a "
+        ".pvd, a .vti.series and other files with time steps all are taken. Names in a shell's "
+        "order are put in that of their numbers, step_2 before step_10"
+    )
     declare.option(parser, "files", text, "FILE", nargs="+")
     declare.output(parser, ".vdis to write")
-    times = "of the files, ascending (default: 0,1,2,...)"
+    times = "of the steps, ascending (default: those in the files, else 0,1,2,...)"
     declare.option(parser, "--times", times, "A,B,...", declare.parse_numbers)
     group = parser.add_argument_group("file")
     text = (
@@ -364,6 +368,7 @@ def _add_series(parser: argparse.ArgumentParser) -> None:
     declare.longest(group, "longest list (default: 20)")
     declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
     declare.memory_limit(group)
+    declare.scheduler(group)
     declare.camera(parser, "the view that the first volume fills")
     declare.classification(parser)
     declare.device(parser)

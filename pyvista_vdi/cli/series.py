@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     OF_ANY_VOLUME,
     PLACE,
@@ -16,16 +17,16 @@ from pyvista_vdi.cli.inputs import (
     measuring,
     of_the_file,
     part,
-    read_volume,
     refuse,
     say_written,
 )
+from pyvista_vdi.cli.steps import Step, in_order, steps_of_vdis, steps_of_volumes, timed
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.io import check_write_options, checked_target
-from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.io.files import HTML_SUFFIX
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
+from pyvista_vdi.large.entrance import connected
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series import reader
@@ -40,39 +41,38 @@ OF_WRITTEN_IMAGES = ("standard_channels", "linear")
 
 def series(options: argparse.Namespace) -> int:
     """Write a series of the files that are named: VDIs, series of them, or volumes."""
-    kinds = [_kind(file) for file in options.files]
+    files = in_order(options.files)
+    kinds = [_kind(file) for file in files]
     if len(set(kinds)) > 1:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
     if kinds[0] != "volume":
         of_volumes = (*OF_ANY_VOLUME, *PLACE, "view_angle", "sample_distance", "memory_limit")
-        refuse(options, of_volumes, "volumes")
-    times = options.times
-    if times is not None and (kinds[0] == "series" or len(times) != len(options.files)):
-        raise InvalidArgumentError(
-            f"--times gives a time to each file: there are {len(options.files)} files and "
-            f"{len(times)} times"
-            if kinds[0] != "series"
-            else "the series have their own times: leave out --times"
-        )
-    arguments = of_the_file(options)
-    arguments |= {"tolerance": options.tolerance, "key_every": options.key_every}
-    steps = _vdis(options.files) if kinds[0] != "volume" else None
+        refuse(options, (*of_volumes, "scheduler"), "volumes")
+    if options.times is not None and kinds[0] == "series":
+        raise InvalidArgumentError("the series have their own times: leave out --times")
+    if kinds[0] == "volume":
+        steps = steps_of_volumes(files, options, in_chunks=True)
+    else:
+        steps = steps_of_vdis(files)
+    if kinds[0] != "series":
+        steps = timed(steps, options.times)
     looks = classification(options)
     Classification(looks, "series")  # refused before a volume is read
     target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
     # A writer's file grows step by step: it gets its name when it is whole, and all have been read
     with (
         tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder,
+        connected(options.scheduler) as client,
         measuring("writing a series") as bar,
     ):
         part = Path(folder) / target.name
-        if steps is not None:
-            with SeriesWriter(part, **arguments) as out:
-                for i, (time, vdi) in enumerate(steps):
-                    out.append(vdi, time if times is None else times[i])
-                    bar((i + 1) / max(i + 2, len(options.files)))
+        if kinds[0] == "volume":
+            _write_volumes(part, steps, options, {"client": client, **looks}, bar)
         else:
-            _write_volumes(part, options, looks, arguments, bar)
+            with SeriesWriter(part, **_of_the_series(options)) as out:
+                for i, step in enumerate(steps):
+                    out.append(step.read(), step.time)
+                    bar((i + 1) / len(steps))
         part.replace(target)
     about = reader.read_info(options.output)
     print(f"{printable(options.output)}: {len(about.times)} steps, {mebibytes(about.file_bytes)}")
@@ -80,37 +80,36 @@ def series(options: argparse.Namespace) -> int:
 
 
 def _write_volumes(
-    target: Path,
-    options: argparse.Namespace,
-    looks: dict[str, Any],
-    arguments: dict[str, Any],
-    bar: Any,
+    target: Path, steps: list[Step], options: argparse.Namespace, more: dict[str, Any], bar: Any
 ) -> None:
-    from pyvista_vdi.cli.generate import generating_view
+    """Write VDIs of volumes, all from the view that the first one has."""
+    with naming(steps[0].name):
+        volume = steps[0].read()
+    view = generating_view(options, volume)
+    with SeriesWriter(
+        target,
+        view,
+        options.size,
+        max_supersegments=options.max_supersegments,
+        sample_distance=options.sample_distance,
+        memory_limit=options.memory_limit,
+        device=options.device,
+        **_of_the_series(options),
+        **more,
+    ) as out:
+        for i, step in enumerate(steps):
+            with naming(step.name):
+                volume = step.read() if i else volume
+                out.append(as_seen(options, volume, view), step.time)
+            bar((i + 1) / len(steps))
 
-    out: SeriesWriter | None = None
-    try:
-        for i, file in enumerate(options.files):
-            volume = read_volume(
-                argparse.Namespace(**{**vars(options), "file": file, "example": None})
-            )
-            if out is None:
-                out = SeriesWriter(
-                    target,
-                    generating_view(options, volume),
-                    options.size,
-                    max_supersegments=options.max_supersegments,
-                    sample_distance=options.sample_distance,
-                    memory_limit=options.memory_limit,
-                    device=options.device,
-                    **arguments,
-                    **looks,
-                )
-            out.append(volume, None if options.times is None else options.times[i])
-            bar((i + 1) / len(options.files))
-    finally:
-        if out is not None:
-            out.close()
+
+def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
+    return {
+        **of_the_file(options),
+        "tolerance": options.tolerance,
+        "key_every": options.key_every,
+    }
 
 
 def _kind(file: str) -> str:
@@ -119,16 +118,6 @@ def _kind(file: str) -> str:
     if reader.is_series_file(file):
         return "series"
     return "VDI" if is_vdi_file(file) else "volume"
-
-
-def _vdis(files: Sequence[str]) -> Iterator[tuple[float | None, VDI]]:
-    """Yield the times, where the files have any, and the VDIs of all files."""
-    for file in files:
-        if reader.is_series_file(file):
-            steps = reader.read(file)
-            yield from zip(steps.times, steps, strict=True)
-        else:
-            yield None, read_vdi(file)
 
 
 def info(options: argparse.Namespace) -> int:

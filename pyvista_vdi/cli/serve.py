@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from pyvista_vdi.cli.inputs import ambient_occlusion, classification, read_volume
+from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
+from pyvista_vdi.errors import naming
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.volume import Volume
 
@@ -16,15 +18,17 @@ class _Steps(Sequence[Volume]):
     """The volumes that the options name, read when they are asked for."""
 
     def __init__(self, options: argparse.Namespace) -> None:
-        self._options = options
-        self._files = options.files or [None]
+        if options.files:
+            self._steps = steps_of_volumes(in_order(options.files), options)
+        else:
+            self._steps = [Step(options.example, None, lambda: read_volume(options))]
 
     def __len__(self) -> int:
-        return len(self._files)
+        return len(self._steps)
 
     def __getitem__(self, step: Any) -> Any:
-        options = argparse.Namespace(**{**vars(self._options), "file": self._files[step]})
-        return read_volume(options)
+        with naming(self._steps[step].name):
+            return self._steps[step].read()
 
 
 def serve(options: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
+from pyvista_vdi.io.time_steps import natural_key
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.volume import Volume
 
@@ -32,7 +33,7 @@ def slices_in(folder: Path) -> list[Path]:
             f"the folder {folder} holds {len(kinds[0])} TIFF and {len(kinds[1])} PNG files: put "
             "the slices of one volume into a folder of their own"
         )
-    return sorted(pictures, key=_natural)
+    return sorted(pictures, key=lambda file: natural_key(file.name.lower()))
 
 
 def read_stack(files: list[Path]) -> Volume:
@@ -58,12 +59,6 @@ def read_stack(files: list[Path]) -> Volume:
             )
         array[i] = picture[::-1]
     return Volume(_grey(array, folder))
-
-
-def _natural(file: Path) -> list[tuple[bool, int, str]]:
-    """Sort key by which slice 10 comes after slice 9."""
-    parts = re.split(r"(\d+)", file.name.lower())
-    return [(p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts]
 
 
 def _is_dicom(file: Path) -> bool:

@@ -28,8 +28,10 @@ from pyvista_vdi.model.volume import Volume, chunked_array
 
 _HDF5 = (".h5", ".hdf5", ".he5", ".ims")
 
-#: Axes of an array that does not name them, from the last one backwards; those of OME-Zarr.
+#: The axes of OME-Zarr, in their order.
 _AXES = ("t", "c", "z", "y", "x")
+#: Those of an array that does not name them, by their number.
+_UNNAMED = {3: _AXES[2:], 4: ("t", *_AXES[2:]), 5: _AXES}
 
 #: Lengths in metres, by the names that OME-Zarr takes of UDUNITS-2.
 _UNITS = {
@@ -93,6 +95,10 @@ class Store:
         Names, where they are known.
     kind : str
         What it is, such as ``"OME-Zarr 0.5"``.
+    clock : (float, float)
+        Time from step to step, and that of the first.
+    named : bool
+        Whether it names its axes.
     """
 
     path: str
@@ -101,6 +107,15 @@ class Store:
     unit: str = ""
     channels: tuple[str, ...] = ()
     kind: str = "zarr"
+    clock: tuple[float, float] = (1.0, 0.0)
+    named: bool = True
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Of its time steps: 0, 1, 2 … where it does not say them."""
+        shape = dict(zip(self.axes, self.levels[0].array.shape, strict=True))
+        step, first = self.clock
+        return tuple(first + step * i for i in range(shape.get("t", 1)))
 
     def index(self, time: int, channel: int | str) -> tuple[int | slice, ...]:
         """Return what is taken of its arrays: a number along time and channel, all of z, y, x."""
@@ -177,6 +192,10 @@ class StoredVolume(Volume):
         number, why = _chosen(self.store, level, camera, window_size)
         return StoredVolume(self.store, number, why, self.time, self.channel)
 
+    def at_time(self, time: int) -> StoredVolume:
+        """Return another time step, by its index: ``store.times`` has as many."""
+        return StoredVolume(self.store, self.level, self.why, time, self.channel)
+
     def describe(self) -> str:
         """Return which level it is, and why, as one line."""
         nx, ny, nz = self.dimensions
@@ -251,6 +270,8 @@ def open_volume(
     else:
         store = _open_zarr(outer, inner)
     number, why = _chosen(store, level, camera, window_size)
+    if not (store.named or "c" in store.axes or time or isinstance(channel, str)):
+        time, channel = channel, 0  # of four axes without names the first may be either
     return StoredVolume(store, number, why, time, channel)
 
 
@@ -321,7 +342,7 @@ def _only(path: str, inner: str, found: Mapping[str, Any]) -> tuple[str, Any]:
 def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
     """Return an array that stands by itself, with what its attributes say of its voxels."""
     name, array = named
-    axes = _axis_names(array)
+    axes, are_named = _axis_names(array)
     _check_axes(f"{path}::{name}", axes)
     attributes = dict(array.attrs)
     unit, spacing = "", attributes.get("spacing")
@@ -334,7 +355,7 @@ def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
             f"{path}::{name}: element_size_um, spacing and origin must be three numbers, along "
             f"z, y and x ({error})"
         ) from error
-    return Store(path, (Level(name, array, grid),), axes, unit, (), kind)
+    return Store(path, (Level(name, array, grid),), axes, unit, (), kind, named=are_named)
 
 
 def _check_axes(path: str, axes: tuple[str, ...]) -> None:
@@ -345,19 +366,19 @@ def _check_axes(path: str, axes: tuple[str, ...]) -> None:
         )
 
 
-def _axis_names(array: Any) -> tuple[str, ...]:
-    """Return the names that zarr 3, xarray or HDF5 have for an array's axes, or OME's order."""
+def _axis_names(array: Any) -> tuple[tuple[str, ...], bool]:
+    """Return the names that zarr 3, xarray or HDF5 have for an array's axes; whether they do."""
     names: Any = getattr(getattr(array, "metadata", None), "dimension_names", None)
     names = names or array.attrs.get("_ARRAY_DIMENSIONS")
     names = names or [dimension.label for dimension in getattr(array, "dims", ())]
     short = [{"time": "t", "channel": "c"}.get(str(n).lower(), str(n).lower()) for n in names]
     if len(short) == array.ndim and set(short) >= {"z", "y", "x"}:
-        return tuple(short)
-    if not 3 <= array.ndim <= len(_AXES):
+        return tuple(short), True
+    if array.ndim not in _UNNAMED:
         raise InvalidVolumeError(
             f"a volume has three axes, before them time and channel; got shape {array.shape}"
         )
-    return _AXES[2:] if array.ndim == 3 else _AXES[-array.ndim :]
+    return _UNNAMED[array.ndim], False
 
 
 def _grid(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Grid:
@@ -425,7 +446,7 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
     _check_axes(path, axes)
     units = [axis.get("unit") for axis in image["axes"][-3:]]
     factors, unit = _to_one_unit(path, units)
-    levels = []
+    levels, clock = [], (1.0, 0.0)
     for entry in image["datasets"]:
         array = group[entry["path"]]
         of_all = image.get("coordinateTransformations", ())
@@ -433,6 +454,8 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
         scale, translation = _placed(path, len(axes), steps)
         grid = _grid(array.shape[-3:], scale[-3:] * factors, translation[-3:] * factors)
         levels.append(Level(entry["path"], array, grid))
+        if "t" in axes and scale[axes.index("t")] > 0:
+            clock = float(scale[axes.index("t")]), float(translation[axes.index("t")])
     names = [channel.get("label") for channel in described.get("omero", {}).get("channels", ())]
     return Store(
         path,
@@ -441,6 +464,7 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
         unit,
         tuple(str(name) for name in names) if all(names) else (),
         f"OME-Zarr {version}",
+        clock,
     )
 
 

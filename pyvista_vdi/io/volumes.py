@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.io import image_stack
+from pyvista_vdi.io.time_steps import listed_steps, lists_steps
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
@@ -35,6 +36,8 @@ def read_file(file: Path, by_pyvista: Callable[[Path], Any] | None = None) -> An
         if slices:
             return image_stack.read_stack(slices)
     suffix = file.suffix.lower()
+    if lists_steps(file):
+        return read_file(_only_step(file), by_pyvista)
     if suffix == ".raw":
         return _read_raw(file)
     if suffix == ".npy":
@@ -44,6 +47,24 @@ def read_file(file: Path, by_pyvista: Callable[[Path], Any] | None = None) -> An
         # axes are
         return provider("read_nrrd")(file, "values")
     return (by_pyvista or provider("read_by_pyvista"))(file)
+
+
+def needs_pyvista(file: Path) -> bool:
+    """Whether a file, no folder, is read by PyVista: by its name."""
+    known = (".raw", ".npy", ".nrrd", ".nhdr")
+    folder = os.path.isdir(file)  # noqa: PTH112 - pathlib's raises for a name that is too long
+    return not folder and file.suffix.lower() not in known
+
+
+def _only_step(file: Path) -> Path:
+    """Return the file that a list of time steps has, if it is one."""
+    steps = listed_steps(file)
+    if len(steps) > 1:
+        raise InvalidVolumeError(
+            f"{file} lists {len(steps)} time steps, and one volume is asked for: name the file of "
+            f"one, such as {steps[0][0]}, or make a series of all (pyvista-vdi series)"
+        )
+    return steps[0][0]
 
 
 def _read_raw(file: Path) -> Volume:

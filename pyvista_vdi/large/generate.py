@@ -22,6 +22,8 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 
+#: Blocks that would fit into a limit of memory: beside one there are lists, and its halo.
+_BLOCKS_IN_LIMIT = 4
 #: Where a block is of which V_O sees nothing.
 NOWHERE = Rectangle(0, 0, 0, 0)
 
@@ -39,7 +41,10 @@ def task_of(
     width, height = check_window_size(window_size)
     require_room(0, (width, height))
     point_bytes = volume.array.dtype.itemsize * (4 if volume.rgba else 1)
-    blocks = Blocks.of(volume, chunks, point_bytes, block_bytes or BLOCK_BYTES)
+    most = block_bytes or BLOCK_BYTES
+    if options.memory_limit is not None:
+        most = min(most, options.memory_limit // _BLOCKS_IN_LIMIT)
+    blocks = Blocks.of(volume, chunks, point_bytes, most)
     gradients = transfer_function.gradient_opacities is not None
     scalars = volume.finite_range() if gradients else (np.nan, np.nan)  # nothing else asks
     camera = Camera.from_any(camera)

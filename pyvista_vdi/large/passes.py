@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.device.buffers import bytes_text
 from pyvista_vdi.device.constants import RUN_WORDS
 from pyvista_vdi.device.work_order import Rectangle, block_items
 from pyvista_vdi.errors import DeviceMemoryError
@@ -338,11 +339,12 @@ class _Marched:
         ambient: NDArray[np.float32] | None = None,
     ) -> None:
         self._task, self._runtime, self._window = task, runtime, window
+        self._size = (window.x1 - window.x0, window.y1 - window.y0)
+        _require_within_limit(task, runtime, volume, self._size)
         options = MediumOptions.of(task.options, {} if lit else {"ambient_occlusion": None})
         self._medium = DeviceVolume(
             runtime, volume, task.transfer_function, options, part=part, ambient=ambient
         )
-        self._size = (window.x1 - window.x0, window.y1 - window.y0)
 
     def __enter__(self) -> _Marched:
         return self
@@ -410,6 +412,33 @@ class _Marched:
         return Piece(self._window, np.concatenate(counts), np.concatenate(runs))
 
 
+def _require_within_limit(
+    task: Task, runtime: Runtime, volume: Volume, size: tuple[int, int]
+) -> None:
+    """Raise DeviceMemoryError where a block or rows of all lists are more than may be taken."""
+    limit = task.options.memory_limit
+    if limit is None or not all(size):
+        return
+    own = volume.array.nbytes + Slices(runtime, size, task.options).bytes
+    together = _slices_to_merge(task, runtime, task.size[1])
+    if max(own, together.bytes) > limit:
+        points = " x ".join(map(str, volume.dimensions))
+        raise DeviceMemoryError(
+            f"a block of {points} points takes {bytes_text(own)} with its lists, and "
+            f"{together.rows} rows of {task.size[0]} lists {bytes_text(together.bytes)}; "
+            f"memory_limit is {bytes_text(limit)}: raise memory_limit, write the volume in smaller "
+            "chunks, or use a smaller window size or max_supersegments"
+        )
+
+
+def _slices_to_merge(task: Task, runtime: Runtime, rows: int) -> Slices:
+    """Return what rows of all blocks' lists are merged in."""
+    size, longest = (task.size[0], rows), task.options.max_supersegments
+    if task.options.criterion != "least-error":  # what is recorded is cut when all is together
+        longest = Slices(runtime, size, task.options).kept
+    return Slices(runtime, size, task.options, max(CHUNK_STEPS, longest))
+
+
 def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """Return the lengths and the runs of a slice's records."""
     runtime, columns = records.runtime, records.window.x1 - records.window.x0
@@ -445,10 +474,7 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
 def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece]) -> Rows:
     width = task.size[0]
     window, options = Rectangle(0, width, y0, y1), task.options
-    longest = options.max_supersegments
-    if options.criterion != "least-error":  # what blocks record is cut when all of it is together
-        longest = Slices(runtime, (width, y1 - y0), options).kept
-    slices = Slices(runtime, (width, y1 - y0), options, max(CHUNK_STEPS, longest))
+    slices = _slices_to_merge(task, runtime, y1 - y0)
     medium = task.rays()
     with (
         Records(runtime, medium, task.camera, task.size, slices, options, window) as records,

@@ -152,7 +152,8 @@ class Volume(Geometry):
             low, high = float(np.fmin.reduce(lows, None)), float(np.fmax.reduce(highs, None))
         if np.isnan(low):
             raise InvalidVolumeError(
-                f"every value of {self.name!r} is NaN: there is nothing to render"
+                f"every value of {self.name!r} is NaN: there is nothing to render; choose another "
+                "array, or leave this volume out"
             )
         return low, high
 

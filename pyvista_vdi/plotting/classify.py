@@ -228,7 +228,10 @@ def _scalar_range(scalars: Any, clim: float | ArrayLike | None) -> tuple[float, 
         # Of what is read chunk by chunk the ends are known, or found so
         values = np.asarray(scalars.found_ranges() if hasattr(scalars, "found_ranges") else scalars)
         if values.dtype.kind == "f" and np.isnan(values).all():
-            raise InvalidVolumeError("every value is NaN: there is nothing to render")
+            raise InvalidVolumeError(
+                "every value is NaN: there is nothing to render; choose another array, or leave "
+                "this volume out"
+            )
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
         if not (np.isfinite(low) and np.isfinite(high)):
             raise InvalidArgumentError(

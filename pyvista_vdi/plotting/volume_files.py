@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.plotting.dicom import Slice, read_slice, require_uncompressed, slices_of, values_of
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
+from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkDICOMImageReader,
     vtkMetaImageReader,
@@ -28,6 +30,9 @@ from pyvista_vdi.vtk_pipeline.vtk import (
 
 #: Names of files that hold VDIs, not volumes.
 _VDI_SUFFIXES = (".vdi", ".exr", ".html")
+
+#: Names of files whose readers announce times; that of legacy .vtk files announces others.
+_WITH_TIMES = (".vti", ".pvti", ".vtkhdf")
 
 #: Bytes of a MetaImage's header, at most: some twenty lines of text.
 _MAX_META_HEADER = 1 << 16
@@ -88,6 +93,22 @@ def read_volume(path: str | os.PathLike[str]) -> pv.ImageData:
     if data.n_points == 0 or not data.array_names:
         raise InvalidVolumeError(f"{file} holds no scalars that PyVista could read")
     return data
+
+
+def steps_of(path: str | os.PathLike[str]) -> tuple[Sequence[Any], tuple[float, ...]]:
+    """Return what a file holds at each of its times, read when it is asked for, and the times.
+
+    There are none where its reader announces none, or it cannot be read.
+    """
+    try:
+        reader: Any = pv.get_reader(path)
+        if hasattr(reader, "time_values"):
+            return steps_and_times(reader)
+        if Path(path).suffix.lower() in _WITH_TIMES:
+            return steps_and_times(reader.reader)
+    except Exception:  # of each format; reading it as one volume says what is wrong
+        return (), ()
+    return (), ()
 
 
 def _by_pyvista(file: Path) -> Any:

@@ -318,6 +318,13 @@ def warn_missed(vdi: VDI) -> None:
         warn_external(missed)
 
 
+def bytes_of(vdi: VDI) -> int:
+    """Return the bytes of a VDI on the device in its 8-byte form, as they are predicted."""
+    occupied = int(np.count_nonzero(vdi.counts))
+    per_list = _SUPERSEGMENT_BYTES * vdi.n_supersegments + _HEADER_BYTES * occupied
+    return per_list + _LIST_BYTES * (vdi.counts.size + 1)
+
+
 def chosen(
     dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int], least: float = 0.0
 ) -> Choice:
@@ -330,9 +337,8 @@ def chosen(
     within = len(ladder)
     if dial.max_bytes is not None:
         free = (1 - _BYTES_MARGIN) * dial.max_bytes
-        within = sum(rung.nbytes <= free for rung in ladder)
-        if within == 0:
-            within = 1
+        within = max(1, sum(rung.nbytes <= free for rung in ladder))
+        if ladder[0].nbytes > dial.max_bytes:
             missed.append(
                 f"max_bytes={dial.max_bytes} cannot be kept: the smallest VDI that a dial makes "
                 f"is predicted to have {ladder[0].nbytes} bytes; allow more, or ask for a smaller "

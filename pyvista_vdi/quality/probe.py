@@ -8,7 +8,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count
 from typing import Any
@@ -36,6 +36,7 @@ from pyvista_vdi.quality.dial import (
     Dial,
     Measurement,
     Setting,
+    bytes_of,
     chosen,
     predictions,
     refuse_settings,
@@ -78,28 +79,50 @@ def generate_by_dial(
 ) -> VDI:
     """Make a VDI by the settings that a dial chooses, or, without a dial, by the options alone.
 
-    With a dial, the window is that of the pictures, and the VDI's metadata say what was chosen.
-    Arguments and errors are those of :func:`~pyvista_vdi.generation.generate.generate_vdi` and of
-    :func:`choose`.
+    With a dial, the window is that of the pictures, and the VDI's metadata say what was chosen;
+    where it has more bytes than the dial allows, by how much more is known then, and another is
+    made. Arguments and errors are those of
+    :func:`~pyvista_vdi.generation.generate.generate_vdi` and of :func:`choose`.
     """
     options = GenerationOptions.of(options, changes)
-    if dial is not None:
-        scene = (volume, camera, window_size, transfer_function)
-        choice = choose(*scene, dial, options, device=device, progress=_counted(progress))
-        window_size = choice.prediction.window_size
-        options = choice.prediction.setting.applied_to(options)
-        metadata = {**(metadata or {}), "dial": choice.to_dict()}
-        progress = _rest(progress)
-    return generate_vdi(
-        volume,
-        camera,
-        window_size,
-        transfer_function,
-        options,
-        device=device,
-        progress=progress,
-        metadata=metadata,
-    )
+    if dial is None:
+        return generate_vdi(
+            volume,
+            camera,
+            window_size,
+            transfer_function,
+            options,
+            device=device,
+            progress=progress,
+            metadata=metadata,
+        )
+    limit, overrun = dial.max_bytes or math.inf, 1.0
+    while True:
+        choice = choose(
+            volume,
+            camera,
+            window_size,
+            transfer_function,
+            dial,
+            options,
+            overrun=overrun,
+            device=device,
+            progress=_counted(progress),
+        )
+        expected = choice.prediction.nbytes
+        vdi = generate_vdi(
+            volume,
+            camera,
+            choice.prediction.window_size,
+            transfer_function,
+            choice.prediction.setting.applied_to(options),
+            device=device,
+            progress=_rest(progress),
+            metadata={**(metadata or {}), "dial": choice.to_dict()},
+        )
+        if bytes_of(vdi) <= limit or expected > limit:  # that is said
+            return vdi
+        overrun *= bytes_of(vdi) / expected
 
 
 def _counted(progress: Progress | None) -> Progress | None:
@@ -125,6 +148,7 @@ def choose(
     dial: Dial,
     options: GenerationOptions | None = None,
     *,
+    overrun: float = 1.0,
     device: Any = None,
     progress: Progress | None = None,
     **changes: Any,
@@ -141,6 +165,8 @@ def choose(
     options : GenerationOptions, optional
         How the VDI will be made; max_supersegments, tolerance and precision, which the dial
         chooses, must have their defaults.
+    overrun : float
+        Bytes that a VDI of this scene has been seen to take, over those predicted.
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     progress : callable, optional
@@ -172,7 +198,11 @@ def choose(
         )
     scene = Scene(volume, camera, size, transfer_function, dial.angle, device, options, progress)
     measured = _measurement(scene)
-    return chosen(dial, predictions(measured, size), size, measured.least)
+    ladder = [
+        replace(rung, nbytes=math.ceil(overrun * rung.nbytes))
+        for rung in predictions(measured, size)
+    ]
+    return chosen(dial, ladder, size, measured.least)
 
 
 def forget() -> None:

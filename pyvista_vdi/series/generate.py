@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence, Sized
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, naming, warn_external
+from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.large.entrance import generate_in_blocks
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
@@ -17,7 +19,7 @@ from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
+from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, bytes_of, warn_missed
 from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.series.series import Called, VDISeries, checked_times
 
@@ -35,6 +37,7 @@ def generate_series(
     *,
     spacing: Sequence[float] | None = None,
     origin: Sequence[float] | None = None,
+    client: Any = None,
     progress: Progress | None = None,
     device: Any = None,
     **options: Any,
@@ -51,16 +54,20 @@ def generate_series(
         The steps: each what :func:`pyvista_vdi.generate` takes, or an array indexed [z, y, x],
         for which ``spacing`` is given, so that a NumPy or Dask array indexed [step, z, y, x] will
         do. They are taken one by one. Or a function that returns step i; or a VTK or PyVista
-        source that has time steps.
+        source that has time steps; or what :func:`pyvista_vdi.open_volume` returned for a store
+        that has.
     camera : pyvista.Camera or vtkCamera or Camera
         The generating view V_O.
     window_size : (int, int)
         Width and height in pixels.
     times : iterable of float, optional
-        Of the steps, ascending; those of a VTK source, else 0, 1, 2 … by default. For a function
-        they say how many steps there are.
+        Of the steps, ascending; those of a source or a store, else 0, 1, 2 … by default. For a
+        function they say how many steps there are.
     spacing, origin : (float, float, float), optional
         Of steps that are bare arrays, (x, y, z).
+    client : distributed.Client, optional
+        As for :func:`pyvista_vdi.generate`: of a Dask cluster, whose workers make the VDIs of
+        chunked volumes. Dask arrays are chunked then, and else brought into memory step by step.
     progress : callable, optional
         Called with the finished fraction, 0 to 1, of the series where its length is known, else of
         each step; work stops if it returns ``False``.
@@ -83,6 +90,8 @@ def generate_series(
         If a keyword is unknown.
     InvalidArgumentError
         If times do not ascend, or are not as many as the steps, or an option cannot be used.
+    InvalidVolumeError
+        If a step is no volume, or has no value to render; the message says which.
     Cancelled
         If ``progress`` returned ``False``.
 
@@ -96,6 +105,7 @@ def generate_series(
         camera,
         window_size,
         device=device,
+        client=client,
         **{"spacing": spacing, "origin": origin, **options},
     )
     sized = steps if known_times is None else known_times
@@ -104,7 +114,8 @@ def generate_series(
     for volume in steps:
         if known_times is not None and len(vdis) == len(known_times):
             raise InvalidArgumentError(f"there are more steps than the {len(vdis)} times")
-        vdis.append(make(volume, _part(progress, len(vdis), total)))
+        with naming(f"step {len(vdis)}"):
+            vdis.append(make(volume, _part(progress, len(vdis), total)))
         warn_missed(vdis[-1])
     again: Sequence[Volume] | None = None
     if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
@@ -123,7 +134,7 @@ class StepMaker:
     ----------
     function : str
         Name of the caller's function, for messages.
-    camera, window_size, device
+    camera, window_size, device, client
         As for :func:`generate_series`.
     default_precision : str
         Of the VDIs, unless it is given or a dial chooses it.
@@ -139,11 +150,12 @@ class StepMaker:
         default_precision: str = "8-byte",
         *,
         device: Any = None,
+        client: Any = None,
         **given: Any,
     ) -> None:
         self._camera = Camera.from_any(camera)
         self._size = check_window_size(window_size)
-        self._device = device
+        self._device, self._client = device, client
         looks = {n: v for n, v in given.items() if n not in (*GENERATION_NAMES, *_DIAL, *_GRID)}
         self._looks = Classification(looks, function, (*GENERATION_NAMES, *_DIAL, *_GRID))
         dial: dict[str, Any] = {
@@ -158,6 +170,7 @@ class StepMaker:
         self._grid = {n: given[n] for n in _GRID if given.get(n) is not None}
         self._table: TransferFunction | None = None
         self._chosen: dict[str, Any] = {}
+        self._max_bytes = None if self._dial is None else self._dial.max_bytes
 
     def __call__(
         self,
@@ -182,13 +195,14 @@ class StepMaker:
         # The first step's range is all steps', while a property's functions have theirs in each
         if self._table is None or self._looks.in_place:
             self._table = self._looks.transfer_function(volume)
-        vdi = generate_by_dial(
+        vdi = generate_anywhere(
             volume,
             self._camera if camera is None else Camera.from_any(camera),
             self._size if window_size is None else check_window_size(window_size),
             self._table,
             self._dial,
             self._options,
+            client=self._client,
             device=self._device,
             progress=progress,
             metadata={
@@ -199,12 +213,20 @@ class StepMaker:
         )
         if self._dial is not None:
             self._keep_the_choice(vdi)
+        elif self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
+            warn_external(
+                f"max_bytes={self._max_bytes} is not kept by all steps: one has {bytes_of(vdi)} "
+                "bytes on the device, with what was chosen for the first step; allow less, or "
+                "begin with a step that has as much to show"
+            )
+            self._max_bytes = None  # told once
         return vdi
 
     def volume(self, volume: Any) -> Volume:
         """Return what a user calls a step's volume as a :class:`Volume`."""
         if self._grid and not hasattr(volume, "GetClassName") and not isinstance(volume, Volume):
-            volume = Volume(np.asarray(volume), **self._grid)
+            array = volume if self._client is not None else np.asarray(volume)
+            volume = Volume(array, **self._grid)
         return as_volume(volume, self._looks.scalars, self._looks.preference)
 
     def _keep_the_choice(self, vdi: VDI) -> None:
@@ -221,6 +243,40 @@ class StepMaker:
         )
 
 
+def generate_anywhere(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    dial: Dial | None,
+    options: GenerationOptions,
+    *,
+    client: Any = None,
+    device: Any = None,
+    progress: Progress | None = None,
+    metadata: Mapping[str, Any] | None = None,
+) -> VDI:
+    """Make a VDI of a volume in memory, or of a chunked one in blocks, here or by workers.
+
+    Arguments and errors are those of :func:`pyvista_vdi.generate`.
+    """
+    scene = (volume, camera, window_size, transfer_function)
+    made: dict[str, Any] = {"device": device, "progress": progress, "metadata": metadata}
+    if volume.chunked:
+        if dial is not None:
+            raise UnsupportedError(
+                "quality, target_ssim, target_fps and max_bytes measure the scene, and "
+                f"{volume.name!r} is chunked: give max_supersegments, or load a coarse level"
+            )
+        return generate_in_blocks(*scene, options, client=client, **made)
+    if client is not None:
+        raise InvalidArgumentError(
+            f"client is for chunked volumes, and {volume.name!r} is in memory: give a Volume of a "
+            "Dask array (dask.array.from_array), or leave client out"
+        )
+    return generate_by_dial(*scene, dial, options, **made)
+
+
 def _steps(
     volumes: Any, times: Iterable[float] | None
 ) -> tuple[Iterable[Any], tuple[float, ...] | None]:
@@ -235,6 +291,10 @@ def _steps(
                 "volumes is a function of the step's index: pass times, one for each step"
             )
         volumes = Called(volumes, range(len(known)))
+    elif isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
+        own = volumes.store.times
+        known = checked_times(own) if known is None else known
+        volumes = Called(volumes.at_time, range(len(own)))
     elif isinstance(volumes, Volume) or hasattr(volumes, "GetClassName"):
         raise InvalidArgumentError(
             "volumes are the steps of a series, got one volume: pass a list, or call generate"

@@ -224,6 +224,11 @@ def unpacked(data: memoryview | bytes) -> bytes:
     return text
 
 
+def index_bytes(steps: int) -> int:
+    """Return the bytes of the index of so many steps, with what stands around it."""
+    return HEADER_BYTES + steps * (ENTRY.size + HEADER_BYTES) + TRAILER.size
+
+
 def head_bytes(head: Mapping[str, Any], magic: bytes = MAGIC) -> bytes:
     """Return the bytes that a file begins with."""
     text = json.dumps(head, allow_nan=False).encode()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import writer as vdi_writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
@@ -71,7 +71,8 @@ class SeriesWriter:
     device : str, int or device, optional
         Where volumes become VDIs.
     **options
-        For volumes: what :func:`pyvista_vdi.generate_series` takes, classification included.
+        For volumes: what :func:`pyvista_vdi.generate_series` takes, classification and ``client``
+        included.
 
     Raises
     ------
@@ -151,7 +152,8 @@ class SeriesWriter:
                     f"got {type(step).__name__}, which is no VDI: pass camera and window_size to "
                     "SeriesWriter, so that VDIs can be made of volumes"
                 )
-            step = self._make(step)
+            with naming(f"step {len(self)}"):
+                step = self._make(step)
         begin, before = self._stream.tell(), len(self._steps)
         try:
             self._steps.write(self._stream, step, time)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io.progress import Pieces, Progress
@@ -15,6 +16,7 @@ from pyvista_vdi.io.whole_file import check_writable, whole_file, with_suffix
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
+from pyvista_vdi.series.layout import index_bytes
 from pyvista_vdi.series.reader import SeriesInfo, StepsReader
 from pyvista_vdi.series.writer import StepsWriter
 from pyvista_vdi.sets.vdi_set import VDISet
@@ -90,15 +92,7 @@ def write(
     views = list(vdi_set.cameras)
     done = Pieces(progress, len(views))
     with whole_file(target) as stream:
-        writer.begin(
-            stream,
-            MAGIC,
-            FORMAT_NAME,
-            views=[view.to_dict() for view in views],
-            picture_size=list(vdi_set.window_size),
-            bounds=list(vdi_set.bounds),
-            about=vdi_set.about,
-        )
+        _begin(writer, stream, vdi_set)
         if stream.tell() > MAX_DESCRIPTION_BYTES:
             raise InvalidVDIError(f"{len(views)} views are more than a file's head can hold")
         for i in range(len(views)):
@@ -106,6 +100,26 @@ def write(
             done()
         writer.finish(stream)
     return target
+
+
+def bytes_around(vdi_set: VDISet) -> int:
+    """Return the bytes that a set's file has beside the frames of its VDIs."""
+    stream = io.BytesIO()
+    _begin(StepsWriter("8-byte", 0.0, 1, "zstd", 1), stream, vdi_set)
+    return stream.tell() + index_bytes(len(vdi_set.cameras))
+
+
+def _begin(writer: StepsWriter, stream: BinaryIO, vdi_set: VDISet) -> None:
+    """Write the head of a set's file."""
+    writer.begin(
+        stream,
+        MAGIC,
+        FORMAT_NAME,
+        views=[view.to_dict() for view in vdi_set.cameras],
+        picture_size=list(vdi_set.window_size),
+        bounds=list(vdi_set.bounds),
+        about=vdi_set.about,
+    )
 
 
 def read(

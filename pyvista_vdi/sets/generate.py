@@ -31,6 +31,7 @@ from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.tiles import REACH, seen_region
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.series.writer import StepsWriter
+from pyvista_vdi.sets.files import bytes_around
 from pyvista_vdi.sets.render import blended
 from pyvista_vdi.sets.sphere import orbit, spiral, spread
 from pyvista_vdi.sets.vdi_set import VDISet
@@ -57,6 +58,12 @@ _LISTS, _LENGTHS = (
     (0.7, 0.77, 0.85, 0.92, 1.0, 1.1, 1.2, 1.3, 1.4),
     (5, 6, 7, 8, 10, 12, 14, 17, 20),
 )
+#: Lists per pixel where more do not fit into ``max_bytes``.
+_FEW_LISTS = (0.2, 0.3, 0.4, 0.5, 0.6)
+#: Bytes of a view beside its VDI, in the head and the index of a file, about.
+_VIEW_BYTES = 600
+#: Share of ``max_bytes`` that is planned for again where more was taken than expected.
+_ROOM = 0.97
 #: Degrees from V_O at which they are.
 _ANGLES = (5.0, 10.0, 15.0, 20.0, 26.0)
 #: How many directions they are measured from.
@@ -92,18 +99,23 @@ class SetSettings:
     views : int
         V_Os to begin with.
     nbytes : float
-        Expected bytes of the file; NaN where nothing was measured.
+        Expected bytes of their VDIs; NaN where nothing was measured.
+    growth : (float, float)
+        Lists along an edge, and the longest list, of a V_O that comes to help over the others': 1
+        where the user has said what they are.
     """
 
     lists: float
     max_supersegments: int
     views: int
     nbytes: float = math.nan
+    growth: tuple[float, float] = (_FINER, _FINER)
 
     def finer(self) -> SetSettings:
         """Return those of a V_O that comes to help where others did not do."""
-        longest = math.ceil(_FINER * self.max_supersegments)
-        return dataclasses.replace(self, lists=_FINER * self.lists, max_supersegments=longest)
+        denser, longer = self.growth
+        longest = math.ceil(longer * self.max_supersegments)
+        return dataclasses.replace(self, lists=denser * self.lists, max_supersegments=longest)
 
 
 def generate_set(
@@ -142,7 +154,7 @@ def generate_set(
     target_ssim : float
         SSIM against volume rendering that each direction is to have, 0 to 1.
     max_bytes : int, optional
-        Most bytes of the set's file, as expected while it is made; goes before the target.
+        Most bytes of the file that :meth:`VDISet.save` writes by default; goes before the target.
     max_views : int
         Most VDIs.
     lists : float, optional
@@ -175,7 +187,7 @@ def generate_set(
     Warns
     -----
     VDIWarning
-        If the target is not reached everywhere.
+        If the target is not reached everywhere; if no VDI is small enough for ``max_bytes``.
 
     See Also
     --------
@@ -232,11 +244,13 @@ def generate_set(
         probes = [Camera.from_any(view) for view in views]
         if not probes:
             raise InvalidArgumentError("there is no view: pass at least one camera")
+    sphere = isinstance(views, str)
     placing = _Placing(maker, probes, goal, max_bytes, int(max_views), progress)
-    settings = placing.settings(lists, max_supersegments, sphere=isinstance(views, str))
-    first = orbit(probes[0], read.bounds, spread(settings.views)) if isinstance(views, str) else []
-    vdi_set = placing.placed(settings, first or probes[:1])
-    vdi_set.about["camera"] = (around if isinstance(views, str) else probes[0]).to_dict()
+    placing.measure(lists, max_supersegments, sphere=sphere)
+    settings, vdi_set = placing.placed(
+        lambda n: orbit(probes[0], read.bounds, spread(n)) if sphere else probes[:1],
+        around if sphere else probes[0],
+    )
     vdi_set._maker = Growth(maker, settings, goal)
     return vdi_set
 
@@ -374,40 +388,57 @@ class _Placing:
     ) -> None:
         self._maker, self._probes, self._goal = maker, probes, goal
         self._aim = 1 - (1 - _SPARE) * (1 - goal)
-        self._max_bytes, self._max_views = max_bytes, max_views
-        self._progress = progress
+        self._limit = math.inf if max_bytes is None else float(max_bytes)
+        self._max_views = max_views
+        self._progress, self._done = progress, 0.0
+        self._choices: list[_Choice] = []
+        self._coarse: list[_Choice] = []
+        self._growth = (_FINER, _FINER)
 
-    def settings(
-        self, lists: float | None, max_supersegments: int | None, *, sphere: bool
-    ) -> SetSettings:
-        """Return how the VDIs are to be made, by what a few of them show."""
+    def measure(self, lists: float | None, max_supersegments: int | None, *, sphere: bool) -> None:
+        """Find out by a few VDIs what settings are expected to give: the choices."""
+        self._growth = (
+            _FINER if lists is None else 1.0,
+            _FINER if max_supersegments is None else 1.0,
+        )
         if lists is None or max_supersegments is None:
             measured = self._measured(_MEASURED)
         elif sphere:
             measured = self._measured([(lists, max_supersegments)])
         else:
-            return SetSettings(lists, max_supersegments, 1)
-        found = []
-        for per_pixel in _LISTS if lists is None else (lists,):
-            for longest in _LENGTHS if max_supersegments is None else (max_supersegments,):
-                losses, nbytes = measured.expected(per_pixel, longest)
-                found.append(self._fewest(per_pixel, longest, losses, nbytes))
-        limit = math.inf if self._max_bytes is None else self._max_bytes
-        reaching = [(each, loss) for each, loss in found if loss <= _SHARE * (1 - self._goal)]
-        within = [each for each, _ in reaching if each.nbytes <= limit]
-        if within:
-            best = min(within, key=lambda each: each.nbytes)
-        else:  # the nearest to what is asked for
-            best = min(found, key=lambda each: each[1])[0]
-        if best.nbytes > limit:
-            views = max(1, int(best.views * limit / best.nbytes))
-            best = dataclasses.replace(best, views=views)
-        _log.debug("a set of %s", best)
-        return best
+            only = SetSettings(lists, max_supersegments, 1, growth=self._growth)
+            self._choices = [_Choice(only, 0.0, np.zeros(len(_ANGLES)))]
+            return
+        lengths = _LENGTHS if max_supersegments is None else (max_supersegments,)
+
+        def choices(several: Sequence[float]) -> list[_Choice]:
+            settings = [(per_pixel, longest) for per_pixel in several for longest in lengths]
+            return [self._fewest(*each, *measured.expected(*each)) for each in settings]
+
+        self._choices = choices(_LISTS if lists is None else (lists,))
+        if lists is None and self._limit < math.inf:
+            self._coarse = choices(_FEW_LISTS)
+
+    def _chosen(self, limit: float) -> SetSettings:
+        """Return how the VDIs are to be made so that they take so many bytes at most."""
+        allowed = _SHARE * (1 - self._goal)
+        reaching = [
+            each.settings
+            for each in self._choices
+            if each.loss <= allowed and not each.settings.nbytes > limit
+        ]
+        if reaching:
+            return min(reaching, key=lambda settings: settings.nbytes)
+
+        def falls_short(each: _Choice) -> tuple[float, float]:
+            within, loss = each.within(limit)
+            return max(1.0, within.nbytes / limit), loss
+
+        return min(self._choices + self._coarse, key=falls_short).within(limit)[0]
 
     def _fewest(
         self, lists: float, longest: int, losses: NDArray[np.float64], nbytes: float
-    ) -> tuple[SetSettings, float]:
+    ) -> _Choice:
         """Return the settings with as many views as keep the goal; and what is lost then."""
         angles = np.asarray(_ANGLES)
         worst = np.maximum.accumulate(losses)
@@ -417,7 +448,9 @@ class _Placing:
         angle = max(angle, angles[0])
         views = min(self._max_views, math.ceil((_SPACING / angle) ** 2))
         loss = float(np.interp(angle, angles, worst))
-        return SetSettings(lists, longest, views, views * nbytes), loss
+        nbytes = views * (nbytes + _VIEW_BYTES)
+        settings = SetSettings(lists, longest, views, nbytes, self._growth)
+        return _Choice(settings, loss, worst)
 
     def _measured(self, settings: Sequence[tuple[float, int]]) -> _Measured:
         """Measure a few settings from a few of the views."""
@@ -437,35 +470,84 @@ class _Placing:
                     losses[i, j] = max(losses[i, j], lost)
         return _Measured(settings, losses, nbytes)
 
-    def placed(self, settings: SetSettings, first: list[Camera]) -> VDISet:
-        """Return the set: V_Os to begin with, and then one after the other where it is worst."""
-        make = self._maker.of(settings)
-        vdis: list[VDI] = []
-        for view in first:
-            self._report(_PILOT_SHARE + _FIRST_SHARE * len(vdis) / len(first))
-            vdis.append(make(view))
+    def placed(
+        self, first: Callable[[int], list[Camera]], camera: Camera
+    ) -> tuple[SetSettings, VDISet]:
+        """Return the set: V_Os to begin with, and then one after the other where it is worst.
+
+        ``first`` returns so many views to begin with, and ``camera`` is kept in the set.
+        """
+        settings, vdis, frames = self._begun(first, camera)
         vdi_set = VDISet(vdis, window_size=self._maker.window_size)
         finer = self._maker.of(settings.finer())
         ssim = np.full(len(self._probes), -np.inf)
         shown: list[Any] = [None] * len(self._probes)
         hopeless = np.zeros(len(self._probes), bool)
-        taken = float(file_bytes(vdis[0]) * len(vdis))
+        full = False
         while True:
             self._judge(vdi_set, ssim, shown)
             worst = int(np.where(hopeless, np.inf, ssim).argmin())
             if ssim[worst] >= self._aim or np.count_nonzero(hopeless) >= _IN_VAIN:
                 break
-            each = _FINER**3 * taken / len(vdi_set)
-            full = self._max_bytes is not None and taken + each > self._max_bytes
+            full = frames * (1 + 1 / len(vdi_set)) > self._limit  # of VDIs that are no finer
             if full or len(vdi_set) >= self._max_views:
                 break
-            vdi_set.add(finer(self._probes[worst]))
-            taken += each
+            more = finer(self._probes[worst])
+            if self._limit < math.inf:
+                frames += file_bytes(more)
+                full = frames + self._around([*vdi_set, more], settings, camera) > self._limit
+            if full:
+                break
+            vdi_set.add(more)
             self._judge(vdi_set, ssim, shown)
             hopeless[worst] = ssim[worst] < self._aim  # although from its own V_O
-        vdi_set.about = self._about(settings, ssim)
+        self._warn(ssim, full)
+        vdi_set.about = self._about(settings, ssim, camera)
         self._report(1.0)
-        return vdi_set
+        return settings, vdi_set
+
+    def _begun(
+        self, first: Callable[[int], list[Camera]], camera: Camera
+    ) -> tuple[SetSettings, list[VDI], int]:
+        """Return settings that are within the limit, the first VDIs, and bytes of their frames."""
+        settings = self._chosen(self._limit)
+        while True:
+            _log.debug("a set of %s", settings)
+            vdis, frames, nbytes = self._made(settings, first(settings.views), camera)
+            if nbytes <= self._limit:
+                return settings, vdis, frames
+            # They take more than expected: as much less is planned for
+            before, share = settings, _ROOM * self._limit / nbytes
+            settings = self._chosen(share * before.nbytes)
+            if settings == before or math.isnan(before.nbytes):
+                width, height = vdis[0].window_size
+                warn_external(
+                    f"max_bytes={self._limit:.0f} cannot be kept: the smallest set, one VDI of "
+                    f"{width} x {height} lists of up to {before.max_supersegments}, takes {nbytes} "
+                    "bytes; allow more, or ask for a smaller window, or for fewer or shorter lists"
+                )
+                return before, vdis, frames
+
+    def _made(
+        self, settings: SetSettings, views: list[Camera], camera: Camera
+    ) -> tuple[list[VDI], int, int]:
+        """Return VDIs, bytes of their frames, and of the file: estimated once it is too large."""
+        make, frames, nbytes = self._maker.of(settings), 0, 0
+        vdis: list[VDI] = []
+        for view in views:
+            self._report(_PILOT_SHARE + _FIRST_SHARE * len(vdis) / len(views))
+            vdis.append(make(view))
+            if self._limit < math.inf:
+                frames += file_bytes(vdis[-1])
+                nbytes = frames + self._around(vdis, settings, camera)
+                if nbytes > self._limit:
+                    return vdis, frames, nbytes * len(views) // len(vdis)
+        return vdis, frames, nbytes
+
+    def _around(self, vdis: Sequence[VDI], settings: SetSettings, camera: Camera) -> int:
+        """Return the bytes of head and index of a file of these VDIs."""
+        about = self._about(settings, np.full(len(self._probes), 1 / 3), camera)
+        return bytes_around(VDISet(vdis, window_size=self._maker.window_size, about=about))
 
     def _judge(self, vdi_set: VDISet, ssim: NDArray[Any], shown: list[Any]) -> None:
         """Measure the views that are shown by other VDIs than before, or by others as well."""
@@ -477,15 +559,19 @@ class _Placing:
                 shown[i] = parts
                 ssim[i] = self._maker.ssim([(vdi_set[k], w) for k, w in parts], view)
 
-    def _about(self, settings: SetSettings, ssim: NDArray[np.float64]) -> dict[str, Any]:
-        least = float(ssim.min())
+    def _warn(self, ssim: NDArray[np.float64], full: bool) -> None:
         missed = int((ssim < self._goal).sum())
         if missed:
+            within = f" within max_bytes={self._limit:.0f}" if full else ""
             warn_external(
-                f"target_ssim={self._goal:g} is not reached in {missed} of {len(ssim)} directions: "
-                f"{least:.4f} is the worst; allow more bytes or views, more or "
+                f"target_ssim={self._goal:g} is not reached in {missed} of {len(ssim)} directions"
+                f"{within}: {ssim.min():.4f} is the worst; allow more bytes or views, more or "
                 "longer lists, or ask for less"
             )
+
+    def _about(
+        self, settings: SetSettings, ssim: NDArray[np.float64], camera: Camera
+    ) -> dict[str, Any]:
         return {
             "target_ssim": self._goal,
             "chosen": {
@@ -494,15 +580,37 @@ class _Placing:
             },
             "reached": {
                 "directions": len(ssim),
-                "least": round(least, 5),
+                "least": round(float(ssim.min()), 5),
                 "mean": round(float(ssim.mean()), 5),
-                "below_target": missed,
+                "below_target": int((ssim < self._goal).sum()),
             },
+            "camera": camera.to_dict(),
         }
 
     def _report(self, fraction: float) -> None:
-        if self._progress is not None and self._progress(min(1.0, fraction)) is False:
+        self._done = max(self._done, min(1.0, fraction))  # where it begins anew, too
+        if self._progress is not None and self._progress(self._done) is False:
             raise Cancelled("making a set of VDIs was cancelled")
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """Settings with as many views as keep the goal, what they lose, and at each angle."""
+
+    settings: SetSettings
+    loss: float
+    losses: NDArray[np.float64]
+
+    def within(self, limit: float) -> tuple[SetSettings, float]:
+        """Return them with as many views as a limit of bytes allows, one at least; and the loss."""
+        full = self.settings
+        if not full.nbytes > limit:
+            return full, self.loss
+        each = full.nbytes / full.views
+        views = max(1, int(limit / each))
+        angle = min(180.0, _SPACING / math.sqrt(views))
+        loss = float(_between(list(_ANGLES), self.losses, angle))
+        return dataclasses.replace(full, views=views, nbytes=views * each), max(self.loss, loss)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,8 @@ LEVELS = (
 LEVELS_WITHIN = {
     "io": (
         ("whole_file", "progress"),
-        ("image_stack", "png", "ranges", "vdi_file"),
+        ("png", "ranges", "time_steps", "vdi_file"),
+        ("image_stack",),
         ("deep_exr", "stores", "volumes"),
         ("files",),
     ),

@@ -41,6 +41,191 @@ def test_volumes_become_a_series(series, volumes):
     assert steps[2].equals(alone)
 
 
+#: Values of three steps, which rise; and their times, where a file says them.
+VALUES, TIMES = (60, 120, 180), [0.5, 1.25, 3.0]
+STEPS = np.stack([np.full((6, 7, 8), value, np.uint8) for value in VALUES])
+
+
+def _store(folder, axes=None, scale=None):
+    zarr = pytest.importorskip("zarr")
+    if scale is None:
+        array = zarr.open(
+            str(folder / "t.zarr"), mode="w", shape=STEPS.shape, chunks=(1, 4, 4, 4), dtype="u1"
+        )
+        if axes:
+            array.attrs["_ARRAY_DIMENSIONS"] = axes
+    else:
+        old = {"zarr_format": 2} if int(zarr.__version__.split(".")[0]) > 2 else {}
+        group = zarr.open_group(str(folder / "t.zarr"), mode="w", **old)
+        array = zarr.open(str(folder / "t.zarr/0"), mode="w", shape=STEPS.shape, dtype="u1", **old)
+        transformations = [
+            {"type": "scale", "scale": [scale, 1, 1, 1]},
+            {"type": "translation", "translation": [1, 0, 0, 0]},
+        ]
+        kinds = {"t": "time"}
+        group.attrs["multiscales"] = [
+            {
+                "version": "0.4",
+                "axes": [{"name": n, "type": kinds.get(n, "space")} for n in "tzyx"],
+                "datasets": [{"path": "0", "coordinateTransformations": transformations}],
+            }
+        ]
+    array[:] = STEPS
+    return ["t.zarr"]
+
+
+def _images(folder, times=(None, None, None)):
+    pv = pytest.importorskip("pyvista")
+    names = [f"step_{number}.vti" for number in (2, 9, 10)]
+    for name, values, time in zip(names, STEPS, times, strict=True):
+        image = pv.ImageData(dimensions=values.shape[::-1])
+        image["v"] = values.ravel()
+        if time is not None:
+            image.field_data["TimeValue"] = [time]
+        image.save(folder / name)
+    return sorted(names)  # as a shell has them: step_10 is the first
+
+
+def _pvd(folder):
+    entries = [
+        f'<DataSet timestep="{time}" part="0" file="step_{number}.vti"/>'
+        for number, time in zip((9, 10, 2), (*TIMES[1:], TIMES[0]), strict=True)
+    ]
+    _images(folder)
+    text = f'<VTKFile type="Collection"><Collection>{"".join(entries)}</Collection></VTKFile>'
+    (folder / "run.pvd").write_text(text)
+    return ["run.pvd"]
+
+
+def _json(folder):
+    _images(folder)
+    files = [
+        {"name": f"step_{n}.vti", "time": time} for n, time in zip((2, 9, 10), TIMES, strict=True)
+    ]
+    (folder / "run.vti.series").write_text(
+        json.dumps({"file-series-version": "1.0", "files": files})
+    )
+    return ["run.vti.series"]
+
+
+def _vtkhdf(folder):
+    h5py = pytest.importorskip("h5py")
+    pytest.importorskip("pyvista")
+    with h5py.File(folder / "run.vtkhdf", "w") as file:
+        group = file.create_group("VTKHDF")
+        extent = [end for n in STEPS.shape[:0:-1] for end in (0, n - 1)]
+        group.attrs.update(
+            {"Version": (2, 0), "WholeExtent": extent, "Direction": np.eye(3).ravel()}
+        )
+        group.attrs.update({"Origin": np.zeros(3), "Spacing": np.ones(3)})
+        group.attrs.create("Type", np.bytes_("ImageData"))
+        group["PointData/v"] = STEPS
+        group["PointData"].attrs.create("Scalars", np.bytes_("v"))
+        group["Steps/Values"] = TIMES
+        group["Steps"].attrs["NSteps"] = 3
+    return ["run.vtkhdf"]
+
+
+def _arrays(folder):
+    names = [f"Step{number}.npy" for number in (8, 9, 10)]
+    for name, values in zip(names, STEPS, strict=True):
+        np.save(folder / name, values)
+    return sorted(names)
+
+
+KINDS = {
+    "a store without names": (_store, [0, 1, 2]),
+    "a store of named axes": (lambda folder: _store(folder, list("tzyx")), [0, 1, 2]),
+    "OME-Zarr that says times": (lambda folder: _store(folder, scale=0.25), [1, 1.25, 1.5]),
+    "numbers in names": (_arrays, [0, 1, 2]),
+    "numbers, no times": (_images, [0, 1, 2]),
+    "numbers and times": (lambda folder: _images(folder, TIMES), TIMES),
+    "times that fall": (lambda folder: _images(folder, TIMES[::-1]), [0, 1, 2]),
+    "times of some": (lambda folder: _images(folder, (0.5, None, 1.0)), [0, 1, 2]),
+    "a collection": (_pvd, TIMES),
+    "a series in JSON": (_json, TIMES),
+    "vtkhdf": (_vtkhdf, TIMES),
+}
+LOOK = ("--size", "12x9", "--cmap", "gray", "--opacity", "linear", "--clim", "0", "255")
+
+
+@pytest.mark.parametrize(("make", "times"), KINDS.values(), ids=KINDS)
+def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files = make(tmp_path)
+    run(capsys, "series", *files, "-o", "run.vdis", *LOOK)
+    steps = pvdi.read("run.vdis")
+    assert list(steps.times) == times
+    assert [round(255 * float(vdi.color.mean())) for vdi in steps] == pytest.approx(VALUES, abs=2)
+    given = (0.1, 0.2, 0.7)
+    run(capsys, "series", *files, "-o", "run.vdis", "--times", "0.1,0.2,0.7", *LOOK)
+    assert pvdi.read("run.vdis").times == given
+
+
+def test_what_is_done_with_names_and_times_is_said(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files = _images(tmp_path, TIMES[::-1])
+    assert cli.main(["series", *files, "-o", "run.vdis", *LOOK]) == 0
+    said = capsys.readouterr().err
+    assert "step_2.vti before step_10.vti" in said
+    assert "do not ascend" in said
+    explicit = ["step_10.vti", "step_2.vti", "step_9.vti"][::-1]  # an order that no shell gives
+    assert cli.main(["series", *explicit, "-o", "run.vdis", *LOOK]) == 0
+    assert "before" not in capsys.readouterr().err
+    colors = [float(vdi.color.mean()) for vdi in pvdi.read("run.vdis")]
+    assert colors[2] == max(colors)
+    assert colors[1] == min(colors)
+
+
+def test_one_time_step_of_a_store(capsys, tmp_path):
+    _store(tmp_path)
+    target = tmp_path / "run.vdis"
+    run(capsys, "series", tmp_path / "t.zarr", "--time-index", "1", "-o", target, *LOOK)
+    (step,) = pvdi.read(target)
+    assert 255 * step.color.mean() == pytest.approx(VALUES[1], abs=2)
+
+
+def test_a_step_without_a_value_is_named(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for k in (0, 1, 2):
+        np.save(f"s_{k}.npy", np.full((5, 5, 5), np.nan if k == 1 else k + 1, np.float32))
+    error = run(capsys, "series", "s_0.npy", "s_1.npy", "s_2.npy", "-o", "s.vdis", *LOOK, status=1)
+    for part in ("s_1.npy", "step 1", "NaN", "leave"):
+        assert part in error
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.pvd", "<VTKFile><Collection/></VTKFile>", "lists no files"),
+        ("a.pvd", "{", "no list of time steps"),
+        (
+            "a.pvd",
+            '<V><DataSet file="b.vti"/><DataSet file="c.vti"/></V>',
+            "2 files for the time 0",
+        ),
+        ("a.pvd", '<V><DataSet timestep="now" file="b.vti"/></V>', "no files with times"),
+        ("a.pvd", '<V><DataSet file="b.vti"/></V>', "b.vti"),
+        ("a.vti.series", '{"files": [{"name": "b.vti"}]}', "no list of time steps"),
+        ("absent.pvd", None, "cannot be read"),
+    ],
+)
+def test_lists_that_are_none_are_refused_by_name(name, text, said, capsys, tmp_path):
+    pytest.importorskip("pyvista")
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    error = run(capsys, "series", tmp_path / name, "-o", tmp_path / "a.vdis", status=1)
+    assert said in error
+    assert str(tmp_path) in error
+
+
+def test_a_verb_of_one_volume_says_what_to_do_with_several(capsys, tmp_path):
+    _pvd(tmp_path)
+    error = run(capsys, "generate", tmp_path / "run.pvd", "-o", tmp_path / "a.vdi", *LOOK, status=1)
+    assert "3 time steps" in error
+    assert "pyvista-vdi series" in error
+
+
 def test_info(series, capsys):
     out = run(capsys, "info", series)
     assert "3, times 0 to 2" in out
@@ -107,7 +292,7 @@ def test_images_of_steps_are_written_as_asked_for(series, capsys, tmp_path):
     ("arguments", "message"),
     [
         ("series {0} {series} -o x.vdis", "not some of each"),
-        ("series {0} {1} -o x.vdis --times 1", "2 files and 1 times"),
+        ("series {0} {1} -o x.vdis --times 1", "2 steps and 1 times"),
         ("series {series} -o x.vdis --times 1", "own times"),
         ("series {0} -o x.vdi", ".vdis"),
         ("series {0} -o x.vdis --tolerance 2", "tolerance"),

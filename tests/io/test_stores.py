@@ -283,7 +283,9 @@ def test_hdf5(tmp_path):
         one = file.create_dataset("deep/one", data=VALUES[0], chunks=(1, 4, 8, 8))
         one.attrs["element_size_um"] = [2.0, 0.5, 0.25]
     volume = pvdi.open_volume(path, channel=1)  # the only one
-    assert volume.store.axes == ("c", "z", "y", "x")
+    assert volume.store.axes == ("t", "z", "y", "x")  # or of channels: nobody says it
+    assert len(volume.store.times) == len(VALUES[0])
+    np.testing.assert_array_equal(volume.at_time(0).load().array, VALUES[0, 0])
     assert volume.store.unit == "micrometer"
     assert volume.spacing == (0.25, 0.5, 2.0)
     np.testing.assert_array_equal(volume.load().array, VALUES[0, 1])

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from runtimes import fresh_runtime
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
@@ -424,6 +425,21 @@ def test_a_grid_of_occlusion_that_is_too_large_is_refused_before_anything_is_rea
     with pytest.raises(DeviceMemoryError, match=r"radius of 8.*larger radius"):
         generate_chunked(volume, camera, WINDOW, function, ambient_occlusion=8.0)
     assert store.points == 0
+
+
+@pytest.mark.parametrize("limit", [10_000, 700_000, 1_600_000, 8_000_000])
+def test_no_more_memory_is_taken_than_allowed(runtime, limit):
+    values = np.random.default_rng(1).integers(0, 255, (96, 96, 96)).astype(np.float32)
+    volume = Volume(values)
+    arguments = (volume, VIEWS["all of it"](volume), WINDOW, transfer_for(volume, "linear"))
+    own = fresh_runtime(runtime)
+    options = {"chunks": (24, 24, 24), "memory_limit": limit, "max_supersegments": 5}
+    if limit < 1_000_000:
+        with pytest.raises(DeviceMemoryError, match="rows of .* memory_limit is .* smaller chunks"):
+            generate_chunked(*arguments, device=own, **options)
+    else:
+        generate_chunked(*arguments, device=own, **options)
+        assert own.peak_allocated <= limit
 
 
 def test_it_is_given_up_when_it_is_asked_to():

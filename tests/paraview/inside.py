@@ -129,6 +129,7 @@ def pipeline(folder):
     (folder / "scene.json").write_text(json.dumps(scene))
     source = brain_source()
     simple.SaveData(str(folder / "brain.vdi"), source)
+    simple.SaveData(str(folder / "small.vdi"), source, Precision="8-byte", Compression="zstd")
     reader = simple.OpenDataFile(str(folder / "brain.vdi"))
     simple.SaveData(str(folder / "again.vdi"), reader)
     simple.SaveData(str(folder / "again.exr"), reader)
@@ -362,7 +363,8 @@ def temporal(folder):
     for time in (2, 0, 1):
         scene.AnimationTime = time
         simple.SaveScreenshot(str(folder / f"scene_{time}.png"), view, ImageResolution=SIZE)
-    simple.SaveData(str(folder / "made.vdis"), source)
+    simple.SaveData(str(folder / "usual.vdis"), source)
+    simple.SaveData(str(folder / "made.vdis"), source, Precision="exact")
 
 
 def mistakes(folder):

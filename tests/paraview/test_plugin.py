@@ -183,6 +183,8 @@ def test_files_keep_every_bit(made):
     assert first.n_supersegments > 10_000
     for name in ("again.vdi", "again.exr", "third.vdi"):
         assert pvdi.read(folder / name).equals(first), name
+    assert pvdi.read(folder / "small.vdi").equals(first.with_precision("8-byte"))
+    assert (folder / "small.vdi").stat().st_size < 0.5 * (folder / "brain.vdi").stat().st_size
 
 
 def test_picture_is_what_render_returns(made, default_runtime):
@@ -367,8 +369,11 @@ def test_vdis_are_made_of_the_time_that_paraview_shows(paraview, tmp_path, defau
     balls = save_steps(tmp_path)
     assert paraview("temporal", tmp_path).strip() == ""
     assert json.loads((tmp_path / "times.json").read_text()) == [0, 1, 2]
-    series = pvdi.read(tmp_path / "made.vdis")
-    assert series.times == (0, 1, 2)
+    series, usual = (pvdi.read(tmp_path / name) for name in ("made.vdis", "usual.vdis"))
+    assert series.times == usual.times == (0, 1, 2)
+    for made, small in zip(series, usual, strict=True):
+        assert (made.precision, small.precision) == ("exact", "8-byte")
+        assert small.equals(made.with_precision("8-byte"))
     for step, made in enumerate(series):
         expected = pvdi.generate(balls[step], made.camera, SCREEN, volume_property=ramp())
         np.testing.assert_array_equal(made.offsets, expected.offsets)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import warnings
 from dataclasses import replace
 from itertools import pairwise
 
@@ -537,6 +538,32 @@ def test_foreign_metadata_are_not_described(foreign):
     vdi = generated()
     vdi.metadata["dial"] = foreign if foreign == 3 else {"window_size": foreign}
     assert vdi.picture_size == vdi.window_size == WINDOW
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_max_bytes_is_kept_where_few_lists_tell_little(seed, default_runtime):
+    """Measured by 13 x 7 lists, sparse points are predicted to take up to a sixth less."""
+    window = (64, 36)
+    values = np.where(np.random.default_rng(seed).random((20, 20, 20)) < 0.02, 100, 0)
+    volume = Volume(values.astype(np.uint8))
+    camera = filling_camera(volume.bounds, window)
+
+    def bytes_of(vdi):
+        return prepared_vdi(default_runtime, vdi).list_bytes
+
+    for rung in (LADDER[0], LADDER[2], LADDER[4], LADDER[8]):
+        size, options = rung.window_size(window), rung.applied_to(GenerationOptions())
+        limit = int(0.99 * bytes_of(generate_vdi(volume, camera, size, TRANSFER, options)))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            vdi = generated(default_runtime, volume, camera, window, max_bytes=limit)
+        missed = [str(warning.message) for warning in caught]
+        assert missed == vdi.metadata["dial"]["missed"]
+        assert bool(missed) == (rung == LADDER[0])
+        if missed:
+            assert f"max_bytes={limit} cannot be kept" in missed[0]
+        else:
+            assert bytes_of(vdi) <= limit
 
 
 def test_a_target_that_is_missed_is_warned_of_where_it_was_asked(default_runtime):

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.errors import (
+    Cancelled,
+    InvalidArgumentError,
+    InvalidVDIError,
+    InvalidVolumeError,
+    VDIWarning,
+)
 from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (20, 12)
@@ -87,6 +93,93 @@ def test_volumes_in_many_shapes_are_the_same_series(series, volumes, camera):
             assert np.array_equal(other.volumes[2].array, volumes[2].array)
             assert other.volumes[2].spacing == SPACING
     assert called == [0, 1, 2, 3, 2, 2]
+
+
+@pytest.fixture
+def store(volumes, tmp_path):
+    """The volumes as time steps of a store."""
+    zarr = pytest.importorskip("zarr")
+    stack = np.stack([volume.array for volume in volumes])
+    path = str(tmp_path / "t.zarr")
+    array = zarr.open(path, mode="w", shape=stack.shape, chunks=(1, 4, 4, 4), dtype="f4")
+    array[...] = stack
+    array.attrs["spacing"] = SPACING[::-1]
+    return path
+
+
+def test_steps_of_a_store_are_made_chunk_by_chunk(store, camera, default_runtime, tmp_path):
+    looks = {"transfer_function": _table()}
+    steps = [pvdi.open_volume(store, time=k) for k in range(4)]
+    expected = [pvdi.generate(step, camera, SIZE, precision="8-byte", **looks) for step in steps]
+    assert all("blocks" in vdi.metadata for vdi in expected)
+    for volumes, times in (
+        (steps, None),
+        (steps[2], None),
+        (pvdi.open_volume(store), (1, 2, 3, 5)),
+    ):
+        series = pvdi.generate_series(volumes, camera, SIZE, times, **looks)
+        assert series.times == (times or (0, 1, 2, 3))
+        assert all(a.equals(b) for a, b in zip(series, expected, strict=True))
+        assert series.volumes[1].chunked
+    with pvdi.SeriesWriter(tmp_path / "a.vdis", camera, SIZE, **looks) as out:
+        for step in steps:
+            out.append(step)
+    written = pvdi.read(tmp_path / "a.vdis")
+    assert all(a.equals(b) for a, b in zip(written, expected, strict=True))
+
+
+def test_workers_make_the_steps(store, volumes, camera, default_runtime, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    import dask.array
+
+    looks = {"transfer_function": _table()}
+    steps = [pvdi.open_volume(store, time=k) for k in range(2)]
+    stack = dask.array.from_array(np.stack([v.array for v in volumes[:2]]), (1, 4, 4, 4))
+    expected = pvdi.generate_series(steps, camera, SIZE, **looks)
+    with (
+        distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=":0") as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        by_workers = pvdi.generate_series(steps, camera, SIZE, client=client, **looks)
+        arrays = pvdi.generate_series(stack, camera, SIZE, spacing=SPACING, client=client, **looks)
+        with pvdi.SeriesWriter(tmp_path / "a.vdis", camera, SIZE, client=client, **looks) as out:
+            for step in steps:
+                out.append(step)
+        with pytest.raises(InvalidArgumentError, match="client is for chunked volumes"):
+            pvdi.generate_series(volumes, camera, SIZE, client=client, **looks)
+    for made in (by_workers, arrays, pvdi.read(tmp_path / "a.vdis")):
+        assert all(a.equals(b) for a, b in zip(made, expected, strict=True))
+
+
+def test_a_step_that_cannot_be_made_is_named(volumes, camera, default_runtime, tmp_path):
+    empty = pvdi.Volume(np.full((9, 8, 7), np.nan, np.float32), SPACING)
+    looks = {"transfer_function": _table()}
+    said = "step 2: every value of 'values' is NaN: .*leave"
+    with pytest.raises(InvalidVolumeError, match=said):
+        pvdi.generate_series([*volumes[:2], empty], camera, SIZE, **looks)
+    with pvdi.SeriesWriter(tmp_path / "a.vdis", camera, SIZE, **looks) as out:
+        for volume in volumes[:2]:
+            out.append(volume)
+        with pytest.raises(InvalidVolumeError, match=said):
+            out.append(empty)
+        out.append(volumes[2])  # the series goes on
+    assert len(pvdi.read(tmp_path / "a.vdis")) == 3
+
+
+def test_bytes_that_a_later_step_needs_are_told_once(camera, default_runtime):
+    size = (48, 36)
+    low, high = (
+        pvdi.Volume((np.random.default_rng(1).random((12, 12, 12)) < share).astype("u1") * 60)
+        for share in (0.01, 0.5)
+    )
+    view = filling_camera(low.bounds, size)
+    with pytest.warns(
+        VDIWarning, match=r"max_bytes=9000 is not kept by all .* one has \d{5} "
+    ) as said:
+        pvdi.generate_series(
+            [low, low, high, high], view, size, max_bytes=9000, transfer_function=_table()
+        )
+    assert len(said) == 1
 
 
 def test_colours_stand_for_the_same_values_in_all_steps(volumes, camera, default_runtime):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import re
+import warnings
 
 import numpy as np
 import pytest
@@ -222,6 +224,41 @@ def test_limits_are_kept_and_what_is_missed_is_said(volume, monkeypatch):
     with pytest.warns(VDIWarning, match="not reached"):
         small = _generate(volume, max_bytes=40_000, **coarse)
     assert 1 <= len(small) < 40
+    with pytest.warns(VDIWarning, match="not reached"):
+        helped = _generate(volume, [VIEW, VIEW.azimuth(60)], **coarse)
+    for vdi in (*small, *few, *helped):  # those that come to help as well
+        assert vdi.metadata["max_supersegments"] == 4 >= vdi.counts.max()
+        assert np.prod(vdi.window_size) <= 0.25 * np.prod(SIZE)
+    assert len(helped) > 1
+
+
+#: Where views are that a volume of one long and detailed side looks larger from than from others.
+UNLIKE_VIEWS = {"sphere": "sphere", "path": [VIEW.azimuth(angle) for angle in range(0, 360, 24)]}
+
+
+@pytest.mark.parametrize("views", UNLIKE_VIEWS)
+@pytest.mark.parametrize("limit", [1_000, 10_000, 20_000, 40_000, 90_000])
+@pytest.mark.parametrize("given", [{}, {"lists": 1, "max_supersegments": 6}], ids=["free", "given"])
+def test_the_file_is_within_max_bytes_or_it_is_said(views, limit, given, monkeypatch, tmp_path):
+    monkeypatch.setattr(generate, "DIRECTIONS", 12)
+    z, y, x = np.mgrid[-1:1:6j, -1:1:12j, -1:1:40j]
+    noise = np.random.default_rng(2).normal(size=x.shape)
+    slab = pvdi.Volume((127 * (1 + np.sin(9 * x + noise) * np.cos(5 * y + z))).astype(np.uint8))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        vdis = _generate(slab, UNLIKE_VIEWS[views], max_bytes=limit, **given)
+    said = [str(warning.message) for warning in caught]
+    size = vdis.save(tmp_path / "a.vdiset").stat().st_size
+    if size > limit:
+        assert len(vdis) == 1
+        figures = [int(n) for n in re.findall(r"max_bytes=(\d+) cannot.* takes (\d+)", said[0])[0]]
+        assert figures[0] == limit
+        assert figures[1] == pytest.approx(size, abs=16)
+        assert given or limit == 1_000
+    else:
+        assert not any("cannot be kept" in text for text in said)
+        # A bound that is kept by leaving it half empty would be no use
+        assert size > limit / 3 or vdis.about["reached"]["below_target"] == 0
 
 
 @pytest.mark.parametrize(

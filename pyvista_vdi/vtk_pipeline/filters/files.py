@@ -9,6 +9,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
+from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.series.reader import StepsReader, is_series_file
 from pyvista_vdi.series.reader import read as read_series
@@ -126,13 +127,18 @@ class VDIReader(Algorithm):
 class VDIWriter(Algorithm):
     """Write the VDI at its input, in its canonical VTK form, to a ``.vdi`` or ``.exr`` file.
 
-    To a ``.vdis`` file it writes those of all times that the input announces, one by one. The file
-    appears whole or not at all. Nothing is written before :meth:`Write`.
+    To a ``.vdis`` file it writes those of all times that the input announces, one by one, in the
+    8-byte form unless :meth:`SetPrecision` says otherwise: exact ones, which are not written by
+    their differences, take seven times as much. The file appears whole or not at all. Nothing is
+    written before :meth:`Write`.
     """
 
     def __init__(self) -> None:
         super().__init__(nInputPorts=1, inputType="vtkImageData", nOutputPorts=0)
         self._path: str | None = None
+        self._precision: str | None = None
+        self._compression: str | None = None
+        self._tolerance = 0.0
 
     def SetInputData(self, image: vtkImageData) -> None:
         """Set the VDI's canonical VTK form."""
@@ -146,6 +152,30 @@ class VDIWriter(Algorithm):
         "Return the file.",
         _as_path,
     )
+    SetPrecision, GetPrecision = accessors(
+        "Precision",
+        "_precision",
+        "precision",
+        'Set what a supersegment takes: ``"exact"``, ``"16-byte"`` or ``"8-byte"``.\n\n'
+        "By default, ``None``, steps of a ``.vdis`` take 8 bytes, and all else is exact, as with\n"
+        ":meth:`VDI.save`. ``.exr`` files are exact.",
+        "Return what a supersegment takes; ``None``: what is usual for the file.",
+        lambda precision: None if precision is None else check_precision(precision),
+    )
+    SetCompression, GetCompression = accessors(
+        "Compression",
+        "_compression",
+        "compression",
+        "Set the compression, as of :meth:`VDI.save`; ``None``, the default: the file's usual one.",
+        "Return the compression; ``None``: the file's usual one.",
+    )
+    SetTolerance, GetTolerance = accessors(
+        "Tolerance",
+        "_tolerance",
+        "tolerance",
+        "Set the loss that saves bytes of a ``.vdis`` file, as of :class:`SeriesWriter`: 0, none.",
+        "Return the tolerance of a ``.vdis`` file.",
+    )
 
     def Write(self) -> None:
         """Write the file.
@@ -153,7 +183,8 @@ class VDIWriter(Algorithm):
         Raises
         ------
         InvalidArgumentError
-            If there is no file name; or it is that of a series, and the input has no times.
+            If there is no file name; or it is that of a series, and the input has no times; or an
+            option is not one of the file's format.
         InvalidVDIError
             If there is no input, or it is no VDI.
         VDIFileError
@@ -162,7 +193,8 @@ class VDIWriter(Algorithm):
         if is_series_file(self._path) and self.GetNumberOfInputConnections(0):
             images, times = steps_and_times(self.GetInputAlgorithm(0, 0))
             vdis = Steps(lambda i: vdi_from_image(images[i]), len(times))
-            VDISeries(vdis, times).save(self._path or "")
+            options = {"precision": "8-byte", **self._options()}
+            VDISeries(vdis, times).save(self._path or "", **options)
             return
         self.Modified()
         self.Update()
@@ -171,4 +203,10 @@ class VDIWriter(Algorithm):
         if self._path is None:
             raise InvalidArgumentError("VDIWriter has no file name: call SetFileName(path)")
         target = checked_target(self._path)
-        vdi_from_image(vtkImageData.GetData(inputs[0], 0)).save(target)
+        vdi_from_image(vtkImageData.GetData(inputs[0], 0)).save(target, **self._options())
+
+    def _options(self) -> dict[str, Any]:
+        """Return the options of the file that were set."""
+        names = ("precision", "compression", "tolerance")
+        given = {name: getattr(self, f"_{name}") for name in names}
+        return {name: value for name, value in given.items() if value}
