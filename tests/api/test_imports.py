@@ -64,7 +64,7 @@ LEVELS = (
 #: Rooms in a room, likewise from the lowest to the highest.
 LEVELS_WITHIN = {
     "io": (
-        ("whole_file", "progress"),
+        ("whole_file", "progress", "store_identity"),
         ("image_stack", "png", "ranges", "vdi_file"),
         ("deep_exr", "stores", "volumes"),
         ("files",),
