@@ -83,6 +83,7 @@ def main() -> None:
         (-1, -1, -1),
         comm=COMM,
         every=EVERY,
+        overwrite=True,
         cmap="inferno",
         opacity="linear",
         clim=(0, 0.8),

@@ -85,6 +85,7 @@ __all__ = ["__version__", "errors", "examples", *sorted(_HOMES)]
 registration.install()
 # The composition root: what lower rooms need of upper ones, by name and loaded when asked for
 providers.provide(
+    by_absolute_path="pyvista_vdi.io.store_identity:by_absolute_path",
     html_files="pyvista_vdi.web.page",
     image_with_scalars="pyvista_vdi.plotting.volumes:as_image",
     range_keeper="pyvista_vdi.io.ranges:keeper_of",
@@ -93,6 +94,7 @@ providers.provide(
     plot="pyvista_vdi.plotting.accessor:plot",
     read_by_pyvista="pyvista_vdi.plotting.imports:read_volume",
     read_nrrd="pyvista_vdi.examples:read_nrrd",
+    store_identity="pyvista_vdi.io.store_identity:identity_of",
     scene_pages="pyvista_vdi.web.scenes.export:export_html",
     temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:steps_and_times",
     thinned="pyvista_vdi.model.thinned:thinned",

@@ -134,10 +134,11 @@ def generate(
         has. A volume that does not fit goes there brick by brick: that takes more time, and the
         VDI is the same to the last bit. See docs/performance.md, "Larger than memory". Of a chunked
         volume blocks are smaller.
-    client : distributed.Client, optional
-        Of a Dask cluster, whose workers make the VDI of a chunked volume (a :class:`Volume` of a
-        Dask, zarr or h5py array, or of :func:`open_volume`). Without it such a volume is made
-        block by block on the local device. See docs/large_volumes.md.
+    client : distributed.Client or str, optional
+        Of a Dask cluster, or the address of its scheduler. Its workers make the VDI of a chunked
+        volume (a :class:`Volume` of a Dask, zarr or h5py array, or of :func:`open_volume`), whose
+        files all of them must find. Without it such a volume is made block by block on the local
+        device. See docs/large_volumes.md.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional

@@ -1,7 +1,8 @@
 """Least and largest values of chunks, kept beside the store that they were read from.
 
 ``x.zarr.ranges/`` holds a small file for each array, time and channel; where it cannot be written,
-the user's cache folder does. Ranges of a store that has changed since are not used.
+the user's cache folder does. Ranges of a store that has changed since are not used, also while it
+is open.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.errors import InvalidVolumeError, VDIFileError
+from pyvista_vdi.io.store_identity import ARRAY_FILES, local_files
 from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.user_cache import user_cache
 
@@ -38,17 +40,13 @@ def keeper_of(array: Any, index: Sequence[int | slice] | None = None) -> RangeFi
     index : sequence of int or slice, optional
         What is taken of it: its time and its channel.
     """
-    library = type(array).__module__.partition(".")[0]
+    found = local_files(array)
+    if found is None:
+        return None
+    library, path = found
     if library == "h5py":
-        return RangeFile(array.file.filename, array.file.filename, array.name, index)
-    if library != "zarr":
-        return None
-    # A local store has its folder as `root` in zarr 3, and as `path` in zarr 2
-    store = getattr(array, "store", None)
-    root = getattr(store, "root", None) or getattr(store, "path", None)
-    if root is None or not Path(str(root)).is_dir():
-        return None
-    folder = (Path(str(root)) / array.path).resolve()
+        return RangeFile(str(path), str(path), array.name, index, array)
+    folder = path.resolve()
     outermost = folder
     while any((outermost.parent / name).exists() for name in ZARR_FILES):
         outermost = outermost.parent
@@ -69,17 +67,54 @@ class RangeFile:
         The array's in the store.
     index : sequence of int or slice, optional
         What is taken of it.
+    in_file : h5py.Dataset, optional
+        The array, if a file that is open holds it.
     """
 
     def __init__(
-        self, store: str, data: str, name: str, index: Sequence[int | slice] | None
+        self,
+        store: str,
+        data: str,
+        name: str,
+        index: Sequence[int | slice] | None,
+        in_file: Any = None,
     ) -> None:
         self._data = Path(data).resolve()
         taken = [str(k) for k in index or () if isinstance(k, int)]
         title = "-".join([*(name.strip("./") or "array").split("/"), *taken])
         self._name = f"{title[:80]}-{_digest(name, *taken)[:8]}.npz"
         self._store = Path(store).resolve()
+        self._in_file = in_file
         self._before: str | None = None
+        self._found: Ranges | None = None
+        self._opened = self._as_opened()
+
+    def check_unchanged(self) -> None:
+        """Raise InvalidVolumeError if what was read when the array was opened is no more valid."""
+        now = self._as_opened()
+        if now[0] == self._opened[0]:
+            return
+        if self._in_file is None and now[1] == self._opened[1]:
+            self._opened = now
+            return
+        if self._in_file is not None and self._in_file.id.valid:
+            # While it is open, HDF5 gives whoever opens it again what it has in memory of it
+            self._in_file.file.close()
+        raise InvalidVolumeError(
+            f"{self._data} was closed, removed or written anew since it was opened: open it again"
+        )
+
+    def _as_opened(self) -> tuple[Any, bytes]:
+        """Return the state of the file that is read when the array is opened, and its content."""
+        if self._in_file is not None:
+            if self._in_file.id.valid and self._in_file.file.mode != "r":
+                self._in_file.file.flush()  # what this process has written is in the file then
+                return None, b""
+            return _state(self._data), b""
+        for name in ARRAY_FILES:
+            with contextlib.suppress(OSError):
+                return _state(self._data / name), (self._data / name).read_bytes()
+        return None, b""
 
     def _places(self) -> Iterator[Path]:
         yield self._store.with_name(self._store.name + ".ranges") / self._name
@@ -88,19 +123,24 @@ class RangeFile:
 
     def load(self) -> Ranges | None:
         """Return the ranges, if they are of the chunks as they are now."""
-        self._before = self._fingerprint()
+        self.check_unchanged()
+        now = self._fingerprint()
+        if now == self._before and self._found is not None:
+            return self._found
+        self._before, self._found = now, None
         for place in self._places():
             with contextlib.suppress(Exception):  # whatever is wrong: they are found again
                 kept = NpzFile(io.BytesIO(place.read_bytes()))  # which reads no pickles
                 if self._before is not None and str(kept["of"]) == self._before:
-                    return kept["low"].astype(np.float64), kept["high"].astype(np.float64)
-        return None
+                    self._found = kept["low"].astype(np.float64), kept["high"].astype(np.float64)
+                    break
+        return self._found
 
     def save(self, ranges: Ranges) -> None:
         """Keep ranges that were found after ``load``, unless the store has changed meanwhile."""
         if self._before is None or self._fingerprint() != self._before:
             return
-        low, high = ranges
+        self._found = low, high = ranges
         for place in self._places():
             with contextlib.suppress(OSError, VDIFileError):
                 place.parent.mkdir(parents=True, exist_ok=True)
@@ -121,6 +161,15 @@ class RangeFile:
         return _digest(
             *(f"{name[len(data) :]} {at.st_size} {at.st_mtime_ns}" for name, at in states)
         )
+
+
+def _state(file: Path) -> tuple[int, ...] | None:
+    """Return what changes with a file."""
+    try:
+        at = file.stat()
+    except OSError:
+        return None
+    return at.st_dev, at.st_ino, at.st_size, at.st_mtime_ns
 
 
 def _digest(*texts: str) -> str:

@@ -309,7 +309,7 @@ def _open_hdf5(path: str, inner: str) -> Store:
             f"{path} needs h5py ({error}): pip install 'pyvista-vdi[hdf5]'"
         ) from error
     try:
-        file = h5py.File(path, "r")
+        file = h5py.File(os.path.abspath(path), "r")  # noqa: PTH100 - links may differ elsewhere
     except (OSError, ValueError) as error:
         raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
     found: dict[str, Any] = {}
@@ -403,7 +403,8 @@ def _open_zarr(path: str, inner: str) -> Store:
             "format 2 alone: install zarr 3, which needs Python 3.11 or newer"
         )
     try:
-        node: Any = zarr.open(path, mode="r")
+        # Other processes, and this one in another folder, open the same one
+        node: Any = zarr.open(path if "://" in path else os.path.abspath(path), mode="r")  # noqa: PTH100
         node = node[inner] if inner else node
     except Exception as error:  # each version and each kind of store has errors of its own
         raise InvalidVolumeError(

@@ -6,7 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    MissingDependencyError,
+    with_article,
+)
 from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.model.vdi import VDI
 
@@ -18,13 +23,27 @@ def generate_in_blocks(*arguments: Any, client: Any = None, **options: Any) -> V
     ------
     MissingDependencyError
         If ``client`` is given and dask.distributed is not installed.
+    InvalidArgumentError
+        If no scheduler answers at the address that ``client`` is.
+    InvalidArgumentTypeError
+        If ``client`` is neither a client nor an address.
     """
     if client is None:
         return generate_chunked(*arguments, **options)
+    if isinstance(client, str):
+        with connected(client) as found:
+            return generate_in_blocks(*arguments, client=found, **options)
     try:
+        from distributed import Client
+
         from pyvista_vdi.large.on_dask import generate_on_dask
     except ImportError as error:
         raise _without_dask(error) from error
+    if not isinstance(client, Client):
+        raise InvalidArgumentTypeError(
+            f"client must be a distributed.Client or the address of a scheduler; got "
+            f"{with_article(type(client).__name__)}: give distributed.Client(cluster) for a cluster"
+        )
     return generate_on_dask(*arguments, client=client, **options)
 
 

@@ -26,6 +26,7 @@ from distributed import (
     get_worker,
     wait,
 )
+from distributed.protocol.pickle import dumps, loads
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
@@ -41,7 +42,8 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.generation.generate import Progress, report
-from pyvista_vdi.large.blocks import Indices, Values
+from pyvista_vdi.io.store_identity import StoreIdentity, check_once, identity_of
+from pyvista_vdi.large.blocks import Indices, Values, ends_of
 from pyvista_vdi.large.generate import (
     NOWHERE,
     chunks_of,
@@ -54,6 +56,7 @@ from pyvista_vdi.large.passes import Opacities, Piece, Rows, Seen, Task, light_e
 from pyvista_vdi.large.reading import Plan, Read
 from pyvista_vdi.large.rows import balanced
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -105,6 +108,9 @@ def generate_on_dask(
     ------
     NoDeviceError
         If no worker has an OpenCL device.
+    InvalidVolumeError
+        If a worker does not find the volume's files, or others than this process; the message names
+        it.
     DeviceError
         If a block could not be made; the message names it.
     Cancelled
@@ -152,6 +158,7 @@ class _Run:
         self._where: dict[str, Any] = some if len(workers) < len(client.nthreads()) else {}
         limits = client.run(_memory_limit, workers=workers, on_error="ignore")
         memory = sum(limit or np.inf for limit in limits.values())
+        self._sent = self._array_for_workers()
         self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
         self._done = 0.0
         self.counted: dict[str, int] = {}
@@ -165,7 +172,7 @@ class _Run:
         order = task.to_read(windows, known)
         chunks = self._volume.chunks
         lazy = chunks is not None and chunks.lazy is not None  # Dask knows what it computes
-        reading = Plan.of(task, self._volume.array, None if lazy else known)
+        reading = Plan.of(task, self._sent, None if lazy else known)
         reads = {block: reading.read(block) for block in order}
         values = self._values(reads)
         in_window = [windows.get(block, NOWHERE) for block in order]
@@ -174,6 +181,7 @@ class _Run:
         )
         seen = self._gathered("seen", first, _without_slabs, _SHARES[0])
         if known is None and len(seen) == len(blocks):
+            self._check_ranges(seen)
             keep_ranges(self._volume, task, seen)
         entering = light_entering(task, windows, seen)
         ambient: list[Any] = [None] * len(entering)
@@ -216,7 +224,64 @@ class _Run:
                 [array.lazy[r.box] for r in reads.values()], **self._where
             )
             return dict(zip(reads, futures, strict=True))
-        return self._mapped("read", reads, _read, reads.values()) if self._kept else dict(reads)
+        if not self._kept:
+            return dict(reads)
+        return self._mapped("read", reads, partial(_read, self._task), reads, reads.values())
+
+    def _array_for_workers(self) -> Any:
+        """Return the array as it goes to workers, each of which has shown that it has its files."""
+        array = self._volume.chunks
+        if array is None:
+            return self._volume.array
+        if array.lazy is not None:
+            for identity in _identities_in(array.lazy):
+                self._require_files(identity)
+            return array
+        own = array.identity()
+        if own is not None:
+            self._require_files(own)
+        return _Sent(array, own, self._token)
+
+    def _require_files(self, identity: StoreIdentity) -> None:
+        answers = self._client.run(_wrong_with, identity, workers=self._workers, on_error="return")
+        failed = {at: error for at, error in answers.items() if error is not None}
+        if failed:
+            at, error = next(iter(failed.items()))
+            raise InvalidVolumeError(
+                f"{len(failed)} of {len(answers)} workers do not read what this process does; "
+                f"worker {at}: {error}"
+            )
+
+    def _check_ranges(self, seen: Mapping[Indices, Seen]) -> None:
+        """Read a chunk of the widest range and one of the narrowest here, too, before all are kept.
+
+        Raises
+        ------
+        InvalidVolumeError
+            If they hold other values here.
+        """
+        array, blocks = self._volume.chunks, self._task.blocks
+        if array is None or array.lazy is not None:
+            return
+        widths = {block: found.ranges[1] - found.ranges[0] for block, found in seen.items()}
+        for choose in (np.nanmax, np.nanmin):
+            known = {at: choose(width) for at, width in widths.items() if np.isfinite(width).any()}
+            if not known:
+                return
+            block = max(known, key=lambda at: known[at] if choose is np.nanmax else -known[at])
+            low, high = seen[block].ranges
+            at = np.unravel_index(np.nanargmax(widths[block] == known[block]), low.shape)
+            box = tuple(
+                slice(part.start + k * n, min(part.start + (k + 1) * n, part.stop))
+                for part, k, n in zip(blocks.own(block), at, blocks.chunks, strict=True)
+            )
+            here = ends_of(array[box])
+            if here != (low[at], high[at]):
+                raise InvalidVolumeError(
+                    f"{_named(self._task, block)}: the workers read values from {low[at]} to "
+                    f"{high[at]} where this process reads {here[0]} to {here[1]} in "
+                    f"{array.source}: all must have the same files, which stay as they are"
+                )
 
     def _bound(self, function: Callable[..., Any]) -> Callable[..., Any]:
         return partial(function, self._task, self._device)
@@ -338,8 +403,8 @@ class _Run:
         except KilledWorker as error:
             raise DeviceError(
                 f"{_named(self._task, at)} could not be made: the workers that were at it died, "
-                f"{_RETRIES + 1} in all (of too little memory, mostly): give workers more, or a "
-                f"smaller block_bytes; {error}"
+                f"{_RETRIES + 1} in all (of too little memory, mostly): give workers more memory, "
+                f"or store the volume in smaller chunks; {error}"
             ) from error
         except (VDIError, CancelledError):
             raise
@@ -374,6 +439,15 @@ def _workers_with_device(
     return {at: name for at, name in answers.items() if at not in without}
 
 
+def _wrong_with(identity: StoreIdentity) -> str | None:
+    """Return what is wrong with a worker's files, if anything is."""
+    try:
+        identity.check()
+    except InvalidVolumeError as error:
+        return str(error)
+    return None
+
+
 def _device_name(device: Any) -> str:
     return get_runtime(device).info.name
 
@@ -383,11 +457,52 @@ def _memory_limit(dask_worker: Worker) -> int | None:
     return dask_worker.memory_manager.memory_limit
 
 
+class _Sent:
+    """A chunked array on its way to workers: unpickled where a part is read.
+
+    Dask waits for ever where arguments cannot be unpickled, as arrays of files that are not there.
+
+    Parameters
+    ----------
+    array : ChunkedArray
+        The array.
+    identity : StoreIdentity, optional
+        Of its files, if there are any.
+    run : str
+        Tells one generation from the next.
+    """
+
+    def __init__(self, array: ChunkedArray, identity: StoreIdentity | None, run: str) -> None:
+        self.dtype, self._array = array.dtype, dumps(array)
+        self._identity, self._run = identity, run
+
+    def __getitem__(self, box: tuple[slice, ...]) -> Values:
+        if self._identity is not None:
+            check_once(self._identity, self._run)
+            self._identity.check_chunks(box)
+        try:
+            array: ChunkedArray = loads(self._array)
+        except Exception as error:
+            raise InvalidVolumeError(
+                f"the volume's array cannot be opened there ({type(error).__name__}: {error}): "
+                "each worker needs the library that reads it, and the right to read its files"
+            ) from error
+        return array[box]
+
+
+def _identities_in(lazy: Any) -> list[StoreIdentity]:
+    """Return what tells the files of arrays in a Dask graph from others."""
+    layers = getattr(lazy.dask, "layers", {}).values()
+    found = (identity_of(value) for layer in layers if len(layer) == 1 for value in layer.values())
+    return [identity for identity in found if identity is not None]
+
+
 # What follows runs on workers
 
 
-def _read(read: Read) -> Values:
-    return read()
+def _read(task: Task, block: Indices, read: Read) -> Values:
+    with _naming(task, block):
+        return read()
 
 
 def _first_pass(task: Task, device: Any, block: Indices, values: Any, window: Rectangle) -> Seen:
@@ -448,9 +563,14 @@ def _at_hand(values: Any) -> Values:
 @contextmanager
 def _at(task: Task, at: tuple[int, ...]) -> Iterator[None]:
     """Do one thing at a time in a process, and say what failed where."""
+    with _naming(task, at), _one_block:
+        yield
+
+
+@contextmanager
+def _naming(task: Task, at: tuple[int, ...]) -> Iterator[None]:
     try:
-        with _one_block:
-            yield
+        yield
     except (Cancelled, MemoryError):
         raise
     except Exception as error:

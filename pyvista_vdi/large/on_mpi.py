@@ -6,23 +6,36 @@ is: neighbours exchange a few points, everybody the lists that belong to somebod
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi import errors
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.errors import (
+    DeviceError,
+    DeviceMemoryError,
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    MissingDependencyError,
+    VDIError,
+    with_article,
+)
 from pyvista_vdi.large.blocks import Blocks, Indices, Offset, Values
 from pyvista_vdi.large.generate import NOWHERE, vdi_of
 from pyvista_vdi.large.passes import Piece, Task, light_entering
 from pyvista_vdi.large.rows import balanced
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.grid import Grid
+from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -30,6 +43,8 @@ from pyvista_vdi.model.volume import Volume
 
 #: Tag of the messages that bring neighbours' points; the place of the neighbour is added.
 _HALO_TAG = 7100
+#: Ranks that a message tells the blocks of.
+_MOST_NAMED = 8
 
 
 def mpi() -> Any:
@@ -48,6 +63,23 @@ def mpi() -> Any:
             "that they run"
         ) from error
     return MPI
+
+
+def checked_ranks(comm: Any) -> Any:
+    """Return a communicator, or tell all ranks that one of them was given something else.
+
+    Raises
+    ------
+    InvalidArgumentTypeError
+        If it is none.
+    """
+    if all(hasattr(comm, name) for name in ("rank", "size", "allgather", "alltoall", "scatter")):
+        return comm
+    with together(mpi().COMM_WORLD, "reading the arguments"):  # where the others most likely are
+        raise InvalidArgumentTypeError(
+            f"comm must be a communicator of mpi4py, such as MPI.COMM_WORLD; got "
+            f"{with_article(type(comm).__name__)}"
+        )
 
 
 def generate_on_mpi(
@@ -102,20 +134,41 @@ def generate_on_mpi(
 
     Raises
     ------
+    VDIError
+        On all ranks, if an argument of one of them cannot be used, or if one fails: of the kind
+        that is told there, :class:`~pyvista_vdi.errors.InvalidArgumentError` say. The message names
+        the rank.
     InvalidArgumentError
-        On all ranks, if the blocks are not those of a grid of blocks.
-    DeviceError
-        On all ranks, if one of them fails; the message names it.
+        On all ranks, if the blocks are not those of a grid of blocks, or the ranks were given
+        different arguments.
     """
-    options = GenerationOptions.of(options, changes)
-    with together(comm, "reading the arguments"):
-        own = Volume(values, name=name)
-        size = check_window_size(window_size)
+    comm = checked_ranks(comm)
+    with together(comm, "reading the arguments", InvalidArgumentError):
+        for wanted, thing in ((Grid, grid), (TransferFunction, transfer_function)):
+            if not isinstance(thing, wanted):
+                raise InvalidArgumentTypeError(
+                    f"expected a {wanted.__name__}, got {type(thing).__name__}"
+                )
+        options = GenerationOptions.of(options, changes)
+        own = Volume(values, name=name).load()
+        size, camera = check_window_size(window_size), Camera.from_any(camera)
+        first = checked_first(first)
+        get_runtime(device)
+    require_same(
+        comm,
+        camera=camera.to_dict(),
+        window_size=size,
+        grid=(grid.dimensions, grid.spacing, grid.origin, grid.direction.tolist()),
+        transfer_function=transfer_function.to_dict(),
+        # What devices may take differs, and lights are those of the first rank
+        options=replace(options, memory_limit=None, lights=Lights()),
+        values=(f"of type {own.array.dtype}", own.array.shape[3:]),
+    )
     blocks, ranks = _blocks(comm, grid, own.dimensions, first)
     ends = comm.allgather(own.finite_range() if np.isfinite(own.array).any() else (np.nan,) * 2)
     low, high = zip(*ends, strict=True)
     scalars = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
-    task = Task.of(blocks, Camera.from_any(camera), size, transfer_function, options, scalars)
+    task = Task.of(blocks, camera, size, transfer_function, options, scalars)
     places = {rank: at for at, rank in ranks.items()}
     block = places[comm.rank]
     windows = blocks.windows(task.camera, task.size)
@@ -152,68 +205,141 @@ def generate_on_mpi(
             y0, y1 = ranges[comm.rank]
             pieces = [received[ranks[at]] for at in order]
             rows = task.merge(y0, y1, pieces, device)
-    gathered = comm.gather(rows)
-    if comm.rank != 0:
-        return None
-    described: Any = SimpleNamespace(
-        name=name,
-        dimensions=grid.dimensions,
-        spacing=grid.spacing,
-        length=grid.length,
-        array=own.array,
-    )
-    finished = [part for part in gathered if part is not None]
-    device_name = get_runtime(device).info.name
-    return vdi_of(task, described, finished, device_name, counted, metadata)
+    gathered, vdi = comm.gather(rows), None
+    with together(comm, "putting the lists together"):
+        if comm.rank == 0:
+            described: Any = SimpleNamespace(
+                name=name,
+                dimensions=grid.dimensions,
+                spacing=grid.spacing,
+                length=grid.length,
+                array=own.array,
+            )
+            finished = [part for part in gathered if part is not None]
+            device_name = get_runtime(device).info.name
+            vdi = vdi_of(task, described, finished, device_name, counted, metadata)
+    return vdi
 
 
 @contextmanager
-def together(comm: Any, what: str) -> Iterator[None]:
+def together(comm: Any, what: str, otherwise: type[VDIError] = DeviceError) -> Iterator[None]:
     """Do something on all ranks; if one fails, all raise, so that nobody waits for it.
+
+    What is done may do something together itself. Between a failure and the end of the block the
+    others meet no other collective call than that of such a block.
+
+    Parameters
+    ----------
+    comm : mpi4py.MPI.Comm
+        The ranks.
+    what : str
+        What is done, for the message.
+    otherwise : type
+        What is raised where the error is none of this package's.
 
     Raises
     ------
-    DeviceError
-        On all ranks; the message says what failed, on how many of them, and why on the first.
+    VDIError
+        On all ranks, of the kind that the first of those has that fail; the message says what
+        failed, on how many of them, and why on the first.
     """
     error: Exception | None = None
     try:
         yield
     except Exception as caught:
+        if getattr(caught, "told_to_all_ranks", False):
+            raise
         error = caught
-    said = comm.allgather(None if error is None else f"{type(error).__name__}: {error}")
-    failed = {rank: text for rank, text in enumerate(said) if text is not None}
-    if failed:
-        rank, text = next(iter(failed.items()))
-        raise DeviceError(
-            f"{what} failed on {len(failed)} of {comm.size} ranks; rank {rank}: {text}"
-        ) from error
+    said = comm.allgather(None if error is None else _kind_and_text(error, otherwise))
+    failed = {rank: kind_and_text for rank, kind_and_text in enumerate(said) if kind_and_text}
+    if not failed:
+        return
+    if comm.size == 1 and isinstance(error, VDIError):
+        raise error
+    rank, (kind, text) = next(iter(failed.items()))
+    told = getattr(errors, kind)(
+        f"{what} failed on {len(failed)} of {comm.size} ranks; rank {rank}: {text}"
+    )
+    told.told_to_all_ranks = True
+    raise told from error
+
+
+def _kind_and_text(error: Exception, otherwise: type[VDIError]) -> tuple[str, str]:
+    """Return the name of the error that tells of another, and in which words."""
+    kind = type(error).__name__
+    if kind in errors.__all__:
+        return kind, str(error)
+    if isinstance(error, MemoryError):
+        return DeviceMemoryError.__name__, f"{kind}: {error}"
+    if isinstance(error, TypeError) and otherwise is InvalidArgumentError:
+        return InvalidArgumentTypeError.__name__, str(error)
+    return otherwise.__name__, f"{kind}: {error}"
+
+
+def require_same(comm: Any, **things: Any) -> None:
+    """Raise InvalidArgumentError on all ranks if they were given different things.
+
+    ``things`` are told apart by what ``repr`` says of them.
+    """
+    own = {
+        name: (hashlib.sha256(repr(thing).encode()).digest(), repr(thing)[:80])
+        for name, thing in things.items()
+    }
+    for rank, others in enumerate(given := comm.allgather(own)):
+        for name, (digest, text) in others.items():
+            if digest != given[0][name][0]:
+                raise InvalidArgumentError(
+                    f"{name} must be the same on all ranks; rank 0 has {given[0][name][1]}, and "
+                    f"rank {rank} {text}"
+                )
+
+
+def checked_first(first: Any) -> tuple[int, int, int]:
+    """Return the index x, y, z of a block's first point.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it is none.
+    """
+    try:
+        x, y, z = (as_whole(k) for k in first)
+    except (TypeError, ValueError):
+        x = y = z = np.nan
+    if not (x >= 0 and y >= 0 and z >= 0):
+        raise InvalidArgumentError(
+            "first must be the index x, y, z of the block's first point in the whole grid, three "
+            f"whole numbers from 0; got {first!r}"
+        )
+    return int(x), int(y), int(z)
 
 
 def _blocks(
     comm: Any, grid: Grid, points: Sequence[int], first: Sequence[int]
 ) -> tuple[Blocks, dict[Indices, int]]:
     """Return the grid of blocks that the ranks' make up, and which rank has which."""
-    boxes = comm.allgather((tuple(int(k) for k in first)[::-1], tuple(points)[::-1]))
+    boxes = comm.allgather((tuple(first)[::-1], tuple(points)[::-1]))
     whole = tuple(reversed(grid.dimensions))
     starts = [sorted({begin[axis] for begin, _ in boxes}) for axis in range(3)]
     cuts = tuple((*starts[axis], whole[axis]) for axis in range(3))
     lengths = [[b - a for a, b in itertools.pairwise(c)] for c in cuts]
     ranks: dict[Indices, int] = {}
+    right = not any(of_axis[0] for of_axis in cuts)
     for rank, (begin, counts) in enumerate(boxes):
         z, y, x = (starts[axis].index(begin[axis]) for axis in range(3))
         expected = tuple(lengths[axis][k] for axis, k in enumerate((z, y, x)))
-        if counts != expected or min(counts) < 4 or cuts[0][0] or cuts[1][0] or cuts[2][0]:
-            raise InvalidArgumentError(
-                f"rank {rank} has {counts} points from {begin} on, both (z, y, x), where blocks "
-                f"along these cuts have {expected}: give blocks of one grid of blocks that cover "
-                f"{whole} points, without ghost points, each with four points at least"
-            )
+        right &= counts == expected and min(counts) >= 4
         ranks[z, y, x] = rank
-    if len(ranks) != np.prod([len(of_axis) for of_axis in lengths]):
+    if not right or len(ranks) != np.prod([len(of_axis) for of_axis in lengths]):
+        given = [
+            f"rank {rank} has {counts[::-1]} from {begin[::-1]} on"
+            for rank, (begin, counts) in enumerate(boxes[:_MOST_NAMED])
+        ]
         raise InvalidArgumentError(
-            f"{comm.size} ranks have {len(ranks)} different blocks of "
-            f"{' x '.join(str(len(of_axis)) for of_axis in lengths)}: one rank has one block"
+            f"the points of {len(boxes)} ranks are not those of one grid of blocks that cover "
+            f"{grid.dimensions}, all along x, y and z: {', '.join(given)}"
+            f"{' ...' if len(boxes) > _MOST_NAMED else ''}; give each rank a block of its own, cut "
+            "where all others are cut, without ghost points, of four points at least"
         )
     z, y, x = (max(of_axis) for of_axis in lengths)
     return Blocks(grid, cuts, (z, y, x)), ranks

@@ -61,6 +61,8 @@ def as_range(values: Any) -> tuple[float, float]:
 def as_floats(values: Any) -> NDArray[np.float64]:
     """Return numbers as a new float64 array, of shape (0,) where they are none."""
     try:
+        if np.iscomplexobj(values):
+            return np.empty(0)
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         return np.empty(0)

@@ -8,17 +8,20 @@ from __future__ import annotations
 import importlib
 import itertools
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi.errors import InvalidVolumeError, VDIError
+from pyvista_vdi.model.providers import provider
 
 #: The least and the largest scalar of each chunk, NaN left out; NaN where there is nothing else.
 Ranges = tuple[NDArray[np.float64], NDArray[np.float64]]
-#: Keeps ranges beside a store, and gives them back: ``load() -> Ranges | None``, ``save(ranges)``.
+#: Keeps ranges beside a store, and gives them back: ``load() -> Ranges | None``, ``save(ranges)``;
+#: and raises where the array must be opened again: ``check_unchanged()``.
 Keeper = Any
 #: Chunks of arrays that have none.
 _CHUNK_POINTS = 64
@@ -40,8 +43,6 @@ class ChunkedArray:
         Turns what was read into what a volume holds: widened, native, C-contiguous.
     dtype : dtype_like, optional
         Of that.
-    keeper : optional
-        Keeps the ranges of chunks beside the store.
 
     Attributes
     ----------
@@ -63,8 +64,8 @@ class ChunkedArray:
         name: str | None = None,
         checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
         dtype: Any = None,
-        keeper: Keeper = None,
     ) -> None:
+        source = provider("by_absolute_path")(source)
         library = type(source).__module__.partition(".")[0]
         self.lazy = source if library == "dask" else None
         self._array = source
@@ -83,6 +84,11 @@ class ChunkedArray:
                 f"a volume is a three-dimensional array; got shape {tuple(source.shape)}: choose "
                 "time and channel (pyvista_vdi.open_volume does), or index the array"
             )
+        if any(math.isnan(n) for n in self._array.shape):
+            raise InvalidVolumeError(
+                f"{_described(source)} does not know how long its chunks are: call "
+                "array.compute_chunk_sizes() first, which computes it for that"
+            )
         z, y, x = (int(self._array.shape[k]) for k in kept)
         self.shape: tuple[int, int, int] = (z, y, x)
         self.dtype = np.dtype(dtype if dtype is not None else source.dtype)
@@ -93,7 +99,7 @@ class ChunkedArray:
             self.lazy = self._array = self.lazy.map_blocks(
                 _held, checked, self.dtype, dtype=self.dtype
             )
-        self._keeper = keeper
+        self._keeper: Keeper = provider("range_keeper")(self._array, index)
         self._ranges: Ranges | None = None
 
     def _chunks(self, kept: Sequence[int]) -> tuple[int, int, int]:
@@ -138,11 +144,27 @@ class ChunkedArray:
                 f"{self.source} is read by three slices of step 1 (z, y, x); got {box!r}: "
                 "load the volume (volume.load()) for anything else"
             )
+        if self._keeper is not None:
+            self._keeper.check_unchanged()
         parts = iter(box)
         at = tuple(next(parts) if isinstance(k, slice) else k for k in self._index)
-        found = self._array[at]
-        if self.lazy is not None:
-            return np.ascontiguousarray(found.compute())
+        try:
+            found = self._array[at]
+            if self.lazy is not None:
+                return np.ascontiguousarray(found.compute())
+        except (MemoryError, VDIError):
+            raise
+        except Exception as error:  # each library, and each function of Dask's, has its own
+            points = ", ".join(f"{part.start or 0}:{part.stop}" for part in box)
+            raise InvalidVolumeError(
+                f"{self.source} cannot be read at its points [{points}] "
+                f"({type(error).__name__}: {error}): "
+                + (
+                    "what computes them fails"
+                    if self.lazy is not None
+                    else "the chunk there is damaged or lost; copy it from its source again"
+                )
+            ) from error
         return _held(found, self._checked, self.dtype)
 
     def __array__(self, *_: Any, **__: Any) -> NDArray[Any]:
@@ -164,15 +186,19 @@ class ChunkedArray:
 
     def ranges(self) -> Ranges | None:
         """Return the least and the largest scalar of each chunk, or None while nobody knows."""
-        if self._ranges is None and self._keeper is not None:
-            self._ranges = self._keeper.load()
-        return self._ranges
+        return self._ranges if self._keeper is None else self._keeper.load()  # type: ignore[no-any-return]
 
     def keep_ranges(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
         """Keep what was found while the array was read."""
-        self._ranges = (low, high)
-        if self._keeper is not None:
-            self._keeper.save(self._ranges)
+        if self._keeper is None:
+            self._ranges = (low, high)
+        else:
+            self._keeper.save((low, high))
+
+    def identity(self) -> Any:
+        """Return what tells the array's files from others, ``None`` where it is in none here."""
+        found = provider("store_identity")(self._array, self._index)
+        return None if found is None else found.absolute()
 
     def found_ranges(self) -> Ranges:
         """Return the ranges, from the chunks themselves where nobody knows them yet."""
@@ -196,10 +222,11 @@ class ChunkedArray:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave an open HDF5 file behind: it is opened where this is unpickled."""
-        return {**self.__dict__, "_array": closed(self._array)}
+        return {**self.__dict__, "_array": closed(self._array), "_keeper": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _array=opened(state["_array"]))
+        self._keeper = provider("range_keeper")(self._array, self._index)
 
     def __repr__(self) -> str:
         return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"
@@ -218,7 +245,7 @@ class _InFile:
 def closed(array: Any) -> Any:
     """Return what is pickled in place of an array: of an HDF5 file's, where it is."""
     if type(array).__module__.partition(".")[0] == "h5py":
-        return _InFile(array.file.filename, array.name)
+        return _InFile(os.path.abspath(array.file.filename), array.name)  # noqa: PTH100 - no links
     return array
 
 

@@ -14,7 +14,6 @@ from pyvista_vdi.errors import InvalidVolumeError, warn_external
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.grid import Geometry
-from pyvista_vdi.model.providers import provider
 
 #: Voxel types that the kernels read as they are.
 VOXEL_TYPES: tuple[str, ...] = (
@@ -187,7 +186,6 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
         index=index,
         checked=_from_long_integers if long else None,
         dtype=kind,
-        keeper=provider("range_keeper")(array, index),
     )
     _check_planes(found.shape)
     return found

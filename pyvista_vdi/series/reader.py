@@ -171,6 +171,7 @@ class StepsReader(Sequence[VDI]):
         "SeriesWriter or 'pyvista-vdi series'"
     )
     _KEPT_VDIS = 4  # that were asked for last
+    _LEAST = 1  # parts of a file
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         try:
@@ -201,7 +202,7 @@ class StepsReader(Sequence[VDI]):
             self._frames = self._found(begin) if frames is None else frames
             #: Steps that others are written by; no other one is worth keeping
             self._needed = {header.by for _, header in self._frames}
-            if not self._frames:
+            if len(self._frames) < self._LEAST:
                 raise VDIFileError(
                     f"{self._path} has no finished {self._PART}: it was cut off, or none is "
                     "written yet"
@@ -209,6 +210,16 @@ class StepsReader(Sequence[VDI]):
         except BaseException:
             self._stream.close()
             raise
+
+    @property
+    def head(self) -> dict[str, Any]:
+        """What the file's head says."""
+        return self._head
+
+    @property
+    def frames(self) -> list[tuple[int, FrameHeader]]:
+        """Where each step's frame begins, and its header."""
+        return self._frames
 
     @property
     def times(self) -> tuple[float, ...]:

@@ -24,6 +24,7 @@ from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series import layout
 from pyvista_vdi.series.codes import Codes, Samples, Tables
+from pyvista_vdi.series.continuing import Begun, begun
 from pyvista_vdi.series.differences import SAME, Stepped, encoded, lengths_of
 from pyvista_vdi.series.generate import StepMaker
 from pyvista_vdi.series.series import checked_time
@@ -45,7 +46,8 @@ class SeriesWriter:
 
     Each step is on its way to the disk, with its checksum, when :meth:`append` returns: other
     processes read it then, and it stays readable if this one is killed. :meth:`close` adds an
-    index, which only makes opening faster. A file that was there before is replaced at once.
+    index, which only makes opening faster. A file that has steps already is not replaced unless
+    that is asked for.
 
     Parameters
     ----------
@@ -70,6 +72,11 @@ class SeriesWriter:
         Effort of the compressor, 1 to 9.
     device : str, int or device, optional
         Where volumes become VDIs.
+    append : bool, default: False
+        Go on with the file, if it is there already: times must be above that of its last step,
+        camera, window size and classification the same, and so the four arguments above.
+    overwrite : bool, default: False
+        Replace the file at once, if it is there already.
     **options
         For volumes: what :func:`pyvista_vdi.generate_series` takes, classification and ``client``
         included.
@@ -77,9 +84,10 @@ class SeriesWriter:
     Raises
     ------
     VDIFileError
-        If the target cannot be written, or its name ends in something else.
+        If the target cannot be written, is there already (without ``append`` and ``overwrite``), or
+        its name ends in something else.
     InvalidArgumentError
-        If an argument is out of its range.
+        If an argument is out of its range, or not that of the file which is appended to.
     TypeError
         If a keyword is unknown.
 
@@ -102,6 +110,8 @@ class SeriesWriter:
         compression: str = "zstd",
         level: int | None = None,
         device: Any = None,
+        append: bool = False,
+        overwrite: bool = False,
         **options: Any,
     ) -> None:
         self._make: StepMaker | None = None
@@ -116,10 +126,17 @@ class SeriesWriter:
             )
         self._steps = StepsWriter(precision, tolerance, key_every, compression, level)
         self.path = check_writable(with_suffix(Path(path), (layout.SUFFIX,), "a series"))
-        with whole_file(self.path) as stream:
-            self._steps.begin(stream)
+        self._begun = begun(self.path, append, overwrite)
+        if self._begun is None:
+            with whole_file(self.path) as stream:
+                self._steps.begin(stream)
+        else:
+            self._steps.go_on(self._begun)
         self._stream: BinaryIO | None = self.path.open("r+b")
-        self._stream.seek(0, os.SEEK_END)
+        if self._begun is None:
+            self._stream.seek(0, os.SEEK_END)
+        else:
+            self._stream.seek(self._begun.end)  # its index, if there is one, is written anew
 
     def append(self, step: Any, time: float | None = None) -> VDI:
         """Write the next step.
@@ -139,13 +156,13 @@ class SeriesWriter:
         Raises
         ------
         InvalidArgumentError
-            If the time does not ascend, or a volume is given without camera and window.
+            If the time does not ascend, a volume is given without camera and window, or what is
+            appended to has another view or classification.
         VDIFileError
             If the file is closed or cannot be written; what was finished stays readable.
         """
-        if self._stream is None:
-            raise VDIFileError(f"{self.path} is closed: no step can be appended")
-        time = self._steps.checked_time(time)
+        time = self.checked_time(time)
+        assert self._stream is not None
         if not isinstance(step, VDI):
             if self._make is None:
                 raise InvalidArgumentError(
@@ -154,8 +171,12 @@ class SeriesWriter:
                 )
             with naming(f"step {len(self)}"):
                 step = self._make(step)
+        if self._begun is not None:
+            self._begun.check(step)
+            self._begun = None  # by what is written now, as in any file
         begin, before = self._stream.tell(), len(self._steps)
         try:
+            self._stream.truncate()  # half a step, or an index, of a run before
             self._steps.write(self._stream, step, time)
         except OSError as error:
             self._undo(begin)
@@ -170,6 +191,15 @@ class SeriesWriter:
             raise
         return step  # type: ignore[no-any-return]
 
+    def checked_time(self, time: float | None) -> float:
+        """Return the next step's time, or raise what :meth:`append` would raise for it."""
+        if self._stream is None:
+            raise VDIFileError(
+                f"{self.path} is closed: no step can be appended; make another SeriesWriter with "
+                "append=True to go on"
+            )
+        return self._steps.checked_time(time)
+
     def close(self) -> None:
         """Write the index, bring the file to the disk and close it; once is enough."""
         stream, self._stream = self._stream, None
@@ -177,6 +207,7 @@ class SeriesWriter:
             return
         try:
             with stream:
+                stream.truncate()
                 self._steps.finish(stream)
                 stream.flush()
                 os.fsync(stream.fileno())
@@ -313,11 +344,23 @@ class StepsWriter:
         }
         stream.write(layout.head_bytes(head, magic))
 
+    def go_on(self, begun: Begun) -> None:
+        """Go on behind the steps of a file, the first one by one that needs no other."""
+        begun.check_head(
+            precision=self._precision,
+            tolerance=self._tolerance,
+            key_every=self._key_every,
+            codec=self._codec,
+        )
+        self._entries, self._last_time = list(begun.entries), begun.last_time
+
     def checked_time(self, time: float | None) -> float:
         """Return the next step's time, or raise InvalidArgumentError."""
         value = float(len(self)) if time is None else checked_time(time)
         if self._last_time is not None and not value > self._last_time:
-            raise InvalidArgumentError(f"times must ascend; got {value} after {self._last_time}")
+            raise InvalidArgumentError(
+                f"times must ascend; got {value} after {self._last_time}, that of the last step"
+            )
         return value
 
     def write(self, stream: BinaryIO, vdi: VDI, time: float) -> None:

@@ -64,7 +64,7 @@ LEVELS = (
 #: Rooms in a room, likewise from the lowest to the highest.
 LEVELS_WITHIN = {
     "io": (
-        ("whole_file", "progress"),
+        ("whole_file", "progress", "store_identity"),
         ("png", "ranges", "time_steps", "vdi_file"),
         ("image_stack",),
         ("deep_exr", "stores", "volumes"),

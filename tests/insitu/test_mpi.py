@@ -15,7 +15,7 @@ from PIL import Image
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.insitu import InSitu
 from pyvista_vdi.large.generate import generate_chunked
@@ -66,6 +66,11 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
     assert np.abs(pictures[0] - pictures[1]).max() <= 1 / 255
     view = turned(camera, volume.bounds, 5)
     assert compare_images(*(pvdi.render(vdi, view) for vdi in (found, whole))).ssim > 0.99
+
+
+@needs_mpi
+def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(tmp_path, default_runtime):
+    run(2, PROGRAM, "mistakes,pipeline", tmp_path)
 
 
 @pytest.mark.slow
@@ -152,11 +157,53 @@ def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, scene):
             told.append(value)
             return [value]
 
-    path = tmp_path / "none" / "x.vdis"
-    show = InSitu(path, *view, volume.dimensions, comm=Told(), clim=(0, 200))
-    with pytest.raises(DeviceError, match=r"writing step 0 failed on 1 of 1 ranks.*does not exist"):
+    with pytest.raises(VDIFileError, match="does not exist"):
+        InSitu(tmp_path / "none" / "x.vdis", *view, volume.dimensions, comm=Told(), clim=(0, 200))
+    assert "does not exist" in str(told[-1])
+    show = InSitu(tmp_path / "{}.vdi", *view, volume.dimensions, comm=Told(), clim=(0, 200))
+    (tmp_path / "0.vdi").mkdir()
+    with pytest.raises(VDIFileError, match="is a folder"):
         show(volume.array, (0, 0, 0), 0.0)
-    assert "does not exist" in told[-1]
+    assert "is a folder" in str(told[-1])
+
+
+def simulate(path, scene, times, **options):
+    volume, camera, size = scene
+    options = {"clim": (0, 200), "max_supersegments": 4, **options}
+    with InSitu(path, camera, size, volume.dimensions, comm=OneRank(), **options) as show:
+        for time in times:
+            show(volume.array, (0, 0, 0), time)
+    return show
+
+
+@pytest.mark.parametrize("name", ["run.vdis", "s{:02d}.vdi"])
+def test_what_an_earlier_run_wrote_is_kept_or_gone_on_with(name, tmp_path, scene):
+    volume, camera, size = scene
+    path = tmp_path / name
+
+    def times():
+        if name == "run.vdis":
+            return list(pvdi.read(path).times)
+        return [pvdi.read(file).metadata["time"] for file in sorted(tmp_path.glob("s*.vdi"))]
+
+    show = simulate(path, scene, [0.0, 1.0, 2.0])
+    with pytest.raises(VDIFileError, match=r"is closed.*append=True"):
+        show(volume.array, (0, 0, 0), 3.0)
+    with pytest.raises(VDIFileError, match=r"is there already.*append=True.*overwrite=True"):
+        simulate(path, scene, [0.0])
+    simulate(path, scene, [3.0, 4.0], append=True)
+    for wrong, message in (
+        ({"times": [4.0]}, "times must ascend"),
+        ({"scene": (volume, camera.azimuth(1), size)}, "its camera is"),
+        ({"scene": (volume, camera, (9, 8))}, "its window_size is"),
+        ({"clim": (0, 100)}, "same classification"),
+        ({"overwrite": True}, "pass one of them"),
+    ):
+        with pytest.raises(InvalidArgumentError, match=message):
+            simulate(path, **{"scene": scene, "times": [9.0], "append": True, **wrong})
+    assert times() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    simulate(path, scene, [0.5], overwrite=True)
+    assert times()[0] == 0.5
 
 
 @pytest.mark.parametrize(
@@ -168,7 +215,10 @@ def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, scene):
             for name in ("x.vdi", "{}_{}.vdi", "{step}.vdi", "x{.vdi")
         ),
         ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": 0}, InvalidArgumentError, "every"),
-        ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": "often"}, InvalidArgumentError, "every"),
+        *(
+            ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": every}, InvalidArgumentError, "every")
+            for every in ("often", "2", 2.5, None, True)
+        ),
         ("x.vdis", (8, 8), {"clim": (0, 1)}, InvalidArgumentError, "three whole numbers"),
         ("x.vdis", (8, 8, 8), {"clim": (0, 1), "colour": "red"}, TypeError, "colour"),
     ],

@@ -10,6 +10,7 @@ import platformdirs
 import pytest
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.io.ranges import keeper_of
 
 VALUES = np.random.default_rng(6).normal(size=(12, 10, 14)).astype(np.float32)
@@ -90,7 +91,59 @@ def test_what_was_read_while_the_store_changed_is_not_kept(store):
         store.touch()
     volume.array.keep_ranges(*before)
     assert not kept(store)
-    assert_same(volume.array.ranges(), VALUES)  # who read them goes on with them
+
+
+def test_what_is_kept_is_dropped_where_files_change_while_the_volume_is_open(store, tmp_path):
+    volume = pvdi.open_volume(store)
+    assert volume.finite_range()[1] == np.nanmax(VALUES)
+    other = tmp_path / store.name
+    shutil.copytree(store, other) if store.is_dir() else shutil.copy(store, other)
+    change_one_value(other)
+    if store.name == "x.zarr":
+        shutil.copytree(other, store, dirs_exist_ok=True)
+        assert volume.array.ranges() is None
+        assert volume.finite_range()[1] == 99
+        zarr_store(other)
+        pytest.importorskip("zarr").open(str(other), mode="a").attrs["spacing"] = [1, 2, 3]
+        shutil.copytree(other, store, dirs_exist_ok=True)
+    else:
+        shutil.copyfile(other, store)  # HDF5 has parts of the file in memory still
+    for use in (volume.finite_range, volume.load):
+        with pytest.raises(InvalidVolumeError, match="written anew.*open it again"):
+            use()
+    assert pvdi.open_volume(store).load().array[5, 5, 5] == other_value(other)
+
+
+def test_what_its_own_process_writes_into_an_hdf5_file_counts(tmp_path):
+    path = tmp_path / "x.h5"
+    hdf5_store(path)
+    with pytest.importorskip("h5py").File(path, "r+") as file:
+        volume = pvdi.Volume(file["x"])
+        volume.finite_range()
+        file["x"][5, 5, 5] = 99
+        assert volume.finite_range()[1] == 99
+
+
+def other_value(store):
+    return pvdi.open_volume(store).array[5:6, 5:6, 5:6].item()
+
+
+def test_a_damaged_chunk_is_named_with_its_store(store):
+    if store.name == "x.h5":
+        with pytest.importorskip("h5py").File(store, "w") as file:
+            data = file.create_dataset("x", data=VALUES, chunks=CHUNKS, compression="gzip")
+            damaged = store, data.id.get_chunk_info_by_coord((4, 5, 7)).byte_offset
+    else:
+        (chunk,) = [f for f in store.rglob("*") if f.as_posix().endswith(("c/1/1/1", "1.1.1"))]
+        damaged = chunk, 0
+    with damaged[0].open("r+b") as stream:
+        stream.seek(damaged[1])
+        stream.write(b"nonsense" * 4)
+    volume = pvdi.open_volume(store)
+    with pytest.raises(
+        InvalidVolumeError, match=rf"{store.name}.*\[4:8, 5:10, 7:14\].*copy it from its source"
+    ):
+        volume.finite_range()
 
 
 def test_in_the_cache_where_the_store_s_folder_cannot_be_written(store, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +16,16 @@ import dask.array as da
 from distributed import Client, LocalCluster
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
-from pyvista_vdi import Volume
-from pyvista_vdi.errors import Cancelled, DeviceError, NoDeviceError, VDIWarning
+from pyvista_vdi import Volume, generate, open_volume
+from pyvista_vdi.errors import (
+    Cancelled,
+    DeviceError,
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    InvalidVolumeError,
+    NoDeviceError,
+    VDIWarning,
+)
 from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.large.on_dask import generate_on_dask
 from pyvista_vdi.large.rows import balanced
@@ -127,6 +136,41 @@ def test_dask_arrays_are_computed_where_they_are_needed(client, scene, expected)
     check_same(generate_on_dask(lazy, *rest, client=client, **options), expected)
 
 
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ("cluster", InvalidArgumentTypeError, r"a LocalCluster: give distributed.Client\(cluster"),
+        (7, InvalidArgumentTypeError, "an? int"),
+        ("tcp://127.0.0.1:1", InvalidArgumentError, "no Dask scheduler answers at 'tcp://127"),
+    ],
+)
+def test_what_is_no_client_is_refused(client, scene, given, error, message):
+    (volume, camera, size, function), _ = scene
+    lazy = Volume(da.from_array(volume.array, chunks=(16, 16, 16)))
+    wrong = client.cluster if given == "cluster" else given
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
+        pytest.raises(error, match=message),
+    ):
+        generate(lazy, camera, size, transfer_function=function, client=wrong)
+
+
+def test_an_address_is_that_of_its_scheduler(client, scene):
+    (volume, camera, size, function), _ = scene
+    lazy = Volume(da.from_array(volume.array, chunks=(16, 16, 16)), volume.spacing)
+    found = generate(
+        lazy, camera, size, transfer_function=function, client=client.scheduler.address
+    )
+    assert found.n_supersegments > 1000
+
+
+def test_dask_arrays_of_unknown_chunks_say_what_to_call(scene):
+    (volume, *_), _ = scene
+    lazy = da.from_array(volume.array, chunks=(16, 16, 16))
+    with pytest.raises(InvalidVolumeError, match="compute_chunk_sizes"):
+        Volume(lazy[lazy[:, 0, 0] < 200])
+
+
 def test_what_cannot_be_read_is_named(client, scene):
     (volume, *rest), options = scene
 
@@ -139,6 +183,131 @@ def test_what_cannot_be_read_is_named(client, scene):
     options = {key: value for key, value in options.items() if key != "chunks"}
     with pytest.raises(DeviceError, match=r"block \(1, 1, 1\) \(points \[16:32.*disk is gone"):
         generate_on_dask(Volume(array), *rest, client=client, **options)
+
+
+def zarr_store(folder, values, **options):
+    zarr = pytest.importorskip("zarr")
+    array = zarr.open(
+        str(folder / "s"), mode="w", shape=values.shape, chunks=(16, 16, 16), dtype="u1", **options
+    )
+    array[...] = values
+    return folder / "s"
+
+
+def hdf5_store(folder, values):
+    with pytest.importorskip("h5py").File(folder / "s", "w") as file:
+        file.create_dataset("d", data=values, chunks=(16, 16, 16))
+    return folder / "s"
+
+
+STORES = {
+    "zarr": zarr_store,
+    "zarr2": lambda *of: zarr_store(*of, zarr_format=2),
+    "hdf5": hdf5_store,
+}
+
+
+@pytest.fixture
+def in_folders(client, tmp_path, monkeypatch):
+    """Have this process and the workers work in folders, of which each has its own for a while."""
+    client.wait_for_workers(2, timeout=STARTED)
+    before = client.run(os.getcwd)
+    names = ("here", "none", "other", "part")
+    for name in names:
+        (tmp_path / name).mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+
+    def go(*places):
+        for worker, place in zip(client.nthreads(), places, strict=True):
+            client.run(os.chdir, str(tmp_path / place), workers=[worker])
+        return tmp_path / "here"
+
+    yield go
+    for worker, folder in before.items():
+        client.run(os.chdir, folder, workers=[worker])
+
+
+def generated(opened, rest, client):
+    return generate_on_dask(opened, *rest, client=client, max_supersegments=8, block_bytes=1)
+
+
+@pytest.mark.skipif(not Path("/proc/self/cwd").exists(), reason="a path that differs by process")
+@pytest.mark.parametrize("kind", [*STORES, "dask"])
+@pytest.mark.parametrize(
+    ("where", "said"), [("none", "is not found"), ("other", "another file"), ("part", "not found")]
+)
+def test_a_worker_that_has_not_the_same_store_is_named(
+    client, scene, in_folders, where, said, kind
+):
+    (volume, *rest), _ = scene
+    here = in_folders("here", where)
+    make = STORES["zarr" if kind == "dask" else kind]
+    make(here, volume.array)
+    if where != "none":
+        other = make(here.parent / where, volume.array if where == "part" else volume.array // 2)
+        if where == "part" and other.is_file():
+            pytest.skip("a file is there or not")
+        if where == "part":
+            chunks = [f for f in sorted(other.rglob("*")) if f.name[-1].isdigit() and f.is_file()]
+            for chunk in chunks[1:-1] if kind == "dask" else chunks[1:2]:
+                chunk.unlink()
+    path = "/proc/self/cwd/s"  # as of a mount that is not the same on all machines
+    opened = Volume(da.from_zarr(path)) if kind == "dask" else open_volume(path)
+    bad = list(client.nthreads())[1]
+    with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.*{said}"):
+        generated(opened, rest, client)
+    assert not list(here.glob("*.ranges"))
+
+
+@pytest.mark.parametrize("kind", STORES)
+def test_relative_paths_are_this_process_s_and_changes_are_seen_while_it_is_open(
+    client, scene, in_folders, kind, default_runtime
+):
+    (volume, *rest), _ = scene
+    here = in_folders("none", "none")
+    STORES[kind](here, volume.array)
+    opened = open_volume("s")
+    whole = generate_chunked(opened, *rest, max_supersegments=8, block_bytes=1)
+    check_same(generated(opened, rest, client), whole)
+    if kind == "hdf5":
+        del opened
+    changed = np.where(volume.array > 100, 0, volume.array)
+    STORES[kind](here, changed)
+    if kind == "hdf5":
+        opened = open_volume("s")
+    found = generated(opened, rest, client)
+    check_same(
+        found,
+        generate_chunked(
+            Volume(changed), *rest, max_supersegments=8, chunks=(16,) * 3, block_bytes=1
+        ),
+    )
+    assert not found.equals(whole)
+
+
+def test_ranges_that_workers_alone_say_are_not_kept(client, scene, tmp_path):
+    """As by a file system that shows a worker something else, which no file's sample gives away."""
+    (volume, *rest), _ = scene
+    store = zarr_store(tmp_path, volume.array)
+
+    def broken():
+        from pyvista_vdi.model.chunked import ChunkedArray
+
+        ChunkedArray.read_right = ChunkedArray.__getitem__
+        ChunkedArray.__getitem__ = lambda self, box: self.read_right(box) * 0
+
+    def mended():
+        from pyvista_vdi.model.chunked import ChunkedArray
+
+        ChunkedArray.__getitem__ = ChunkedArray.read_right
+
+    client.run(broken)
+    try:
+        with pytest.raises(InvalidVolumeError, match="workers read values from 0.* must have"):
+            generated(open_volume(store), rest, client)
+    finally:
+        client.run(mended)
+    assert not list(tmp_path.glob("*.ranges"))
 
 
 def test_workers_without_a_device_are_named(client, scene, expected):

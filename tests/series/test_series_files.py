@@ -299,6 +299,69 @@ def test_what_was_appended_is_readable_at_once(steps, tmp_path):
         out.append(steps[0])
 
 
+def test_a_file_is_gone_on_with_or_kept(steps, tmp_path):
+    path = tmp_path / "a.vdis"
+    with pvdi.SeriesWriter(path) as out:
+        for vdi in steps[:3]:
+            out.append(vdi)
+    whole = path.read_bytes()
+    with pytest.raises(VDIFileError, match=r"is there already with 3 steps, .*append=True.*over"):
+        pvdi.SeriesWriter(path)
+    with pytest.raises(InvalidArgumentError, match="pass one of them"):
+        pvdi.SeriesWriter(path, append=True, overwrite=True)
+    for wrong in ({"precision": "exact"}, {"tolerance": 0.1}, {"compression": "none"}):
+        with pytest.raises(InvalidArgumentError, match=f"written with {next(iter(wrong))}="):
+            pvdi.SeriesWriter(path, append=True, **wrong)
+    with pvdi.SeriesWriter(path, append=True) as out:
+        assert len(out) == 3
+        with pytest.raises(InvalidArgumentError, match="ascend; got 2.0 after 2.0"):
+            out.append(steps[3], 2.0)
+        with pytest.raises(InvalidArgumentError, match="its camera is"):
+            out.append(turned_away(steps[3]))
+    assert path.read_bytes() == whole
+    with pvdi.SeriesWriter(path, append=True) as out:
+        for vdi in steps[3:5]:
+            out.append(vdi)
+    assert reader.read_info(path).closed
+    assert all_same(pvdi.read(path), steps[:5])
+    with pvdi.SeriesWriter(path, overwrite=True) as out:
+        out.append(steps[0])
+    assert len(pvdi.read(path)) == 1
+
+
+def turned_away(vdi):
+    arrays = (vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth)
+    return pvdi.VDI(
+        vdi.camera.azimuth(3), vdi.window_size, *arrays, vdi.bounds, depth_origin=vdi.depth_origin
+    )
+
+
+def test_every_cut_of_a_killed_run_is_gone_on_with(tmp_path):
+    small, path = packed_steps(4, size=(6, 4)), tmp_path / "a.vdis"
+    VDISeries.of(small[:3]).save(path)
+    data, cut = path.read_bytes(), tmp_path / "cut.vdis"
+    ends = [place + layout.HEADER_BYTES + h.n_bytes for place, h in frames_of(path)]
+    begin = frames_of(path)[0][0]
+    for n in [0, begin, begin + 9, *(end + k for end in ends for k in (-1, 0, 30)), len(data)]:
+        cut.write_bytes(data[:n])
+        finished = sum(end <= n for end in ends)
+        with pvdi.SeriesWriter(cut, append=True) as out:
+            out.append(small[3], 9.0)
+        assert reader.read_info(cut).closed
+        assert all_same(pvdi.read(cut), [*small[:finished], small[3]])
+
+
+@pytest.mark.parametrize("content", [b"not a series", b"\x89VDIS\r\n\x1a" + bytes(40)])
+def test_a_foreign_file_is_neither_replaced_nor_gone_on_with(content, tmp_path):
+    path = tmp_path / "a.vdis"
+    path.write_bytes(content)
+    with pytest.raises(VDIFileError, match="is there already"):
+        pvdi.SeriesWriter(path)
+    with pytest.raises(VDIFileError, match="not a series|damaged"):
+        pvdi.SeriesWriter(path, append=True)
+    assert path.read_bytes() == content
+
+
 def test_a_writer_takes_volumes(tmp_path, default_runtime):
     z, y, x = np.mgrid[:9, :8, :7]
     volumes = [pvdi.Volume((x * y + z + k).astype(np.float32)) for k in range(3)]

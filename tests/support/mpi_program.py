@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 
@@ -9,7 +10,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError
+from pyvista_vdi import TransferFunction
+from pyvista_vdi.errors import (
+    DeviceError,
+    InvalidArgumentError,
+    NoDeviceError,
+    VDIError,
+    VDIFileError,
+)
 from pyvista_vdi.insitu import InSitu
 from pyvista_vdi.large.on_mpi import generate_on_mpi
 from pyvista_vdi.model.grid import Grid
@@ -56,15 +64,120 @@ def same(folder):
 
 
 def failing(_folder):
-    """One rank's driver fails: all must say so, and nobody waits."""
+    """One rank has no device: all must say so, and nobody waits."""
     volume = volume_of("uint8")
     values, first = own_block(volume, COMM.rank)
     device = "nobody" if COMM.rank == 2 else None
     arguments = (Grid.of(volume), VIEWS["all of it"](volume), WINDOW, transfer_for(volume))
-    with pytest.raises(DeviceError, match="rank 2: .*nobody"):
+    with pytest.raises(NoDeviceError, match="rank 2: .*nobody"):
         generate_on_mpi(values, first, *arguments, comm=COMM, device=device)
     with pytest.raises(InvalidArgumentError, match="one grid of blocks"):
         generate_on_mpi(values[:, :, 1:], first, *arguments, comm=COMM)
+
+
+#: What a mistake gives to an argument, and what happens to be right of some.
+WRONG = (
+    None, "x", -1, 2.5, float("nan"), object(), np.zeros(3), np.zeros((2, 2)), (), (1, 2, 3), {},
+    b"", True, print, 10**400, ["a", "b", "c"], (0, 0, 2), np.zeros((8, 16, 16), complex),
+    np.zeros((8, 16, 16), "u1"), np.full((8, 16, 16), "a"),
+)  # fmt: skip
+
+
+def mistakes(folder):
+    """One rank is given something wrong, each argument in turn: all raise the same, or none does.
+
+    A rank that waits is ended by the alarm, and by that the test.
+    """
+    signal.alarm(240)
+    camera = VIEWS["all of it"](volume_of("uint8"))
+    table = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 1))
+    right = np.random.default_rng(0).random((8, 16, 16), dtype=np.float32)
+    at = (0, 0, 8 * COMM.rank)
+    making = {"path": folder / "m.vdis", "camera": camera, "window_size": (8, 6)}
+    making |= {"dimensions": (16,) * 3, "comm": COMM, "overwrite": True, "clim": (0, 1)}
+    others = ("spacing", "origin", "every", "device", "append", "cmap", "opacity", "nobody")
+    others += ("max_supersegments", "precision", "ambient_occlusion", "sample_distance", "lights")
+    showing = {"values": right, "first": at, "at": 0.0}
+    grid = Grid((16,) * 3, (1.0,) * 3, (0.0,) * 3, np.eye(3))
+    one = {"values": right, "first": at, "grid": grid, "camera": camera, "window_size": (8, 6)}
+    one |= {"transfer_function": table, "comm": COMM}
+
+    def show(making, showing):
+        with InSitu(**making) as writer:
+            writer(**showing)
+
+    cases = [(f"InSitu({name})", making, name) for name in (*making, *others)]
+    cases += [(f"show({name})", showing, name) for name in showing]
+    cases += [
+        (f"generate({name})", one, name)
+        for name in (*one, "options", "device", "name", "metadata", "tolerance")
+    ]
+    for what, given, name in cases:
+        for k, wrong in enumerate(WRONG):
+            changed = {**given, name: wrong} if COMM.rank == 1 else given
+            try:
+                if given is one:
+                    generate_on_mpi(**changed)
+                else:
+                    show(
+                        changed if given is making else making,
+                        changed if given is showing else showing,
+                    )
+                said = ""
+            except VDIError as error:
+                said = f"{type(error).__name__}: {error}"
+            assert not said.startswith("DeviceError"), (what, k, said)
+            of_ranks = COMM.allgather((said.partition(":")[0], said.partition("rank 1:")[2]))
+            assert len(set(of_ranks)) == 1, (what, k, of_ranks)
+            assert not said or "rank 1" in said, (what, k, said)
+    # What each rank may be given, but all the same
+    for change in ({"every": 1 + COMM.rank}, {"clim": (0, 1 + COMM.rank)}):
+        with pytest.raises(InvalidArgumentError, match="must be the same on all ranks.*rank 1"):
+            show({**making, **change}, showing)
+    with InSitu(**making) as writer:
+        if COMM.rank == 1:
+            writer.close()
+        with pytest.raises(VDIFileError, match=r"rank 1: .*is closed.*append=True"):
+            writer(**showing)
+    signal.alarm(0)
+
+
+def pipeline(_folder):
+    """VTK's pipeline with a part of the volume on each rank, as in a parallel server."""
+    signal.alarm(200)
+    from pyvista_vdi.vtk_pipeline.filters import ranks
+    from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData, vtkVolumeProperty
+
+    ranks.communicator = lambda: COMM  # VTK's own controller is not of MPI in every build
+    camera = VIEWS["all of it"](volume_of("uint8"))
+
+    def source(skipped=None, points=16, kind=10):
+        image, made = vtkImageData(), ranks.RanksVDISource()
+        image.SetDimensions(points, 16, 16)
+        if skipped != "scalars":
+            image.AllocateScalars(kind, 1)
+            image.GetPointData().GetScalars().Fill(1)
+        if skipped != "input":
+            made.SetInputDataObject(image)
+        settings = {"Camera": camera, "WindowSize": (8, 6), "VolumeProperty": vtkVolumeProperty()}
+        for name, value in settings.items():
+            if name != skipped:
+                getattr(made, f"Set{name}")(value)
+        return made
+
+    assert source().GetVDI().window_size == (8, 6)
+    for change in (
+        {"skipped": "Camera"},
+        {"skipped": "WindowSize"},
+        {"skipped": "VolumeProperty"},
+        {"skipped": "scalars"},
+        {"kind": VTK_UNSIGNED_CHAR},
+        {"points": 12},
+    ):
+        with pytest.raises(VDIError) as caught:
+            source(**(change if COMM.rank == 1 else {})).GetVDI()
+        assert not isinstance(caught.value, DeviceError), (change, caught.value)
+    signal.alarm(0)
 
 
 def series(folder):
@@ -89,4 +202,10 @@ def series(folder):
 
 if __name__ == "__main__":
     for case in sys.argv[1].split(","):
-        {"same": same, "failing": failing, "series": series}[case](Path(sys.argv[2]))
+        {
+            "same": same,
+            "failing": failing,
+            "mistakes": mistakes,
+            "pipeline": pipeline,
+            "series": series,
+        }[case](Path(sys.argv[2]))

@@ -118,6 +118,14 @@ class RanksVDISource(VDISource):
         self._part = None
         return super().RequestData(request, inputs, outputs)
 
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        comm = communicator()
+        if comm is None:
+            super()._execute(inputs, outputs)
+            return
+        with together(comm, "making a VDI"):  # a camera that only one has, say
+            super()._execute(inputs, outputs)
+
     def _scalar_range(self, image: Any) -> tuple[float, float]:
         """Return the least and the largest scalar of the whole input."""
         if communicator() is not None:
