@@ -36,8 +36,9 @@ _NAMES = {
         "vtkWeakReference"
     ),
     "vtkCommonDataModel": (
-        "vtkCellArray vtkCompositeDataSet vtkDataObject vtkImageData vtkMultiBlockDataSet "
-        "vtkPiecewiseFunction vtkPlane vtkPolyData vtkRectilinearGrid vtkSelectionNode"
+        "vtkCellArray vtkCompositeDataSet vtkDataObject vtkDataSetAttributes vtkImageData "
+        "vtkMultiBlockDataSet vtkPiecewiseFunction vtkPlane vtkPolyData vtkRectilinearGrid "
+        "vtkSelectionNode vtkUniformGrid"
     ),
     "vtkCommonExecutionModel": "vtkStreamingDemandDrivenPipeline vtkTrivialProducer",
     "vtkCommonMath": "vtkMatrix4x4",

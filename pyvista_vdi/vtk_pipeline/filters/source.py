@@ -315,6 +315,11 @@ class VDISource(SourceSettings):
             image.GetSpacing(),
             image.GetOrigin(),
             tuple(direction.GetElement(i, j) for i in range(3) for j in range(3)),
+            *(
+                (ghosts.GetAddressAsString(""), ghosts.GetMTime())
+                for ghosts in (image.GetPointGhostArray(), image.GetCellGhostArray())
+                if ghosts is not None
+            ),
         )
         if self._volume is None or key != self._volume_key:
             self._volume = volume_from_vtk(image, self._scalars, self._preference)
