@@ -84,6 +84,7 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
         taken.origin if options.origin is None else options.origin,
         taken.direction,
         name=taken.name,
+        blanked=taken.blanked,
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
@@ -14,7 +13,7 @@ from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
-from pyvista_vdi.vtk_pipeline.filters.view import as_array
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
 
@@ -231,7 +230,7 @@ class VDIActorMethods(PlayingMethods):
                 "nothing shows this actor, so there is no view: pass camera, or add the actor to "
                 "a renderer first"
             )
-        vdi = vdi_set.generate(Camera.from_any(camera, model_transform=as_array(self.GetMatrix())))
+        vdi = vdi_set.generate(camera_of(camera, as_array(self.GetMatrix())))
         vdi_set.add(vdi)
         self.GetMapper().Modified()
         return vdi
@@ -244,7 +243,7 @@ class VDIActorMethods(PlayingMethods):
         if window_size is None and renderer is not None and min(renderer.GetSize()) > 0:
             window_size = renderer.GetSize()
         if camera is not None:
-            camera = Camera.from_any(camera, model_transform=as_array(self.GetMatrix()))
+            camera = camera_of(camera, as_array(self.GetMatrix()))
         vdi = player.series.generate(player.step, camera, window_size)
         player.replace(vdi)
         self.GetMapper().Modified()
