@@ -260,14 +260,12 @@ def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:
 
 
 def as_numpy(array: vtkDataArray) -> NDArray[Any]:
-    """Return the values of VTK's array, sharing its memory where it has one."""
-    try:
-        values: NDArray[Any] = vtk_to_numpy(array)
-    except (AttributeError, TypeError, ValueError):
-        # Implicit arrays (constant, affine, ...) have no memory of their own
+    """Return the values of VTK's array, sharing its memory where they lie one after the other."""
+    if not array.HasStandardMemoryLayout():  # implicit (constant, affine, ...), or by components
         plain = vtkDataArray.CreateDataArray(array.GetDataType())
         plain.DeepCopy(array)
         return vtk_to_numpy(plain)  # type: ignore[no-any-return]
+    values: NDArray[Any] = vtk_to_numpy(array)
     # NumPy's own array rather than one that keeps VTK's, which has an attribute: see Held
     lent = getattr(array, "_numpy_reference", values)
     same = (lent.dtype, lent.size, lent.ctypes.data) == (
