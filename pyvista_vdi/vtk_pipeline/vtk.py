@@ -73,7 +73,8 @@ _NAMES = {
     "vtkRenderingLOD": "vtkLODActor",
     "vtkRenderingLabel": "vtkLabelPlacementMapper vtkPointSetToLabelHierarchy",
     "vtkRenderingOpenGL2": (
-        "vtkOpenGLActor vtkOpenGLGL2PSHelper vtkPixelBufferObject vtkTextureObject"
+        "vtkOpenGLActor vtkOpenGLGL2PSHelper vtkOpenGLShaderProperty vtkPixelBufferObject "
+        "vtkTextureObject"
     ),
     "vtkRenderingUI": "vtkGenericRenderWindowInteractor",
     "vtkRenderingVolume": (

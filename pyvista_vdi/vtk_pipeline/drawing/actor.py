@@ -12,17 +12,20 @@ from pyvista_vdi.series.player import Player
 from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
-from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
+from pyvista_vdi.vtk_pipeline.drawing.shader import VDIShaderProperty, show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
 
 
+@refusing(OF_ACTORS)
 class VDIActorMethods(PlayingMethods):
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
     def _become_vdi_actor(self: Any) -> None:
         """Install the shader; to be called once, from ``__init__``."""
+        super().SetShaderProperty(VDIShaderProperty())  # type: ignore[misc]
         show_image(self)
 
     def SetMapper(self: Any, mapper: Any) -> None:

@@ -245,9 +245,13 @@ class SourceSettings(Algorithm):
         Raises
         ------
         UnsupportedError, InvalidArgumentError
-            If it cannot be honoured: see ``transfer_function_from_property``.
+            If it cannot be honoured: see ``transfer_function_from_property``. Functions without
+            points may be filled later, before the VDI is made.
         """
-        if prop is not None:
+        if prop is not None and 0 not in (
+            prop.GetScalarOpacity().GetSize(),
+            color_function(prop).GetSize(),
+        ):
             transfer_function_from_property(prop, rgba=not prop.GetIndependentComponents())
         if prop is not self.GetVolumeProperty():
             self._property = None if prop is None else Held(prop)
