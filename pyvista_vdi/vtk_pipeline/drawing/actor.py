@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, warn_external
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
@@ -263,3 +263,18 @@ class VDIActor(VDIActorMethods, vtkVolume):
 
     def __init__(self) -> None:
         self._become_vdi_actor()
+
+    def SetProperty(self, prop: Any) -> None:
+        """Set the actor's volume property, which changes nothing, and warn if it is another one.
+
+        Another one than the source's, that is; with none of the source there is nothing to say.
+        """
+        super().SetProperty(prop)
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.GetSource()
+        own = None if source is None else source.GetVolumeProperty()
+        if own is not None and own is not prop:
+            warn_external(
+                "VDIActor.SetProperty changes nothing: the VDI has the colours and opacities of "
+                "its source's property, which VDISource.SetVolumeProperty sets"
+            )

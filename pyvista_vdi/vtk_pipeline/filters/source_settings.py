@@ -248,10 +248,10 @@ class SourceSettings(Algorithm):
             If it cannot be honoured: see ``transfer_function_from_property``. Functions without
             points may be filled later, before the VDI is made.
         """
-        if prop is not None and 0 not in (
-            prop.GetScalarOpacity().GetSize(),
-            color_function(prop).GetSize(),
-        ):
+        to_be_filled = isinstance(prop, vtkVolumeProperty) and not (
+            prop.GetScalarOpacity().GetSize() and color_function(prop).GetSize()
+        )
+        if prop is not None and not to_be_filled:
             transfer_function_from_property(prop, rgba=not prop.GetIndependentComponents())
         if prop is not self.GetVolumeProperty():
             self._property = None if prop is None else Held(prop)
