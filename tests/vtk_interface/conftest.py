@@ -1,5 +1,5 @@
 """Every window off-screen: see ``tests/support/off_screen.py``."""
 
-from off_screen import off_screen
+from off_screen import closed, off_screen, vtk_messages
 
-__all__ = ["off_screen"]
+__all__ = ["closed", "off_screen", "vtk_messages"]

@@ -19,6 +19,7 @@ from vtk_interface.stage import (  # noqa: E402
     WITHOUT,
     N,
     Row,
+    another_property,
     colors,
     function,
     image_of,
@@ -37,7 +38,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (  # noqa: E402
     vtkPlaneCollection,
     vtkRectilinearGrid,
     vtkUniformGrid,
-    vtkVolumeProperty,
 )
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or TESTS.parent)
@@ -188,14 +188,6 @@ MAPPER = (
         SAME, "VTK's own"),
     Row("Render GPURender ReleaseGraphicsResources", SAME, "VTK's own, called by its renderer"),
 )  # fmt: skip
-
-
-def another_property():
-    """Return one of other colours and opacities."""
-    made = vtkVolumeProperty()
-    made.SetColor(colors((0, 1, 0, 0), (200, 0, 0, 1)))
-    made.SetScalarOpacity(function((0, 0.3), (255, 0)))
-    return made
 
 
 def shaded(**how):

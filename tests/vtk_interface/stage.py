@@ -127,6 +127,14 @@ def some_property() -> vtkVolumeProperty:
     return prop
 
 
+def another_property():
+    """Return one of other colours and opacities."""
+    made = vtkVolumeProperty()
+    made.SetColor(colors((0, 1, 0, 0), (200, 0, 0, 1)))
+    made.SetScalarOpacity(function((0, 0.3), (255, 0)))
+    return made
+
+
 class Scene:
     """The volume in a renderer, by VTK's mapper or by ours."""
 

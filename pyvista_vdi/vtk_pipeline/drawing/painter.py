@@ -125,6 +125,8 @@ class Painter:
                 painter._place_proxy(painter.input.bounds())
 
         self.upkeep.set_input(source, bounds_changed)
+        if source is None:
+            self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
         self._place_proxy(bounds)
 
     def _give_proxy(self, components: int) -> None:

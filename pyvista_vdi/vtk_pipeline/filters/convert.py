@@ -183,30 +183,31 @@ def _blanked(image: vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
     """Return the octants that VTK's GPU mapper leaves out, as a :class:`Volume` has them.
 
     Its texels are points, or cells where the scalars are theirs. It leaves out a sample where the
-    texel that it lies in is marked, or the nearest one to it along an axis. A marked cell marks the
-    point that it begins at, and a marked point the cells around it.
+    texel that it lies in is marked, or the nearest one to it along an axis. Where texels are
+    points, a marked cell is the point that it begins at.
     """
-    ghosts = ghosts_of(image)
-    if not ghosts:
-        return None
-    points = image.GetDimensions()[::-1]
-    texels = np.zeros([n - of_cells for n in points], bool)
-    if "cell" in ghosts:
-        texels[tuple(slice(n - 1) for n in points)] = ghosts["cell"] > 0
-    if "point" in ghosts:
-        corners = (slice(-1), slice(1, None)) if of_cells else (slice(None),)
-        for corner in itertools.product(corners, repeat=3):
-            texels |= ghosts["point"][corner] > 0
+    blanked = None
+    for kind, marks in ghosts_of(image).items():
+        cells = kind == "cell" and of_cells
+        texels = np.pad(marks > 0, (0, 1)) if kind == "cell" and not cells else marks > 0
+        octants = _octants_of(texels, cells)
+        blanked = octants if blanked is None else blanked | octants
+    return blanked
+
+
+def _octants_of(texels: NDArray[np.bool_], cells: bool) -> NDArray[np.uint8]:
+    """Return the octants that marked texels, of points or of cells, blank."""
+    points = [n + cells for n in texels.shape]
     texels = np.pad(texels, 1, mode="edge")
-    blanked = np.zeros(points, np.uint8)
+    octants = np.zeros(points, np.uint8)
     for octant, above in enumerate(itertools.product((0, 1), repeat=3)):  # z, y, x
-        at = [up if of_cells else 1 for up in above]
-        beside = [1 - up if of_cells else 2 * up for up in above]
+        at = [up if cells else 1 for up in above]
+        beside = [1 - up if cells else 2 * up for up in above]
         marked = np.zeros(points, bool)
         for first in (at, *([*at[:k], beside[k], *at[k + 1 :]] for k in range(3))):
             marked |= texels[tuple(slice(f, f + n) for f, n in zip(first, points, strict=True))]
-        blanked |= marked.astype(np.uint8) << octant
-    return blanked
+        octants |= marked.astype(np.uint8) << octant
+    return octants
 
 
 def scalars_of(image: vtkImageData, name: str | None, preference: str = "point") -> vtkDataArray:
