@@ -152,9 +152,10 @@ MAPPER = (
         "TotalNumberOfInputConnections ConvertTotalInputToPortConnection", WITHOUT, _OF_PROXY),
     Row("InputArrayToProcess InputArrayInformation InputArraySpecification ResetInputArraySpecifications",
         WITHOUT, "VTK's mapper does not ask for them, either"),
-    Row("RenderToImage ColorImage", SAME, "", color_image),
+    Row("RenderToImage ColorImage ColorTexture", SAME, "", color_image),
     Row("DepthImage", REFUSED, "`VDIActor.pick(x, y)` says what is seen where",
         lambda s: s.mapper.GetDepthImage(vtkImageData())),
+    Row("DepthTexture", REFUSED, "likewise", lambda s: s.mapper.GetDepthTexture()),
     Row("DepthImageScalarType", WITHOUT, f"{_OF_REFUSED}depth images"),
     Row("ClampDepthToBackface", REFUSED, "it is of depth images", lambda s: s.mapper.ClampDepthToBackfaceOn()),
     Row("UseDepthPass", REFUSED, "a VDI has no isosurfaces", lambda s: s.mapper.UseDepthPassOn()),
@@ -186,6 +187,8 @@ MAPPER = (
     Row("ShallowCopy", SAME, "copies the clipping planes, as of every mapper"),
     Row("RenderSupported IsARayCastMapper IsARenderIntoImageMapper Scalars AbstractScalars GhostArray",
         SAME, "VTK's own"),
+    Row("Partitions PreLoadData SharedDepthTexture CurrentPass", WITHOUT, "how VTK's ray caster is fed with voxels and depth",
+        lambda s: s.mapper.SetPartitions(2, 1, 1)),
     Row("Render GPURender ReleaseGraphicsResources", SAME, "VTK's own, called by its renderer"),
 )  # fmt: skip
 
@@ -430,7 +433,7 @@ IMAGE = (
 )  # fmt: skip
 
 SECTIONS = {
-    "vtkGPUVolumeRayCastMapper, of a VDIMapper": MAPPER,
+    "vtkOpenGLGPUVolumeRayCastMapper, of a VDIMapper": MAPPER,
     "vtkVolumeProperty, of VDISource.SetVolumeProperty": PROPERTY,
     "vtkVolume, of a VDIActor": VOLUME,
     "vtkImageData, at the input of a VDISource": IMAGE,

@@ -248,7 +248,6 @@ def test_marks_that_change_make_another_vdi_and_picks_go_through(off_screen):
     marks = vtk_to_numpy(grid.GetPointGhostArray()).reshape(N, N, N)
     marks[: N // 2] = vtkDataSetAttributes.HIDDENPOINT
     marks[:, :, N // 2 :] = vtkDataSetAttributes.HIDDENPOINT
-    grid.GetPointGhostArray().Modified()
     grid.Modified()
     scene.picture()
     assert not scene.source.GetVDI().equals(front)

@@ -10,8 +10,8 @@ from pyvista_vdi.errors import VDIError
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkAlgorithm,
     vtkDataObject,
-    vtkGPUVolumeRayCastMapper,
     vtkObject,
+    vtkOpenGLGPUVolumeRayCastMapper,
     vtkUniformGrid,
     vtkVolume,
     vtkVolumeProperty,
@@ -32,7 +32,7 @@ def setters_of_images():
 @pytest.mark.parametrize(
     ("methods", "rows"),
     [
-        (methods_of(vtkGPUVolumeRayCastMapper, vtkAlgorithm) + of_inputs(), MAPPER),
+        (methods_of(vtkOpenGLGPUVolumeRayCastMapper, vtkAlgorithm) + of_inputs(), MAPPER),
         (methods_of(vtkVolumeProperty, vtkObject), PROPERTY),
         (methods_of(vtkVolume, vtkObject), VOLUME),
         (setters_of_images(), IMAGE),

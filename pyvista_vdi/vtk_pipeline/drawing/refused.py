@@ -55,6 +55,7 @@ OF_MAPPERS: Mapping[str, str] = {
     "SetClampDepthToBackface": _DEPTH,
     "ClampDepthToBackfaceOn": _DEPTH,
     "GetDepthImage": _DEPTH,
+    "GetDepthTexture": _DEPTH,
     "SetLockSampleDistanceToInputSpacing": _STEP,
     "LockSampleDistanceToInputSpacingOn": _STEP,
     "CreateCanonicalView": "it draws VTK's own ray caster's picture: take one by "

@@ -316,7 +316,8 @@ class VDISource(SourceSettings):
             image.GetOrigin(),
             tuple(direction.GetElement(i, j) for i in range(3) for j in range(3)),
             *(
-                (ghosts.GetAddressAsString(""), ghosts.GetMTime())
+                # Blanking a point modifies nothing; whoever has done it modifies the image
+                (ghosts.GetAddressAsString(""), ghosts.GetMTime(), image.GetMTime())
                 for ghosts in (image.GetPointGhostArray(), image.GetCellGhostArray())
                 if ghosts is not None
             ),
