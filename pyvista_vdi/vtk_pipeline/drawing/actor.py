@@ -258,7 +258,8 @@ class VDIActor(VDIActorMethods, vtkVolume):
 
     Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``. Its volume
     property has no effect here: the classification is in the VDI (see
-    ``VDISource.SetVolumeProperty``).
+    ``VDISource.SetVolumeProperty``). Other coordinate systems than the world, and changes to its
+    shader, are refused by name.
     """
 
     def __init__(self) -> None:

@@ -435,8 +435,8 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     the input up to date and raycasts it from the frame's view, ending rays at opaque geometry;
     an image is kept as long as view, depth and VDI stay the same. Clipping planes
     (``AddClippingPlane``), cropping (``SetCropping`` and its regions) and the opacity multiplier
-    act on the next frame without another VDI; other blending modes, masks and VTK's global
-    illumination are refused.
+    act on the next frame without another VDI. What of VTK's mapper a VDI has no place for, such as
+    other blending modes, masks and depth images, is refused by the method's name.
 
     Notes
     -----
