@@ -269,6 +269,9 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
     if (ANY(some))
         sample.w = SELECT((Real)(0.0f), step_optical_depth(sample.w, units), some);
 #endif
+#ifdef BLANKED
+    sample.w = SELECT(sample.w, (Real)(0.0f), is_blank(medium->blanked, medium->size, x, y, z));
+#endif
 #if defined(RGBA) || defined(SHADED) || defined(GRADIENT_OPACITY) || defined(OCCLUSION)
     const Int visible = sample.w > 0.0f;
     if (ANY(visible)) {

@@ -39,7 +39,11 @@ KERNEL_OF_LANES void project(
 #endif
             const Real scalar = sample_volume(medium.voxels, medium.size, fma(t, march.slope.x, march.start.x),
                                               fma(t, march.slope.y, march.start.y), fma(t, march.slope.z, march.start.z));
-            const Int counts = (march.steps > k) & (steps > 0.0f) & (scalar == scalar);
+            Int counts = (march.steps > k) & (steps > 0.0f) & (scalar == scalar);
+#ifdef BLANKED
+            counts = counts & !is_blank(medium.blanked, medium.size, fma(t, march.slope.x, march.start.x),
+                                        fma(t, march.slope.y, march.start.y), fma(t, march.slope.z, march.start.z));
+#endif
             length = SELECT(length, length + steps, counts);
 #if defined(MAXIMUM)
             extreme = SELECT(extreme, fmax(extreme, scalar), counts);

@@ -89,6 +89,7 @@ def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
         taken.origin if options.origin is None else options.origin,
         taken.direction,
         name=taken.name,
+        blanked=taken.blanked,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device.work_order import Rectangle
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.generate import Progress, made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.large.blocks import BLOCK_BYTES, Blocks, Indices
@@ -40,6 +40,11 @@ def task_of(
     """Return a VDI's task."""
     width, height = check_window_size(window_size)
     require_room(0, (width, height))
+    if volume.blanked is not None:
+        raise UnsupportedError(
+            f"the volume {volume.name!r} has blank points or cells, which volumes in blocks "
+            "cannot have: write NaN there, or leave client out"
+        )
     point_bytes = volume.array.dtype.itemsize * (4 if volume.rgba else 1)
     most = block_bytes or BLOCK_BYTES
     if options.memory_limit is not None:

@@ -65,7 +65,14 @@ def _with_scalars(volume: Volume, scalars: Any) -> Volume:
             f"scalars must have one value per point, {points}; got {values.size}"
         )
     shaped = values.reshape(volume.scalars.shape + (4,) * rgba)
-    other = Volume(shaped, volume.spacing, volume.origin, volume.direction, name="scalars")
+    other = Volume(
+        shaped,
+        volume.spacing,
+        volume.origin,
+        volume.direction,
+        name="scalars",
+        blanked=volume.blanked,
+    )
     other.unit_distance = volume.unit_distance
     return other
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, warn_external
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.grid import Geometry
@@ -56,6 +56,9 @@ class Volume(Geometry):
         Columns are the directions of the x, y and z index axes; identity by default.
     name : str
         What the scalars are called.
+    blanked : array_like of uint8, shape (nz, ny, nx), optional
+        What is not drawn: a bit for each octant, half a voxel long, around each point. The
+        octant above the point along x has 1 in its number, that above it along y 2, along z 4.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class Volume(Geometry):
 
     array: NDArray[Any]
     name: str
+    blanked: NDArray[np.uint8] | None
 
     def __init__(
         self,
@@ -75,12 +79,14 @@ class Volume(Geometry):
         direction: ArrayLike | None = None,
         *,
         name: str = "values",
+        blanked: ArrayLike | None = None,
     ) -> None:
         self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
         self.spacing = _checked_vector("spacing", spacing)
         self.origin = _checked_vector("origin", origin)
         self.direction = _checked_direction(direction)
         self.name = str(name)
+        self.blanked = None if blanked is None else self._checked_blanked(blanked)
         if min(self.spacing) <= 0:
             raise InvalidVolumeError(
                 f"spacing must be positive along each axis; got {self.spacing}: "
@@ -109,6 +115,20 @@ class Volume(Geometry):
     def chunked(self) -> bool:
         """Whether the voxels are read chunk by chunk: VDIs are then made block by block."""
         return self.chunks is not None
+
+    def _checked_blanked(self, blanked: ArrayLike) -> NDArray[np.uint8]:
+        octants = np.ascontiguousarray(blanked)
+        if self.chunked:
+            raise UnsupportedError(
+                "blanked is of volumes in memory, and this one is read chunk by chunk: load it "
+                "(Volume.load()), or write NaN where it is blank"
+            )
+        if octants.dtype != np.uint8 or octants.shape != self.array.shape[:3]:
+            raise InvalidVolumeError(
+                f"blanked must be uint8 of shape {self.array.shape[:3]}, a bit for each octant; "
+                f"got {octants.dtype} of shape {octants.shape}"
+            )
+        return octants
 
     def _check_places(self) -> None:
         """Warn where float64 rounds the places of voxels by more than pictures bear."""

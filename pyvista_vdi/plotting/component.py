@@ -450,8 +450,6 @@ class AddVDI(Component):
         actor = PlotterVDIActor()
         if prop is not None:
             actor.prop = prop
-            if not prop.independent_components:
-                mapper.painter.give_proxy(4)
         if isinstance(shown, VDISeries):
             mapper.SetSeries(shown)
         elif isinstance(shown, VDISet):

@@ -112,6 +112,11 @@ def _with_values(image: Any, values: Any) -> pv.ImageData:
         )
     copy = pv.ImageData()
     copy.CopyStructure(image)
+    for to, marks in (
+        (copy.GetPointData(), image.GetPointGhostArray()),
+        (copy.GetCellData(), image.GetCellGhostArray()),
+    ):
+        to.AddArray(marks)
     data = copy.point_data if len(values) == n_points else copy.cell_data
     data.set_array(values, _UNNAMED)
     return copy

@@ -326,7 +326,8 @@ def medium_at(
             )
     if occlusion is not None:
         color = color * occlusion.factors(inside)[:, None]
-    return color, np.where(outside | np.isnan(scalar), 0.0, tau)
+    unseen = outside | np.isnan(scalar) | _blank(volume, inside)
+    return color, np.where(unseen, 0.0, tau)
 
 
 def node_occlusion(
@@ -425,6 +426,16 @@ def classify(transfer_function: TransferFunction, scalar: Array) -> tuple[Array,
 def _nearest(array: NDArray[np.generic], position: Array) -> Array:
     x, y, z = np.floor(position + 0.5).astype(np.int64).T
     return np.asarray(array[z, y, x], dtype=np.float64)
+
+
+def _blank(volume: Volume, position: Array) -> NDArray[np.bool_]:
+    """Return whether positions lie in blank octants."""
+    if volume.blanked is None:
+        return np.zeros(len(position), dtype=bool)
+    nearest = np.floor(position + 0.5).astype(np.int64)
+    octant = (position >= nearest) @ np.array([1, 2, 4])
+    x, y, z = nearest.T
+    return (volume.blanked[z, y, x] >> octant & 1).astype(bool)
 
 
 def _linear(array: NDArray[np.generic], position: Array) -> Array:

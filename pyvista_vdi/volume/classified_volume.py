@@ -37,7 +37,6 @@ from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shad
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
 from pyvista_vdi.volume.upload import (
     ENTRY_BYTES,
-    MACROCELL_BYTES,
     TABLE_BYTES,
     Scale,
     described,
@@ -45,8 +44,10 @@ from pyvista_vdi.volume.upload import (
     fits_whole,
     integer_ends,
     macrocells_over,
+    other_bytes,
     reads_natively,
     scale_of,
+    upload_blanked,
     upload_ranges,
     upload_voxels,
     uploads_of,
@@ -204,6 +205,10 @@ class DeviceVolume:
             per_difference = scale.unit if scale else 1.0
             gradient = gradient_table(volume.spacing, scalars, transfer_function, per_difference)
             self._gradient = (runtime.upload(gradient, "gradient opacity"),)
+        self._blanked: tuple[DeviceBuffer, ...] = ()
+        if volume.blanked is not None:
+            self._blanked = (upload_blanked(runtime, volume),)
+            self.defines["BLANKED"] = 1
         self._part: tuple[Any, ...] = ()
         if part is not None:
             self._part = part.arguments
@@ -270,6 +275,7 @@ class DeviceVolume:
             *self._lighting(camera),
             *self._gradient,
             *self._occlusion,
+            *self._blanked,
         )
 
     def _bricks_within(
@@ -284,7 +290,7 @@ class DeviceVolume:
         )
         dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
         point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
-        others = math.prod(macrocells_over(volume)) * MACROCELL_BYTES + TABLE_BYTES
+        others = other_bytes(volume)
         left = room.for_bricks(runtime, others)
         largest = runtime.info.max_allocation
         found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
@@ -343,7 +349,7 @@ class DeviceVolume:
                 found = ambient_transmittances(
                     self.runtime,
                     grid,
-                    (*self._classified(self._visible), *self._gradient),
+                    (*self._classified(self._visible), *self._gradient, *self._blanked),
                     self._classified(self._visible)[-2:],
                     self._of_opacities,
                     self.sample_distance,

@@ -24,6 +24,7 @@ _IN_BLOCKS: Mapping[str, Define] = {
     "HEADLIGHT": None,
     "POSITIONAL_LIGHTS": None,
     "GRADIENT_OPACITY": None,
+    "BLANKED": None,
     "MAXIMUM": None,
     "MINIMUM": None,
     "AVERAGE": None,

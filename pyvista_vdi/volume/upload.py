@@ -127,6 +127,7 @@ class _Uploads:
         self.too_large: bool | None = None
         #: The least and the largest voxel of 16 bits; None before anyone has asked.
         self.ends: tuple[int, int] | None = None
+        self.blanked: dict[Runtime, DeviceBuffer] = {}
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
 
 
@@ -146,6 +147,12 @@ def device_bytes(volume: Volume, scale: Scale | None) -> int:
     return volume.array.nbytes if scale is None else 4 * volume.array.size
 
 
+def other_bytes(volume: Volume) -> int:
+    """Bytes on a device beside the voxels: macrocells, tables and what is blank."""
+    blanked = 0 if volume.blanked is None else volume.blanked.nbytes
+    return math.prod(macrocells_over(volume)) * MACROCELL_BYTES + TABLE_BYTES + blanked
+
+
 def described(volume: Volume) -> str:
     """Return a volume in words, for errors."""
     nx, ny, nz = volume.dimensions
@@ -155,10 +162,7 @@ def described(volume: Volume) -> str:
 def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room) -> bool:
     """Whether there is room for a volume in one piece."""
     uploaded = (runtime, scale) in uploads_of(volume).made
-    nbytes, macrocells = device_bytes(volume, scale), math.prod(macrocells_over(volume))
-    return room.holds(
-        runtime, nbytes, macrocells * MACROCELL_BYTES + TABLE_BYTES, uploaded=uploaded
-    )
+    return room.holds(runtime, device_bytes(volume, scale), other_bytes(volume), uploaded=uploaded)
 
 
 def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
@@ -168,7 +172,7 @@ def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
     """
     if room.limit is None:
         return nbytes, 0
-    others = math.prod(macrocells_over(volume)) * MACROCELL_BYTES + TABLE_BYTES
+    others = other_bytes(volume)
     if nbytes + others + room.working <= room.limit:
         return nbytes + others, 0
     return room.limit - room.working - room.sample_bytes, room.sample_bytes
@@ -201,6 +205,18 @@ def upload_voxels(
                 runtime.finish()  # a thread with another queue may use them next
             made[key] = (voxels, ranges)
         return made[key]
+
+
+def upload_blanked(runtime: Runtime, volume: Volume) -> DeviceBuffer:
+    """Return what is blank of a volume, made once per device."""
+    uploads = uploads_of(volume)
+    with runtime.holding(uploads.lock):
+        if runtime not in uploads.blanked:
+            assert volume.blanked is not None
+            blanked = runtime.upload(volume.blanked, f"what is blank of volume {volume.name!r}")
+            runtime.finish()  # a thread with another queue may use it next
+            uploads.blanked[runtime] = blanked
+        return uploads.blanked[runtime]
 
 
 def upload_ranges(

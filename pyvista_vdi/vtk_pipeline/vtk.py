@@ -31,15 +31,17 @@ _NAMES = {
     "util.vtkAlgorithm": "VTKPythonAlgorithmBase",
     "vtkCommonCore": (
         "VTK_FLOAT VTK_INT VTK_UNSIGNED_CHAR VTK_UNSIGNED_INT mutable reference vtkCollection "
-        "vtkDataArray vtkErrorCode vtkFloatArray vtkInformation vtkMath vtkObjectBase "
+        "vtkDataArray vtkErrorCode vtkFloatArray vtkInformation vtkMath vtkObject vtkObjectBase "
         "vtkOutputWindow vtkStringArray vtkStringOutputWindow vtkUnsignedCharArray vtkVersion "
         "vtkWeakReference"
     ),
     "vtkCommonDataModel": (
-        "vtkCellArray vtkCompositeDataSet vtkDataObject vtkImageData vtkMultiBlockDataSet "
-        "vtkPiecewiseFunction vtkPlane vtkPolyData vtkRectilinearGrid vtkSelectionNode"
+        "vtkCellArray vtkCompositeDataSet vtkDataObject vtkDataSetAttributes vtkImageData "
+        "vtkMultiBlockDataSet vtkPiecewiseFunction vtkPlane vtkPlaneCollection vtkPolyData "
+        "vtkRectilinearGrid "
+        "vtkSelectionNode vtkUniformGrid"
     ),
-    "vtkCommonExecutionModel": "vtkStreamingDemandDrivenPipeline vtkTrivialProducer",
+    "vtkCommonExecutionModel": "vtkAlgorithm vtkStreamingDemandDrivenPipeline vtkTrivialProducer",
     "vtkCommonMath": "vtkMatrix4x4",
     "vtkFiltersCore": "vtkCellDataToPointData vtkContourFilter vtkTriangleFilter",
     "vtkFiltersGeneral": "vtkMultiBlockDataGroupFilter",
@@ -72,7 +74,8 @@ _NAMES = {
     "vtkRenderingLOD": "vtkLODActor",
     "vtkRenderingLabel": "vtkLabelPlacementMapper vtkPointSetToLabelHierarchy",
     "vtkRenderingOpenGL2": (
-        "vtkOpenGLActor vtkOpenGLGL2PSHelper vtkPixelBufferObject vtkTextureObject"
+        "vtkOpenGLActor vtkOpenGLGL2PSHelper vtkOpenGLShaderProperty vtkPixelBufferObject "
+        "vtkTextureObject"
     ),
     "vtkRenderingUI": "vtkGenericRenderWindowInteractor",
     "vtkRenderingVolume": (

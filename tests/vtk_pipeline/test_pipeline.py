@@ -202,8 +202,9 @@ def test_view_of_a_matrix_projects_as_the_matrix(position, angle, center, parall
     camera.SetParallelProjection(parallel)
     camera.SetParallelScale(1.7)
     matrix = as_array(camera.GetCompositeProjectionTransformMatrix(aspect, -1, 1))
+    backward = as_array(camera.GetModelViewTransformMatrix())[2]
     eye, forward = np.array(camera.GetPosition()), np.array(camera.GetDirectionOfProjection())
-    to_view, lens = view_of(matrix, aspect, eye=eye, forward=forward)
+    to_view, lens = view_of(matrix, aspect, backward)
     # rigid: lengths of the optical model are taken from it
     np.testing.assert_allclose(to_view[:3, :3] @ to_view[:3, :3].T, np.eye(3), atol=1e-9)
     ours = pvdi.Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), **lens)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.errors import InvalidArgumentError, warn_external
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
@@ -13,17 +12,20 @@ from pyvista_vdi.series.player import Player
 from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
-from pyvista_vdi.vtk_pipeline.drawing.shader import show_image
-from pyvista_vdi.vtk_pipeline.filters.view import as_array
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
+from pyvista_vdi.vtk_pipeline.drawing.shader import VDIShaderProperty, show_image
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
 
 
+@refusing(OF_ACTORS)
 class VDIActorMethods(PlayingMethods):
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
     def _become_vdi_actor(self: Any) -> None:
         """Install the shader; to be called once, from ``__init__``."""
+        super().SetShaderProperty(VDIShaderProperty())  # type: ignore[misc]
         show_image(self)
 
     def SetMapper(self: Any, mapper: Any) -> None:
@@ -231,7 +233,7 @@ class VDIActorMethods(PlayingMethods):
                 "nothing shows this actor, so there is no view: pass camera, or add the actor to "
                 "a renderer first"
             )
-        vdi = vdi_set.generate(Camera.from_any(camera, model_transform=as_array(self.GetMatrix())))
+        vdi = vdi_set.generate(camera_of(camera, as_array(self.GetMatrix())))
         vdi_set.add(vdi)
         self.GetMapper().Modified()
         return vdi
@@ -244,7 +246,7 @@ class VDIActorMethods(PlayingMethods):
         if window_size is None and renderer is not None and min(renderer.GetSize()) > 0:
             window_size = renderer.GetSize()
         if camera is not None:
-            camera = Camera.from_any(camera, model_transform=as_array(self.GetMatrix()))
+            camera = camera_of(camera, as_array(self.GetMatrix()))
         vdi = player.series.generate(player.step, camera, window_size)
         player.replace(vdi)
         self.GetMapper().Modified()
@@ -256,8 +258,24 @@ class VDIActor(VDIActorMethods, vtkVolume):
 
     Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``. Its volume
     property has no effect here: the classification is in the VDI (see
-    ``VDISource.SetVolumeProperty``).
+    ``VDISource.SetVolumeProperty``). Other coordinate systems than the world, and changes to its
+    shader, are refused by name.
     """
 
     def __init__(self) -> None:
         self._become_vdi_actor()
+
+    def SetProperty(self, prop: Any) -> None:
+        """Set the actor's volume property, which changes nothing, and warn if it is another one.
+
+        Another one than the source's, that is; with none of the source there is nothing to say.
+        """
+        super().SetProperty(prop)
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.GetSource()
+        own = None if source is None else source.GetVolumeProperty()
+        if own is not None and own is not prop:
+            warn_external(
+                "VDIActor.SetProperty changes nothing: the VDI has the colours and opacities of "
+                "its source's property, which VDISource.SetVolumeProperty sets"
+            )

@@ -64,7 +64,7 @@ class ArrayChoiceMethods:
         if mode not in (*_ACTIVE, _FIELD):
             _refuse_cells()
         self._scalar_mode = mode
-        self._choose_array()
+        self.choose_array()
 
     def GetScalarMode(self) -> int:
         """Return VTK's number of the scalar mode."""
@@ -97,22 +97,22 @@ class ArrayChoiceMethods:
     def SelectScalarArray(self, array: str | int) -> None:
         """Choose an array by name or id, which ``SetScalarModeToUsePointFieldData`` draws."""
         super().SelectScalarArray(array)  # type: ignore[misc]
-        self._choose_array()
+        self.choose_array()
 
     def SetArrayName(self, name: str) -> None:
         """Choose an array by name, if it is accessed by name."""
         super().SetArrayName(name)  # type: ignore[misc]
-        self._choose_array()
+        self.choose_array()
 
     def SetArrayId(self, number: int) -> None:
         """Choose an array by id, if it is accessed by id."""
         super().SetArrayId(number)  # type: ignore[misc]
-        self._choose_array()
+        self.choose_array()
 
     def SetArrayAccessMode(self, mode: int) -> None:
         """Choose by id (0) or by name (1)."""
         super().SetArrayAccessMode(mode)  # type: ignore[misc]
-        self._choose_array()
+        self.choose_array()
 
     def take_array_choice(self: Any, other: ArrayChoiceMethods) -> None:
         """Say of the chosen array what another mapper, of the same source, says."""
@@ -122,20 +122,21 @@ class ArrayChoiceMethods:
         super().SetArrayAccessMode(theirs.GetArrayAccessMode())  # type: ignore[misc]
         self._scalar_mode, self._added = other._scalar_mode, other._added
 
-    def _choose_array(self: Any) -> None:
-        """Tell the source what is chosen by now, if that is an array."""
+    def choose_array(self: Any) -> None:
+        """Tell the source what is chosen by now, if that is an array, and there is a source."""
         if self._scalar_mode in _ACTIVE:
             if self._added is not None:
                 self.own_source("its scalars").SetScalars(*self._added)
             return
+        if self.painter.input is None:
+            return
         source = self.own_source("its scalars")
-        image = source.UpdateInput()
-        if self.GetArrayAccessMode() == _BY_NAME:
-            name = self.GetArrayName() or None
-        else:
-            name = image.GetPointData().GetArrayName(self.GetArrayId())
+        name = self.GetArrayName() or None
+        if self.GetArrayAccessMode() != _BY_NAME:
+            name = source.UpdateInput().GetPointData().GetArrayName(self.GetArrayId())
         if name is not None:  # else nothing has been chosen yet
-            scalars_of(image, name)  # refuses what is not there
+            if source.GetNumberOfInputConnections(0) > 0:
+                scalars_of(source.UpdateInput(), name)  # refuses what is not there
             self._added = self._added or (source.GetScalars(), source.GetPreference())
             source.SetScalars(name)
 

@@ -112,13 +112,10 @@ class Frame:
         aspect = renderer.GetTiledAspectRatio()
         # Not GetCompositeProjectionTransformMatrix: that one turns stereo off
         projection = as_array(vtk_camera.GetProjectionTransformMatrix(aspect, -1, 1))
-        composite = projection @ as_array(vtk_camera.GetModelViewTransformMatrix())
-        to_view, lens = view_of(
-            composite,
-            width / height,
-            eye=np.asarray(vtk_camera.GetPosition()),
-            forward=np.asarray(vtk_camera.GetDirectionOfProjection()),
-        )
+        model_view = as_array(vtk_camera.GetModelViewTransformMatrix())
+        scale = np.linalg.norm(model_view[2, :3])  # of the camera's model transform
+        to_view, lens = view_of(projection @ model_view, width / height, model_view[2] / scale)
+        projection[:, 2] *= scale
         model_transform = to_view @ as_array(actor.GetMatrix())
         camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=model_transform, **lens)
         size = (width, height)
@@ -443,16 +440,14 @@ def depths_of(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]
     return float(depth.min()), float(depth.max())
 
 
-def view_of(
-    composite: Matrix, aspect: float, *, eye: NDArray[Any], forward: NDArray[Any]
-) -> tuple[Matrix, dict[str, Any]]:
+def view_of(composite: Matrix, aspect: float, backward: Matrix) -> tuple[Matrix, dict[str, Any]]:
     """Split a projection matrix into a rigid transform and a lens.
 
     Whatever VTK put into the matrix (one eye of a stereo pair, a tile of a screenshot, a window
     centre, an off-axis or explicit projection) is in what is drawn, so the frame's view is taken
     from the matrix, ``composite``, world to normalised device coordinates, and not from the
-    camera's settings. In parallel projection it does not tell where depth begins: the camera's
-    ``eye`` and ``forward`` direction do. ``aspect`` is that of the viewport in pixels.
+    camera's settings. In parallel projection it does not tell where depth begins: ``backward``,
+    world to the z of view coordinates, (4,), does. ``aspect`` is that of the viewport in pixels.
 
     Returns world to view coordinates (x right, y up, z backward), (4, 4), rotation and translation
     with whatever scale or shear is left in it, and the lens of a :class:`Camera` at the origin that
@@ -465,7 +460,7 @@ def view_of(
         half = 1.0 / np.linalg.norm(up[:3] / denominator[3])
         to_view[0] = across / denominator[3] * half * aspect
         to_view[1] = up / denominator[3] * half
-        to_view[2] = [*-forward, forward @ eye]
+        to_view[2] = backward
         return to_view, {"parallel_projection": True, "parallel_scale": half}
     depth = denominator / scale  # Z = depth . (x, y, z, 1): unit normal
     # u Z = across . p = X / t_x - c_x Z, and X has no component along the direction

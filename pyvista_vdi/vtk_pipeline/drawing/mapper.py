@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import gc
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
@@ -24,6 +24,7 @@ from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
 from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
 from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
@@ -63,6 +64,7 @@ def _on_end(mapper: Any, event: str) -> None:
     mapper._far_box.end(mapper.painter.proxy)
 
 
+@refusing(OF_MAPPERS)
 class VDIMapperMethods(ArrayChoiceMethods):
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
@@ -91,16 +93,24 @@ class VDIMapperMethods(ArrayChoiceMethods):
 
     def SetInputConnection(self, *args: Any) -> None:
         """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
+        _require_first_port("SetInputConnection", args)
         port = args[-1]
         self._set_input(None if port is None else input_of_port(port))
 
     def SetInputDataObject(self, *args: Any) -> None:
         """Draw a VDI in its canonical form."""
+        _require_first_port("SetInputDataObject", args)
         self.SetInputData(args[-1])
 
     def SetInputData(self, data: Any) -> None:
         """Draw a VDI, or its canonical image."""
         self._set_input(None if data is None else input_of(data))
+
+    def RemoveInputConnection(self, *args: Any) -> None:
+        """Draw nothing any more, as all that follow."""
+        self._set_input(None)
+
+    RemoveAllInputConnections = RemoveAllInputs = RemoveInputConnection
 
     def GetInputDataObject(self, *args: Any) -> Any:
         """Return the box of the VDI's bounds that VTK is given in its place, and warn.
@@ -403,66 +413,18 @@ class VDIMapperMethods(ArrayChoiceMethods):
 
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)
+        self._added = None
+        if self.GetSource() is not None:
+            self.choose_array()  # which may have been named before
         self.Modified()
 
-    def SetBlendMode(self: Any, mode: int) -> None:
-        """Accept composite blending only."""
-        if mode != self.COMPOSITE_BLEND:
-            _refuse_blending()
 
-    def SetBlendModeToMaximumIntensity(self) -> NoReturn:
-        """Refuse, as all that follow."""
-        _refuse_blending()
-
-    SetBlendModeToMinimumIntensity = SetBlendModeToMaximumIntensity
-    SetBlendModeToAverageIntensity = SetBlendModeToMaximumIntensity
-    SetBlendModeToAdditive = SetBlendModeToMaximumIntensity
-    SetBlendModeToIsoSurface = SetBlendModeToMaximumIntensity
-    SetBlendModeToSlice = SetBlendModeToMaximumIntensity
-
-    def SetGlobalIlluminationReach(self, reach: float) -> None:
-        """Refuse VTK's shadows along light rays; 0 is accepted."""
-        if reach:
-            _refuse_illumination("SetGlobalIlluminationReach")
-
-    def SetVolumetricScatteringBlending(self, share: float) -> None:
-        """Refuse VTK's volumetric scattering; 0 is accepted."""
-        if share:
-            _refuse_illumination("SetVolumetricScatteringBlending")
-
-    def SetComputeNormalFromOpacity(self, on: bool) -> None:
-        """Refuse normals from opacity; ``SetComputeNormalFromOpacity(0)`` is accepted."""
-        if on:
-            self.ComputeNormalFromOpacityOn()
-
-    def ComputeNormalFromOpacityOn(self) -> NoReturn:
-        """Refuse."""
+def _require_first_port(method: str, args: tuple[Any, ...]) -> None:
+    if len(args) > 1 and args[0] != 0:
         raise UnsupportedError(
-            "a VDI is shaded by the gradient of its scalars, and when it is generated: leave "
-            "ComputeNormalFromOpacity off"
+            f"{method}({args[0]}, ...): a VDIMapper has one input, port 0: give each VDI its own "
+            "VDIMapper and VDIActor"
         )
-
-    def SetMaskInput(self, mask: Any) -> None:
-        """Refuse a mask; ``SetMaskInput(None)`` is accepted."""
-        if mask is not None:
-            raise UnsupportedError(
-                "a VDI cannot be masked when it is drawn: set masked voxels to a transparent "
-                "value before it is generated"
-            )
-
-
-def _refuse_blending() -> NoReturn:
-    raise UnsupportedError(
-        "a VDI stores what is composited along a ray, so only composite blending is supported: "
-        "draw the volume itself by one of VTK's mappers for another"
-    )
-
-
-def _refuse_illumination(setter: str) -> NoReturn:
-    raise UnsupportedError(
-        f"{setter} lights a volume while it is drawn, and a VDI is lit when it is generated: use "
-        "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
-    )
 
 
 class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
@@ -473,8 +435,8 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     the input up to date and raycasts it from the frame's view, ending rays at opaque geometry;
     an image is kept as long as view, depth and VDI stay the same. Clipping planes
     (``AddClippingPlane``), cropping (``SetCropping`` and its regions) and the opacity multiplier
-    act on the next frame without another VDI; other blending modes, masks and VTK's global
-    illumination are refused.
+    act on the next frame without another VDI. What of VTK's mapper a VDI has no place for, such as
+    other blending modes, masks and depth images, is refused by the method's name.
 
     Notes
     -----

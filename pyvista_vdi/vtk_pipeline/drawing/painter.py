@@ -69,7 +69,7 @@ class Painter:
         self.selection = Selection()
         self.proxy = vtkImageData()  # whose box VTK draws in place of the VDI
         self.proxy.SetDimensions(2, 2, 2)
-        self.give_proxy(1)
+        self._give_proxy(1)
         self._warnings = Warnings()
         self.upkeep = Upkeep(self.interaction, self._warnings, self.texts)
         self._actor = vtkWeakReference()
@@ -125,10 +125,12 @@ class Painter:
                 painter._place_proxy(painter.input.bounds())
 
         self.upkeep.set_input(source, bounds_changed)
+        if source is None:
+            self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
         self._place_proxy(bounds)
 
-    def give_proxy(self, components: int) -> None:
-        """Give the proxy's voxels components: VTK asks for four where they are dependent."""
+    def _give_proxy(self, components: int) -> None:
+        """Give the proxy's voxels components."""
         self.proxy.AllocateScalars(3, components)  # VTK_UNSIGNED_CHAR
         self.proxy.GetPointData().GetScalars().Fill(0)
 
@@ -168,7 +170,6 @@ class Painter:
 
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
-        self.give_proxy(other.proxy.GetNumberOfScalarComponents())
         self.opacity_multiplier = other.opacity_multiplier
         self.image_distance = other.image_distance
         self.upkeep.draw = other.upkeep.draw
@@ -224,6 +225,10 @@ class Painter:
                 "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
             )
             return
+        # VTK asks for four where the actor's property says that they are dependent
+        components = 1 if self.actor.GetProperty().GetIndependentComponents() else 4
+        if self.proxy.GetNumberOfScalarComponents() != components:
+            self._give_proxy(components)
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
             return

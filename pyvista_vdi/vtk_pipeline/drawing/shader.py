@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.vtk_pipeline.vtk import reference, vtkHardwareSelector
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_SHADERS, refusing
+from pyvista_vdi.vtk_pipeline.vtk import (
+    reference,
+    vtkHardwareSelector,
+    vtkOpenGLShaderProperty,
+)
 
 _DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
 
@@ -85,6 +90,27 @@ _UNUSED = (
 )
 
 
+@refusing(OF_SHADERS)
+class VDIShaderProperty(vtkOpenGLShaderProperty):
+    """The shader property of a VDI's actor: what is added to it by others is refused."""
+
+    def ClearAllShaderReplacements(self, *args: Any) -> None:
+        """Leave what shows the VDI: there are no others. So do all that follow."""
+
+    ClearAllVertexShaderReplacements = ClearAllShaderReplacements
+    ClearAllFragmentShaderReplacements = ClearAllShaderReplacements
+    ClearAllGeometryShaderReplacements = ClearAllShaderReplacements
+    ClearVertexShaderReplacement = ClearAllShaderReplacements
+    ClearFragmentShaderReplacement = ClearAllShaderReplacements
+    ClearGeometryShaderReplacement = ClearAllShaderReplacements
+
+
+#: What the class above keeps from others, by VTK's own methods.
+_add_fragment = vtkOpenGLShaderProperty.AddFragmentShaderReplacement
+_add_vertex = vtkOpenGLShaderProperty.AddVertexShaderReplacement
+_clear_vertex = vtkOpenGLShaderProperty.ClearVertexShaderReplacement
+
+
 def show_image(actor: Any, *, occluded: bool = False) -> None:
     """Have an actor's shader look its colours up in an image of the viewport.
 
@@ -92,10 +118,10 @@ def show_image(actor: Any, *, occluded: bool = False) -> None:
     """
     shader = actor.GetShaderProperty()
     if _replacement(shader) is None:
-        shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
-        shader.AddFragmentShaderReplacement(_CUSTOM, True, _UNIFORMS, False)
+        _add_fragment(shader, "//VTK::Base::Dec", True, _DECLARATION, False)
+        _add_fragment(shader, _CUSTOM, True, _UNIFORMS, False)
         for unused in _UNUSED:
-            shader.AddFragmentShaderReplacement(unused, True, "", False)
+            _add_fragment(shader, unused, True, "", False)
     _replace(shader, _LOOKUP + _UNSEEN if occluded else _LOOKUP)
 
 
@@ -114,9 +140,9 @@ def fill_viewport(actor: Any, edge: float | None) -> None:
     if text == _replacement(shader, _POSITION):
         return
     if text is None:
-        shader.ClearVertexShaderReplacement(_POSITION, True)
+        _clear_vertex(shader, _POSITION, True)
     else:
-        shader.AddVertexShaderReplacement(_POSITION, True, text, False)
+        _add_vertex(shader, _POSITION, True, text, False)
 
 
 def place_texture(actor: Any, unit: int) -> None:
@@ -137,7 +163,7 @@ def show_first_hits(actor: Any, selection_pass: int) -> None:
 def _replace(shader: Any, text: str) -> None:
     """Put the text in place, unless it is: a property that is modified has the shader rebuilt."""
     if _replacement(shader) != text:
-        shader.AddFragmentShaderReplacement(_CALL, True, text, False)
+        _add_fragment(shader, _CALL, True, text, False)
 
 
 def _replacement(shader: Any, of: str = _CALL) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import json
 from typing import Any
 
@@ -35,6 +36,7 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkCommonDataModel,
     vtkDataArray,
     vtkDataObject,
+    vtkDataSetAttributes,
     vtkImageData,
     vtkStringArray,
 )
@@ -117,7 +119,8 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     Volume
         It shares memory with the point array where that is contiguous and of a type that the
         kernels take; cell data become point data by ``vtkCellDataToPointData``, as
-        ``Plotter.add_volume`` does.
+        ``Plotter.add_volume`` does. What its ghost arrays mark (hidden and duplicate points and
+        cells, ``vtkUniformGrid``'s blanking) is blank, as VTK's GPU mapper draws it.
 
     Raises
     ------
@@ -141,7 +144,8 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     dimensions = image.GetDimensions()
     name = array.GetName() or "values"
     points = image.GetPointData()
-    if not any(points.GetArray(i) is array for i in range(points.GetNumberOfArrays())):
+    of_cells = all(points.GetArray(i) is not array for i in range(points.GetNumberOfArrays()))
+    if of_cells:
         if min(dimensions) < 2:
             raise InvalidVolumeError(
                 f"the volume has only one plane of points: its dimensions are {dimensions}, and "
@@ -158,7 +162,52 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         first,
         [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
         name=name,
+        blanked=_blanked(image, of_cells),
     )
+
+
+def ghosts_of(image: vtkImageData) -> dict[str, NDArray[np.uint8]]:
+    """Return the ghost arrays that mark anything, of "point" and "cell", (nz, ny, nx)."""
+    nx, ny, nz = image.GetDimensions()
+    found = {}
+    for kind, array, shape in (
+        ("point", image.GetPointGhostArray(), (nz, ny, nx)),
+        ("cell", image.GetCellGhostArray(), (nz - 1, ny - 1, nx - 1)),
+    ):
+        if array is not None and (values := as_numpy(array)).any():
+            found[kind] = values.reshape(shape)
+    return found
+
+
+def _blanked(image: vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
+    """Return the octants that VTK's GPU mapper leaves out, as a :class:`Volume` has them.
+
+    Its texels are points, or cells where the scalars are theirs. It leaves out a sample where the
+    texel that it lies in is marked, or the nearest one to it along an axis. Where texels are
+    points, a marked cell is the point that it begins at.
+    """
+    blanked = None
+    for kind, marks in ghosts_of(image).items():
+        cells = kind == "cell" and of_cells
+        texels = np.pad(marks > 0, (0, 1)) if kind == "cell" and not cells else marks > 0
+        octants = _octants_of(texels, cells)
+        blanked = octants if blanked is None else blanked | octants
+    return blanked
+
+
+def _octants_of(texels: NDArray[np.bool_], cells: bool) -> NDArray[np.uint8]:
+    """Return the octants that marked texels, of points or of cells, blank."""
+    points = [n + cells for n in texels.shape]
+    texels = np.pad(texels, 1, mode="edge")
+    octants = np.zeros(points, np.uint8)
+    for octant, above in enumerate(itertools.product((0, 1), repeat=3)):  # z, y, x
+        at = [up if cells else 1 for up in above]
+        beside = [1 - up if cells else 2 * up for up in above]
+        marked = np.zeros(points, bool)
+        for first in (at, *([*at[:k], beside[k], *at[k + 1 :]] for k in range(3))):
+            marked |= texels[tuple(slice(f, f + n) for f, n in zip(first, points, strict=True))]
+        octants |= marked.astype(np.uint8) << octant
+    return octants
 
 
 def scalars_of(image: vtkImageData, name: str | None, preference: str = "point") -> vtkDataArray:
@@ -176,7 +225,8 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
         kind: [a for i in range(data.GetNumberOfArrays()) if (a := data.GetArray(i)) is not None]
         for kind, data in attributes.items()
     }
-    names = list(dict.fromkeys(array.GetName() for found in arrays.values() for array in found))
+    named = (array.GetName() for found in arrays.values() for array in found)
+    names = [name for name in dict.fromkeys(named) if name != vtkDataSetAttributes.GhostArrayName()]
     if name is None:
         # Active scalars: points first, whatever the preference, as pyvista's active_scalars
         for data in attributes.values():
@@ -211,14 +261,12 @@ def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:
 
 
 def as_numpy(array: vtkDataArray) -> NDArray[Any]:
-    """Return the values of VTK's array, sharing its memory where it has one."""
-    try:
-        values: NDArray[Any] = vtk_to_numpy(array)
-    except (AttributeError, TypeError, ValueError):
-        # Implicit arrays (constant, affine, ...) have no memory of their own
+    """Return the values of VTK's array, sharing its memory where they lie one after the other."""
+    if not array.HasStandardMemoryLayout():  # implicit (constant, affine, ...), or by components
         plain = vtkDataArray.CreateDataArray(array.GetDataType())
         plain.DeepCopy(array)
         return vtk_to_numpy(plain)  # type: ignore[no-any-return]
+    values: NDArray[Any] = vtk_to_numpy(array)
     # NumPy's own array rather than one that keeps VTK's, which has an attribute: see Held
     lent = getattr(array, "_numpy_reference", values)
     same = (lent.dtype, lent.size, lent.ctypes.data) == (
@@ -231,6 +279,11 @@ def as_numpy(array: vtkDataArray) -> NDArray[Any]:
 
 def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
     """Return a volume as a grid that shares its memory; its scalars are the active ones."""
+    if volume.blanked is not None:
+        raise UnsupportedError(
+            f"the volume {volume.name!r} has blank octants, for which a vtkImageData has no place: "
+            "pass the grid that it was made of"
+        )
     image = vtkImageData()
     image.SetDimensions(volume.dimensions)
     image.SetSpacing(volume.spacing)

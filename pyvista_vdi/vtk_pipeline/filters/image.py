@@ -30,6 +30,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_from_image,
     view_from_description,
 )
+from pyvista_vdi.vtk_pipeline.filters.view import camera_of
 from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData
 
 #: Point scalars of the picture: straight RGBA, uint8.
@@ -91,7 +92,7 @@ class VDIToImage(Algorithm):
         InvalidCameraError, UnsupportedError
             If it is no camera, or has what the optical model has no place for.
         """
-        view = None if camera is None else Camera.from_any(camera, model_transform=model_transform)
+        view = None if camera is None else camera_of(camera, model_transform)
         self._change("_camera", view)
 
     def GetCamera(self) -> Camera | None:

@@ -89,6 +89,11 @@ def transfer_function_from_property(
         If nodes lie so close together that no table resolves them.
     """
     check_property(prop, rgba=rgba)
+    for name, function in (("opacity", prop.GetScalarOpacity()), ("colour", color_function(prop))):
+        if function.GetSize() == 0:
+            raise InvalidArgumentError(
+                f"the volume property's {name} function has no points: add some (AddPoint)"
+            )
     shading = None
     if prop.GetShade():
         reflected = (prop.GetAmbient(), prop.GetDiffuse(), prop.GetSpecular())
@@ -111,18 +116,13 @@ def transfer_function_from_property(
 
 
 def check_property(prop: Any, *, rgba: bool = False) -> None:
-    """Refuse what :func:`transfer_function_from_property` refuses, without making a table."""
+    """Refuse what no table can have; functions may be filled with points later."""
     require_this_build(type(prop))
     if not isinstance(prop, vtkVolumeProperty):
         raise InvalidArgumentError(
             f"volume_property must be a vtkVolumeProperty; got {type(prop).__name__}"
         )
     _refuse_unsupported(prop, rgba)
-    for name, function in (("opacity", prop.GetScalarOpacity()), ("colour", color_function(prop))):
-        if function.GetSize() == 0:
-            raise InvalidArgumentError(
-                f"the volume property's {name} function has no points: add some (AddPoint)"
-            )
 
 
 def color_function(prop: vtkVolumeProperty) -> Any:

@@ -20,9 +20,18 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import whole_extent
-from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of, volume_from_vtk
+from pyvista_vdi.vtk_pipeline.filters.convert import (
+    ghosts_of,
+    require_image,
+    scalars_of,
+    volume_from_vtk,
+)
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
-from pyvista_vdi.vtk_pipeline.vtk import vtkImageData, vtkStreamingDemandDrivenPipeline
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkDataSetAttributes,
+    vtkImageData,
+    vtkStreamingDemandDrivenPipeline,
+)
 
 #: Points that a block has along each axis at least, see generate_on_mpi.
 _LEAST_POINTS = 4
@@ -240,6 +249,16 @@ class _Held:
             raise UnsupportedError(
                 f"the scalars {volume.name!r} are RGBA, of which several ranks make no VDI: start "
                 "one, or pass one scalar per point"
+            )
+        # Copies of what other ranks have are marked, too
+        hidden = {
+            "point": vtkDataSetAttributes.HIDDENPOINT,
+            "cell": vtkDataSetAttributes.HIDDENCELL,
+        }
+        if any((marks & hidden[kind]).any() for kind, marks in ghosts_of(image).items()):
+            raise UnsupportedError(
+                "the input has hidden points or cells, of which several ranks make no VDI: start "
+                "one, or write NaN there"
             )
         array, of_points = scalars_of(image, scalars, preference), image.GetPointData()
         at_points = (of_points.GetArray(i) for i in range(of_points.GetNumberOfArrays()))

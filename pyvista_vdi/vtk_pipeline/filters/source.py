@@ -317,6 +317,12 @@ class VDISource(SourceSettings):
             image.GetSpacing(),
             image.GetOrigin(),
             tuple(direction.GetElement(i, j) for i in range(3) for j in range(3)),
+            *(
+                # Blanking a point modifies nothing; whoever has done it modifies the image
+                (ghosts.GetAddressAsString(""), ghosts.GetMTime(), image.GetMTime())
+                for ghosts in (image.GetPointGhostArray(), image.GetCellGhostArray())
+                if ghosts is not None
+            ),
         )
         if self._volume is None or key != self._volume_key:
             self._volume = volume_from_vtk(image, self._scalars, self._preference)

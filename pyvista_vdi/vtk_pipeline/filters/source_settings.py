@@ -29,7 +29,7 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
     check_property,
     color_function,
 )
-from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera
+from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera, camera_of
 from pyvista_vdi.vtk_pipeline.vtk import (
     require_this_build,
     vtkImageData,
@@ -171,7 +171,7 @@ class SourceSettings(Algorithm):
             If it is no camera, or has what the optical model has no place for.
         """
         require_this_build(type(camera))
-        view = None if camera is None else Camera.from_any(camera, model_transform=model_transform)
+        view = None if camera is None else camera_of(camera, model_transform)
         if self._given is not None:
             self._given.watch(None)
         follows = hasattr(camera, "GetMTime")  # a VTK object
@@ -245,7 +245,8 @@ class SourceSettings(Algorithm):
         Raises
         ------
         UnsupportedError, InvalidArgumentError
-            If it cannot be honoured: see ``transfer_function_from_property``.
+            If it cannot be honoured: see ``transfer_function_from_property``. Functions without
+            points may be filled later, before the VDI is made.
         """
         if prop is not None:
             check_property(prop, rgba=not prop.GetIndependentComponents())

@@ -34,6 +34,19 @@ def aim(theirs: Any, camera: Camera) -> None:
     theirs.SetWindowCenter(*camera.window_center)
 
 
+def camera_of(camera: Any, model_transform: ArrayLike | None = None) -> Camera:
+    """Return a ``vtkCamera`` as a :class:`Camera` that sees a prop of this matrix, (4, 4).
+
+    The camera's own model transform, which VTK applies to all that it sees, comes on top. Others
+    than VTK's are returned as by :meth:`Camera.from_any`, whose errors it raises.
+    """
+    view = Camera.from_any(camera, model_transform=model_transform)
+    if model_transform is None or isinstance(camera, Camera):
+        return view
+    on_top = as_array(camera.GetModelTransformMatrix())
+    return view.replace(model_transform=on_top @ view.model_transform)
+
+
 @dataclass(frozen=True)
 class View(model_view.View):
     """A view that a renderer shows."""
@@ -41,7 +54,7 @@ class View(model_view.View):
     @classmethod
     def of(cls, renderer: Any, model_transform: NDArray[np.float64]) -> View:
         """Return what a renderer shows an actor from; UnsupportedError where no VDI can be."""
-        camera = Camera.from_any(renderer.GetActiveCamera(), model_transform=model_transform)
+        camera = camera_of(renderer.GetActiveCamera(), model_transform)
         width, height = renderer.GetSize()
         return cls(camera, (max(1, width), max(1, height)))
 
@@ -91,7 +104,7 @@ class TrackedCamera:
 
     def read(self) -> Camera:
         """Return the view as it is now; raises what :meth:`Camera.from_any` does."""
-        view = Camera.from_any(self.camera, model_transform=self.model_transform)
+        view = camera_of(self.camera, self.model_transform)
         self._pose = _pose(self.camera)
         return view
 
