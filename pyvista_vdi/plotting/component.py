@@ -451,7 +451,7 @@ class AddVDI(Component):
         if prop is not None:
             actor.prop = prop
             if not prop.independent_components:
-                mapper.painter.give_proxy(4)
+                mapper.painter.box.give_components(4)
         if isinstance(shown, VDISeries):
             mapper.SetSeries(shown)
         elif isinstance(shown, VDISet):

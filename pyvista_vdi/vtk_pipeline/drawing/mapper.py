@@ -55,12 +55,14 @@ COARSEST = 4.0
 
 def _on_start(mapper: Any, event: str) -> None:
     mapper.painter.begin(mapper)
+    mapper.painter.box.begin()
     mapper._far_box.begin(mapper.painter.actor, mapper.painter.proxy)
 
 
 def _on_end(mapper: Any, event: str) -> None:
     mapper.painter.end()
     mapper._far_box.end(mapper.painter.proxy)
+    mapper.painter.box.end()
 
 
 class VDIMapperMethods(ArrayChoiceMethods):
@@ -78,7 +80,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
-        super().SetInputDataObject(self._painter.proxy)  # type: ignore[misc]
+        super().SetInputConnection(self._painter.box.GetOutputPort())  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)

@@ -5,19 +5,21 @@ from __future__ import annotations
 import time
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view, coverage, magnification
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.sets.render import blended
 from pyvista_vdi.vtk_pipeline.drawing import passes
+from pyvista_vdi.vtk_pipeline.drawing.box import Box
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.few_lists import FewLists
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
@@ -46,7 +48,7 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
     WindowClock,
     reduced,
 )
-from pyvista_vdi.vtk_pipeline.vtk import vtkImageData, vtkVolume, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference
 
 #: Frames per second that stand-ins keep where no rate is asked for: changes are followed by eye.
 _STAND_IN_RATE = 30.0
@@ -67,9 +69,7 @@ class Painter:
         self.texts = CornerTexts()
         self.image_distance = 1.0
         self.selection = Selection()
-        self.proxy = vtkImageData()  # whose box VTK draws in place of the VDI
-        self.proxy.SetDimensions(2, 2, 2)
-        self.give_proxy(1)
+        self.box = Box()
         self._warnings = Warnings()
         self.upkeep = Upkeep(self.interaction, self._warnings, self.texts)
         self._actor = vtkWeakReference()
@@ -84,7 +84,7 @@ class Painter:
         self._images: Recent[Drawn] = Recent()
         self._free: Image | None = None  # shown by no frame, not even the last
         self._raycasts = 0
-        self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
+        self._last = _nothing()
         self._scene: tuple[View, weakref.ref[WindowClock]] | None = None
         self._trouble: BaseException | None = None
         self._scene_at_hand = SceneAtHand(self._say_not_exported)
@@ -116,28 +116,21 @@ class Painter:
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
-        bounds = None if source is None else source.bounds()  # refuses what is no VDI
         weak = weakref.ref(self)
 
-        def bounds_changed(*_: Any) -> None:
+        def changed(*_: Any) -> None:
             painter = weak()
-            if painter is not None and painter.input is not None:
-                painter._place_proxy(painter.input.bounds())
+            if painter is not None:
+                painter.box.connect()
 
-        self.upkeep.set_input(source, bounds_changed)
-        self._place_proxy(bounds)
+        self.upkeep.set_input(source, changed)
+        self.box.show(source)
+        self._last = _nothing()
 
-    def give_proxy(self, components: int) -> None:
-        """Give the proxy's voxels components: VTK asks for four where they are dependent."""
-        self.proxy.AllocateScalars(3, components)  # VTK_UNSIGNED_CHAR
-        self.proxy.GetPointData().GetScalars().Fill(0)
-
-    def _place_proxy(self, bounds: tuple[float, ...] | None) -> None:
-        """Give the proxy these bounds, model frame."""
-        if bounds is not None:
-            low, high = np.asarray(bounds[::2]), np.asarray(bounds[1::2])
-            self.proxy.SetOrigin(*low)
-            self.proxy.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
+    @property
+    def proxy(self) -> Any:
+        """The image whose box VTK draws in place of the VDI."""
+        return self.box.image
 
     def say_not_exported(self) -> None:
         """Say once that a scene which is written for another renderer lacks the VDI.
@@ -168,7 +161,7 @@ class Painter:
 
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
-        self.give_proxy(other.proxy.GetNumberOfScalarComponents())
+        self.box.give_components(other.proxy.GetNumberOfScalarComponents())
         self.opacity_multiplier = other.opacity_multiplier
         self.image_distance = other.image_distance
         self.upkeep.draw = other.upkeep.draw
@@ -231,6 +224,8 @@ class Painter:
         for effect in passes.effects(names):
             self._warnings.warn(effect)
         self.selection.leave(self._actor.Get(), occluded="vtkSSAOPass" in names)
+        with suppress(VDIError):  # which what is drawn says
+            self.box.Update()
         self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
         clock = WindowClock.of(window)
@@ -260,6 +255,9 @@ class Painter:
             )
             self._note(interrupt)
         except Exception as error:  # VTK would swallow it
+            if isinstance(error, InvalidVolumeError):  # as VTK's mappers: there is nothing to see
+                self._last = _nothing()
+                self.box.place(None)
             self._cannot_draw(error)
         return None
 
@@ -307,7 +305,7 @@ class Painter:
         )
         if seen is None:
             return None
-        self._place_proxy(seen.bounds)
+        self.box.place(seen.bounds)
         if seen is not self._drawn():
             self._images.clear()
             self._drawn = weakref.ref(seen)
@@ -497,6 +495,11 @@ class Painter:
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+
+
+def _nothing() -> Drawn:
+    """Return what a frame shows of which nothing can be drawn."""
+    return Drawn(np.zeros((1, 1, 4), dtype=np.float32))
 
 
 def _is_drawing(renderer: Any) -> bool:

@@ -29,6 +29,7 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     UPDATE_TIME_STEP,
     announce,
     ask_for_all,
+    is_aborted,
     wanted_time,
     whole_extent,
 )
@@ -215,7 +216,20 @@ class VDISource(SourceSettings):
         return self.GetInputDataObject(0, 0)
 
     def GetInputBounds(self) -> tuple[float, ...] | None:
-        """Return the volume's bounds, model frame, without making a VDI; ``None`` without input."""
+        """Return the volume's bounds, model frame; ``None`` where there is no volume.
+
+        The input is brought up to date, as by VTK's mappers, because many filters announce other
+        bounds than they give; no VDI is made.
+        """
+        if self.GetNumberOfInputConnections(0) == 0:
+            return None
+        data = self.UpdateInput()
+        if isinstance(data, vtkImageData) and self._holds_all(data):
+            return tuple(data.GetBounds()) if data.GetNumberOfPoints() else None
+        return self._known_bounds()
+
+    def _known_bounds(self) -> tuple[float, ...] | None:
+        """Return the volume's bounds, as far as they are known without reading it."""
         image = self._input_grid()
         return None if image is None else tuple(image.GetBounds())
 
@@ -310,13 +324,15 @@ class VDISource(SourceSettings):
         direction = image.GetDirectionMatrix()
         key = (
             array.GetAddressAsString(""),
-            array.GetMTime(),
+            image.GetMTime(),  # newer than the arrays': values may have been written in place
             image.GetExtent(),
             image.GetSpacing(),
             image.GetOrigin(),
             tuple(direction.GetElement(i, j) for i in range(3) for j in range(3)),
         )
         if self._volume is None or key != self._volume_key:
+            if is_aborted(self.GetInputAlgorithm(0, 0)):
+                raise Cancelled("what is before VDISource was aborted: its data are not whole")
             self._volume = volume_from_vtk(image, self._scalars, self._preference)
             self._volume_key = key
         return self._volume
