@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, Held, watch
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkStreamingDemandDrivenPipeline
 
@@ -32,6 +32,7 @@ class Box(Algorithm):
         self._shown: Input | None = None
         self._components = 1
         self._stands = False
+        self._watched: tuple[Held, int] | None = None
         self.Update()
         self.image = self.GetOutputDataObject(0)
 
@@ -49,7 +50,22 @@ class Box(Algorithm):
 
     def connect(self) -> None:
         """Follow what the input is made of, which may be something else by now."""
-        self.SetInputConnection(None if self._shown is None else self._shown.before())
+        port = None if self._shown is None else self._shown.before()
+        if self._watched is not None:
+            self._watched[0].get().RemoveObserver(self._watched[1])
+        self._watched = None
+        if port is not None:
+            producer = port.GetProducer()
+            self._watched = Held(producer), watch(producer, self, Box._executed, "EndEvent")
+        self.SetInputConnection(port)
+
+    def _executed(self) -> None:
+        """Have no bounds where what is before gives nothing, as if it fails: this is not asked."""
+        data = self.GetInputDataObject(0, 0)
+        if not self._stands and (
+            data is None or data.GetNumberOfElements(vtkDataObject.POINT) == 0
+        ):
+            self.place(None)
 
     def give_components(self, components: int) -> None:
         """Give the voxels components: VTK asks for four where they are dependent."""
@@ -64,6 +80,7 @@ class Box(Algorithm):
             self._allocate()
         if bounds is not None:
             low, high = np.asarray(bounds[::2]), np.asarray(bounds[1::2])
+            self.image.SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1)  # VTK passes on the input's
             self.image.SetOrigin(*low)
             self.image.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
 

@@ -257,7 +257,8 @@ class Painter:
         except Exception as error:  # VTK would swallow it
             if isinstance(error, InvalidVolumeError):  # as VTK's mappers: there is nothing to see
                 self._last = _nothing()
-                self.box.place(None)
+                with suppress(VDIError):
+                    self.box.place(None if self.input is None else self.input.bounds())
             self._cannot_draw(error)
         return None
 

@@ -452,8 +452,12 @@ class Upkeep:
             return source.last()
         try:
             vdi = source.vdi()
-        except (Cancelled, InvalidVolumeError):  # of one execution; soon found again
+        except Cancelled:  # of one execution
             raise
+        except InvalidVolumeError:  # soon found again
+            if not source.has_what_it_had():
+                raise
+            return source.last()  # as VTK's mappers, which draw the data that are there
         except BaseException:
             self._failed_at = source.stamp()
             raise

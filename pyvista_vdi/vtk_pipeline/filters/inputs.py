@@ -61,6 +61,10 @@ class Input:
         """Ask what is before for as much as is needed."""
         ask_for_all(inputs)
 
+    def has_what_it_had(self) -> bool:
+        """Whether the data of the VDI made last are still there, though an update fails."""
+        return False
+
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Have this called when what is before it may be another; ``None`` ends it."""
 
@@ -183,6 +187,11 @@ class SourceInput(Input):
         source = self.source
         connected = source.GetNumberOfInputConnections(0) > 0
         return source.GetInputConnection(0, 0) if connected else None
+
+    def has_what_it_had(self) -> bool:
+        """Whether the data at the source's input are still those of the VDI made last."""
+        made = self.source.GetCurrentRequest()
+        return made is not None and self.source.GetVolume() is made.volume
 
     def ask(self, inputs: Any) -> None:
         """Ask for what the source asks for."""
