@@ -403,6 +403,38 @@ class VDIMapperMethods(ArrayChoiceMethods):
         modifies=False,
     )
 
+    def ShallowCopy(self: Any, other: Any) -> None:
+        """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is a mapper of VTK's.
+        """
+        if not isinstance(other, VDIMapperMethods):
+            raise InvalidArgumentError(
+                f"a VDIMapper copies a VDIMapper; got {type(other).__name__}: put a VDISource "
+                "between its input and this mapper (SetInputConnection)"
+            )
+        theirs: Any = other
+        shown = other.painter.input
+        self.painter.set_input(None if shown is None else shown.shared())
+        self.take_array_choice(theirs)
+        self.SetDevice(theirs.GetDevice())
+        self.painter.take_settings(other.painter)
+        self.SetMaximumImageSampleDistance(theirs.GetMaximumImageSampleDistance())
+        self.SetCropping(theirs.GetCropping())
+        self.SetCroppingRegionPlanes(theirs.GetCroppingRegionPlanes())
+        self.SetCroppingRegionFlags(theirs.GetCroppingRegionFlags())
+        planes = theirs.GetClippingPlanes()
+        self.RemoveAllClippingPlanes()
+        for i in range(0 if planes is None else planes.GetNumberOfItems()):
+            self.AddClippingPlane(planes.GetItem(i))
+
+    def NewInstance(self) -> VDIMapperMethods:
+        """Return another mapper of this class, with nothing to draw yet."""
+        return type(self)()
+
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)
         self.Modified()

@@ -87,6 +87,7 @@ class Painter:
         self._last = _nothing()
         self._scene: tuple[View, weakref.ref[WindowClock]] | None = None
         self._trouble: BaseException | None = None
+        self._astray = False  # whether something else than the actor draws
         self._scene_at_hand = SceneAtHand(self._say_not_exported)
 
     def set_actor(self, actor: Any) -> None:
@@ -212,10 +213,17 @@ class Painter:
     def begin(self, mapper: Any) -> None:
         """Raycast and upload the image for the frame that has just begun."""
         renderer = self.renderer()
-        if renderer is None:
+        # Else a copy of the actor by vtkVolume.ShallowCopy draws, in another window
+        self._astray = renderer is None or not _is_drawing(renderer)
+        if self._astray or self._is_behind_another(mapper, renderer):
             self._warnings.warn(
-                "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
+                "VDIMapper draws only behind its own VDIActor, and is behind another volume: use "
+                "VDIActor in place of vtkVolume, also for copies (VDIActor().ShallowCopy(actor))"
             )
+        if self._astray:
+            self.box.place((0.0,) * 6)  # nothing is seen of it
+            if self._actor.Get() is not None:  # whose shader the copy has
+                place_image(self._actor.Get(), 0, (0, 0), (1, 1))
             return
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
@@ -223,7 +231,11 @@ class Painter:
         names = passes.classes(renderer)
         for effect in passes.effects(names):
             self._warnings.warn(effect)
-        self.selection.leave(self._actor.Get(), occluded="vtkSSAOPass" in names)
+        peeled = passes.peels_volumes(renderer, names)
+        if peeled and passes.shows_what_is_translucent(renderer):
+            self._warnings.warn(passes.PEELED)
+        occluded = "vtkSSAOPass" in names
+        self.selection.leave(self._actor.Get(), occluded=occluded, peeled=peeled)
         with suppress(VDIError):  # which what is drawn says
             self.box.Update()
         self._last = self._guarded(self._paint, mapper, renderer) or self._last
@@ -238,8 +250,16 @@ class Painter:
         self.texts.write(renderer, self.status)
         self.upkeep.tick(window)
 
+    def _is_behind_another(self, mapper: Any, renderer: Any) -> bool:
+        """Whether a renderer shows a volume with this mapper that is not our actor."""
+        props, actor = renderer.GetVolumes(), self._actor.Get()
+        volumes = (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems()))
+        return any(each is not actor and each.GetMapper() is mapper for each in volumes)
+
     def end(self) -> None:
         """Let go of the texture unit."""
+        if self._astray:
+            self.box.Modified()  # it has its bounds again
         self._texture.let_go()
         self._no_depth.let_go()
         self.selection.texture.let_go()

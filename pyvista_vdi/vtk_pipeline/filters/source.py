@@ -199,6 +199,10 @@ class VDISource(SourceSettings):
         other._vdi, other._request = self._vdi, self._request
         return other
 
+    def NewInstance(self) -> VDISource:
+        """Return another source of this class, with no input and no settings."""
+        return type(self)()
+
     def UpdateInput(self) -> Any:
         """Return the data at the input, up to date and as of the time that is asked of the source.
 
