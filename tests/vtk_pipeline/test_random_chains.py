@@ -360,6 +360,7 @@ FILTERS += [smoothed, magnified, padded, appended, informed, translated, shrunk,
 
 
 @pytest.mark.filterwarnings("ignore::pyvista_vdi.errors.VDIWarning")  # of what fails or is aborted
+@pytest.mark.filterwarnings("ignore:Call to deprecated class vtkImageThreshold")  # VTK 9.7
 @pytest.mark.every(10)
 @pytest.mark.parametrize("seed", range(CHAINS))
 def test_every_frame_is_as_with_vtks_mapper(seed, expected_messages):
