@@ -125,7 +125,7 @@ LENGTHY = {
     "series": "on_device series_files",
     "volume": "ambient_occlusion bricks lighting picture_blocks projections sampling_functions "
     "volume_ends",
-    "vtk_pipeline": "picking pipeline source vtk_files",
+    "vtk_pipeline": "copies events picking pipeline random_chains source vtk_files",
 }
 
 #: And those of which it runs none.

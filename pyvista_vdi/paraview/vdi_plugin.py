@@ -393,7 +393,7 @@ class VDISource(_Looking, RanksVDISource):
         super()._execute(inputs, outputs)
 
     def _set_view(self) -> None:
-        view, bounds, size = self._given_camera(), self.GetInputBounds(), self.GetWindowSize()
+        view, bounds, size = self._given_camera(), self._known_bounds(), self.GetWindowSize()
         if view is not None:
             view = view.azimuth(self._azimuth).elevation(self._elevation)
         elif bounds is not None and size is not None:

@@ -62,22 +62,22 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 
         A VDI is never copied: it does not change. The lookup table is shared.
         """
-        other = PlotterVDIMapper(theme=self._theme)
-        other.scalar_range = self.scalar_range  # before there is a table that it would change
-        other.lookup_table = self.lookup_table
-        if self.painter.input is not None:
-            other.painter.set_input(self.painter.input.shared())
-        other.take_array_choice(self)
-        other.SetDevice(self.GetDevice())
-        other.painter.take_settings(self.painter)
-        other.SetMaximumImageSampleDistance(self.GetMaximumImageSampleDistance())
-        other.SetCropping(self.GetCropping())
-        other.SetCroppingRegionPlanes(self.GetCroppingRegionPlanes())
-        other.SetCroppingRegionFlags(self.GetCroppingRegionFlags())
-        planes = self.GetClippingPlanes()
-        for i in range(0 if planes is None else planes.GetNumberOfItems()):
-            other.AddClippingPlane(planes.GetItem(i))
+        other = self.NewInstance()
+        other.ShallowCopy(self)
         return other
+
+    def NewInstance(self) -> PlotterVDIMapper:  # noqa: N802
+        """Return another mapper of the same theme, with nothing to draw yet."""
+        return PlotterVDIMapper(theme=self._theme)
+
+    def ShallowCopy(self, other: Any) -> None:  # noqa: N802
+        """Draw what another mapper of this class draws, in the same way, with its lookup table."""
+        super().ShallowCopy(other)
+        if isinstance(other, PlotterVDIMapper):
+            theirs: Any = other
+            self.lookup_table = None  # which another range would change
+            self.scalar_range = theirs.scalar_range
+            self.lookup_table = theirs.lookup_table
 
 
 class PlotterVDIActor(VDIActorMethods, Volume):
@@ -191,8 +191,7 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         """
         other = PlotterVDIActor()
         other.ShallowCopy(self)
-        mapper = self.mapper.copy()
-        other.SetMapper(mapper)
+        mapper = other.mapper
         if deep:
             prop = self.GetProperty()
             copied = type(prop)()  # an actor without its volume has a plain vtkVolumeProperty

@@ -43,10 +43,13 @@ _NAMES = {
     ),
     "vtkCommonExecutionModel": "vtkAlgorithm vtkStreamingDemandDrivenPipeline vtkTrivialProducer",
     "vtkCommonMath": "vtkMatrix4x4",
-    "vtkFiltersCore": "vtkCellDataToPointData vtkContourFilter vtkTriangleFilter",
+    "vtkFiltersCore": (
+        "vtkCellDataToPointData vtkContourFilter vtkImageAppend vtkResampleToImage "
+        "vtkTriangleFilter"
+    ),
     "vtkFiltersGeneral": "vtkMultiBlockDataGroupFilter",
     "vtkFiltersGeometry": "vtkDataSetSurfaceFilter",
-    "vtkFiltersHybrid": "vtkTemporalInterpolator",
+    "vtkFiltersHybrid": "vtkImplicitModeller vtkTemporalInterpolator",
     "vtkFiltersSources": "vtkSphereSource",
     "vtkIOImage": (
         "vtkDICOMImageReader vtkMetaImageReader vtkMetaImageWriter vtkNIFTIImageReader "
@@ -54,9 +57,14 @@ _NAMES = {
     ),
     "vtkIOXML": "vtkXMLImageDataReader vtkXMLImageDataWriter",
     "vtkImagingCore": (
-        "vtkExtractVOI vtkImageCast vtkImageFlip vtkImagePermute vtkImageResample "
-        "vtkImageShiftScale vtkRTAnalyticSource"
+        "vtkExtractVOI vtkImageCast vtkImageChangeInformation vtkImageConstantPad "
+        "vtkImageFlip vtkImageMagnify vtkImageMirrorPad vtkImagePermute vtkImageResample "
+        "vtkImageReslice vtkImageResize vtkImageShiftScale vtkImageShrink3D vtkImageThreshold "
+        "vtkImageTranslateExtent vtkRTAnalyticSource"
     ),
+    "vtkImagingGeneral": "vtkImageGaussianSmooth vtkImageMedian3D",
+    "vtkImagingHybrid": "vtkGaussianSplatter",
+    "vtkImagingSources": "vtkImageGaussianSource vtkImageSinusoidSource",
     "vtkInteractionStyle": "vtkInteractorStyleTrackballCamera",
     "vtkParallelCore": "vtkMultiProcessController",
     "vtkRenderingAnnotation": (

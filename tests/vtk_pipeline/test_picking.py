@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pipelines
 import pytest
 import pyvista as pv
 from plugin_scenes import add_ours, soft_ball
@@ -18,6 +19,8 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkPlane,
     vtkPropPicker,
     vtkRenderer,
+    vtkRenderingCore,
+    vtkRenderingVolume,
     vtkRenderWindow,
     vtkSelectionNode,
 )
@@ -397,6 +400,41 @@ def test_in_plain_vtk_and_before_the_first_frame():
     assert picker.GetPickPosition()[2] == pytest.approx(0.5, abs=Z_BUFFER)
     assert actor.pick(*CENTRE).position[2] == pytest.approx(0.5, abs=1e-12)
     window.Finalize()
+
+
+@pytest.mark.parametrize(
+    ("picker", "seen", "beside"),  # as the table in guide_plotting.md has it
+    [
+        ("vtkPropPicker", "data", None),
+        ("vtkRenderedAreaPicker", "actor", None),
+        ("vtkCellPicker", "box", "box"),
+        ("vtkVolumePicker", "box", "box"),
+        ("vtkPicker", "actor", "actor"),
+        ("vtkPointPicker", None, None),
+        ("vtkWorldPointPicker", None, None),
+    ],
+)
+def test_what_vtks_other_pickers_answer_with(picker, seen, beside):
+    scene = pipelines.Scene("auto")
+    scene.set_input(pipelines.image_of(pipelines.values()))
+    scene.reset()
+    scene.picture()
+    where = scene.actor.pick(60, 45).position
+    assert scene.actor.pick(30, 70) is None  # of the box, but of nothing in it
+    home = vtkRenderingVolume if picker == "vtkVolumePicker" else vtkRenderingCore
+    for place, wanted in (((60, 45), seen), ((30, 70), beside)):
+        made = getattr(home, picker)()
+        if picker == "vtkRenderedAreaPicker":
+            x, y = place
+            hit = made.AreaPick(x - 1, y - 1, x + 1, y + 1, scene.renderer)
+        else:
+            hit = made.Pick(*place, 0, scene.renderer)
+        assert bool(hit) == (wanted is not None)
+        at = np.asarray(made.GetPickPosition())
+        if wanted == "data":  # the ray through the pixel's corner
+            np.testing.assert_allclose(at, where, atol=0.2)
+        if wanted == "box":
+            assert np.isclose(at, 12).any()
 
 
 def test_what_fails_is_said_once_and_picks_nothing(monkeypatch):

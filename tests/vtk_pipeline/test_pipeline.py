@@ -16,6 +16,7 @@ from watched_windows import on_screen
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidVDIError, VDIWarning
+from pyvista_vdi.vtk_pipeline import VDIReader
 from pyvista_vdi.vtk_pipeline.drawing.frame import as_array, view_of
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -110,6 +111,20 @@ def test_bounds_are_right_before_the_first_frame():
     moved.origin = (3, 4, 5)
     actor.GetMapper().GetSource().SetInputDataObject(moved)
     assert renderer.ComputeVisiblePropBounds() == pytest.approx(moved.GetBounds())
+
+
+def test_bounds_are_those_of_the_file_that_a_reader_has_by_now(tmp_path):
+    vdi_of_one_list().save(tmp_path / "other.vdi")
+    reader, mapper, actor = VDIReader(), pvdi.VDIMapper(), pvdi.VDIActor()
+    reader.SetFileName(str(tmp_path / "other.vdi"))
+    mapper.SetInputConnection(reader.GetOutputPort())
+    actor.SetMapper(mapper)
+    assert actor.GetBounds() == vdi_of_one_list().bounds
+    source = ready_source()
+    source.SetInputDataObject(soft_ball(12).translate((5, 0, 0)))
+    source.GetVDI().save(tmp_path / "moved.vdi")
+    reader.SetFileName(str(tmp_path / "moved.vdi"))
+    np.testing.assert_allclose(actor.GetBounds(), (4, 6, -1, 1, -1, 1), atol=1e-6)
 
 
 def test_given_view_is_used_and_the_scenes_camera_is_not():

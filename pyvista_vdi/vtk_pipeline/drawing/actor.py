@@ -48,6 +48,30 @@ class VDIActorMethods(PlayingMethods):
             old.painter.leave_actor(self)
         super().SetMapper(mapper)  # type: ignore[misc]
 
+    def ShallowCopy(self: Any, other: Any) -> None:
+        """Show what another actor shows, by a copy of its mapper, which is of one actor.
+
+        Place, property and visibility are VTK's to copy: the property is shared.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it has an ordinary volume mapper.
+        """
+        mapper = other.GetMapper() if hasattr(other, "GetMapper") else None
+        copied = None
+        if mapper is not None:
+            copied = mapper.NewInstance() if isinstance(mapper, VDIMapperMethods) else mapper
+            if copied is not mapper:
+                copied.ShallowCopy(mapper)
+        self.SetMapper(copied)
+        super().ShallowCopy(other)  # type: ignore[misc]
+        self.SetMapper(copied)
+
+    def NewInstance(self) -> VDIActorMethods:
+        """Return another actor of this class, with nothing to show yet."""
+        return type(self)()
+
     @property
     def vdi(self: Any) -> VDI | None:
         """The VDI; ``None`` before the first frame.

@@ -56,12 +56,14 @@ COARSEST = 4.0
 
 def _on_start(mapper: Any, event: str) -> None:
     mapper.painter.begin(mapper)
+    mapper.painter.box.begin()
     mapper._far_box.begin(mapper.painter.actor, mapper.painter.proxy)
 
 
 def _on_end(mapper: Any, event: str) -> None:
     mapper.painter.end()
     mapper._far_box.end(mapper.painter.proxy)
+    mapper.painter.box.end()
 
 
 @refusing(OF_MAPPERS)
@@ -80,7 +82,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
-        super().SetInputDataObject(self._painter.proxy)  # type: ignore[misc]
+        super().SetInputConnection(self._painter.box.GetOutputPort())  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
@@ -410,6 +412,38 @@ class VDIMapperMethods(ArrayChoiceMethods):
         bool,
         modifies=False,
     )
+
+    def ShallowCopy(self: Any, other: Any) -> None:
+        """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it is a mapper of VTK's.
+        """
+        if not isinstance(other, VDIMapperMethods):
+            raise InvalidArgumentError(
+                f"a VDIMapper copies a VDIMapper; got {type(other).__name__}: put a VDISource "
+                "between its input and this mapper (SetInputConnection)"
+            )
+        theirs: Any = other
+        shown = other.painter.input
+        self.painter.set_input(None if shown is None else shown.shared())
+        self.take_array_choice(theirs)
+        self.SetDevice(theirs.GetDevice())
+        self.painter.take_settings(other.painter)
+        self.SetMaximumImageSampleDistance(theirs.GetMaximumImageSampleDistance())
+        self.SetCropping(theirs.GetCropping())
+        self.SetCroppingRegionPlanes(theirs.GetCroppingRegionPlanes())
+        self.SetCroppingRegionFlags(theirs.GetCroppingRegionFlags())
+        planes = theirs.GetClippingPlanes()
+        self.RemoveAllClippingPlanes()
+        for i in range(0 if planes is None else planes.GetNumberOfItems()):
+            self.AddClippingPlane(planes.GetItem(i))
+
+    def NewInstance(self) -> VDIMapperMethods:
+        """Return another mapper of this class, with nothing to draw yet."""
+        return type(self)()
 
     def _set_input(self: Any, source: Input | None) -> None:
         self.painter.set_input(source)

@@ -5,19 +5,21 @@ from __future__ import annotations
 import time
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view, coverage, magnification
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.sets.render import blended
 from pyvista_vdi.vtk_pipeline.drawing import passes
+from pyvista_vdi.vtk_pipeline.drawing.box import Box
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.few_lists import FewLists
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
@@ -46,7 +48,7 @@ from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
     WindowClock,
     reduced,
 )
-from pyvista_vdi.vtk_pipeline.vtk import vtkImageData, vtkVolume, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference
 
 #: Frames per second that stand-ins keep where no rate is asked for: changes are followed by eye.
 _STAND_IN_RATE = 30.0
@@ -67,9 +69,7 @@ class Painter:
         self.texts = CornerTexts()
         self.image_distance = 1.0
         self.selection = Selection()
-        self.proxy = vtkImageData()  # whose box VTK draws in place of the VDI
-        self.proxy.SetDimensions(2, 2, 2)
-        self._give_proxy(1)
+        self.box = Box()
         self._warnings = Warnings()
         self.upkeep = Upkeep(self.interaction, self._warnings, self.texts)
         self._actor = vtkWeakReference()
@@ -84,9 +84,10 @@ class Painter:
         self._images: Recent[Drawn] = Recent()
         self._free: Image | None = None  # shown by no frame, not even the last
         self._raycasts = 0
-        self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
+        self._last = _nothing()
         self._scene: tuple[View, weakref.ref[WindowClock]] | None = None
         self._trouble: BaseException | None = None
+        self._astray = False  # whether something else than the actor draws
         self._scene_at_hand = SceneAtHand(self._say_not_exported)
 
     def set_actor(self, actor: Any) -> None:
@@ -116,30 +117,21 @@ class Painter:
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
-        bounds = None if source is None else source.bounds()  # refuses what is no VDI
         weak = weakref.ref(self)
 
-        def bounds_changed(*_: Any) -> None:
+        def changed(*_: Any) -> None:
             painter = weak()
-            if painter is not None and painter.input is not None:
-                painter._place_proxy(painter.input.bounds())
+            if painter is not None:
+                painter.box.connect()
 
-        self.upkeep.set_input(source, bounds_changed)
-        if source is None:
-            self._last = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
-        self._place_proxy(bounds)
+        self.upkeep.set_input(source, changed)
+        self.box.show(source)
+        self._last = _nothing()
 
-    def _give_proxy(self, components: int) -> None:
-        """Give the proxy's voxels components."""
-        self.proxy.AllocateScalars(3, components)  # VTK_UNSIGNED_CHAR
-        self.proxy.GetPointData().GetScalars().Fill(0)
-
-    def _place_proxy(self, bounds: tuple[float, ...] | None) -> None:
-        """Give the proxy these bounds, model frame."""
-        if bounds is not None:
-            low, high = np.asarray(bounds[::2]), np.asarray(bounds[1::2])
-            self.proxy.SetOrigin(*low)
-            self.proxy.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
+    @property
+    def proxy(self) -> Any:
+        """The image whose box VTK draws in place of the VDI."""
+        return self.box.image
 
     def say_not_exported(self) -> None:
         """Say once that a scene which is written for another renderer lacks the VDI.
@@ -220,22 +212,35 @@ class Painter:
     def begin(self, mapper: Any) -> None:
         """Raycast and upload the image for the frame that has just begun."""
         renderer = self.renderer()
-        if renderer is None:
+        # Else a copy of the actor by vtkVolume.ShallowCopy draws, in another window
+        self._astray = renderer is None or not _is_drawing(renderer)
+        if self._astray or self._is_behind_another(mapper, renderer):
             self._warnings.warn(
-                "VDIMapper draws only behind a VDIActor: use VDIActor in place of vtkVolume"
+                "VDIMapper draws only behind its own VDIActor, and is behind another volume: use "
+                "VDIActor in place of vtkVolume, also for copies (VDIActor().ShallowCopy(actor))"
             )
+        if self._astray:
+            self.box.place((0.0,) * 6)  # nothing is seen of it
+            if self._actor.Get() is not None:  # whose shader the copy has
+                place_image(self._actor.Get(), 0, (0, 0), (1, 1))
             return
         # VTK asks for four where the actor's property says that they are dependent
         components = 1 if self.actor.GetProperty().GetIndependentComponents() else 4
         if self.proxy.GetNumberOfScalarComponents() != components:
-            self._give_proxy(components)
+            self.box.give_components(components)
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
             return
         names = passes.classes(renderer)
         for effect in passes.effects(names):
             self._warnings.warn(effect)
-        self.selection.leave(self._actor.Get(), occluded="vtkSSAOPass" in names)
+        peeled = passes.peels_volumes(renderer, names)
+        if peeled and passes.shows_what_is_translucent(renderer):
+            self._warnings.warn(passes.PEELED)
+        occluded = "vtkSSAOPass" in names
+        self.selection.leave(self._actor.Get(), occluded=occluded, peeled=peeled)
+        with suppress(VDIError):  # which what is drawn says
+            self.box.Update()
         self._last = self._guarded(self._paint, mapper, renderer) or self._last
         window, drawn = renderer.GetRenderWindow(), self._last
         clock = WindowClock.of(window)
@@ -248,8 +253,16 @@ class Painter:
         self.texts.write(renderer, self.status)
         self.upkeep.tick(window)
 
+    def _is_behind_another(self, mapper: Any, renderer: Any) -> bool:
+        """Whether a renderer shows a volume with this mapper that is not our actor."""
+        props, actor = renderer.GetVolumes(), self._actor.Get()
+        volumes = (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems()))
+        return any(each is not actor and each.GetMapper() is mapper for each in volumes)
+
     def end(self) -> None:
         """Let go of the texture unit."""
+        if self._astray:
+            self.box.Modified()  # it has its bounds again
         self._texture.let_go()
         self._no_depth.let_go()
         self.selection.texture.let_go()
@@ -265,6 +278,10 @@ class Painter:
             )
             self._note(interrupt)
         except Exception as error:  # VTK would swallow it
+            if isinstance(error, InvalidVolumeError):  # as VTK's mappers: there is nothing to see
+                self._last = _nothing()
+                with suppress(VDIError):
+                    self.box.place(None if self.input is None else self.input.bounds())
             self._cannot_draw(error)
         return None
 
@@ -312,7 +329,7 @@ class Painter:
         )
         if seen is None:
             return None
-        self._place_proxy(seen.bounds)
+        self.box.place(seen.bounds)
         if seen is not self._drawn():
             self._images.clear()
             self._drawn = weakref.ref(seen)
@@ -502,6 +519,11 @@ class Painter:
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+
+
+def _nothing() -> Drawn:
+    """Return what a frame shows of which nothing can be drawn."""
+    return Drawn(np.zeros((1, 1, 4), dtype=np.float32))
 
 
 def _is_drawing(renderer: Any) -> bool:

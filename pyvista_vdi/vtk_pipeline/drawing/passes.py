@@ -26,6 +26,13 @@ _EFFECTS = {
     ),
 }
 
+#: What becomes of a VDI where volumes are peeled, and something in the scene is translucent.
+PEELED = (
+    "depth peeling of volumes (SetUseDepthPeelingForVolumes) cannot take a VDI's picture apart: it "
+    "is drawn over all that is translucent, as without; for translucent meshes inside a volume "
+    "draw that by VTK's own mapper (add_volume)"
+)
+
 
 def classes(renderer: Any) -> set[str]:
     """Return the names of the classes of all passes of a renderer."""
@@ -35,6 +42,20 @@ def classes(renderer: Any) -> set[str]:
 def effects(names: set[str]) -> list[str]:
     """Return what passes of these classes do to a VDI, one text for each that does something."""
     return [text for name, text in _EFFECTS.items() if name in names]
+
+
+def peels_volumes(renderer: Any, names: set[str]) -> bool:
+    """Whether VTK may draw a renderer's volumes between its translucent layers."""
+    if "vtkDualDepthPeelingPass" in names:
+        return True
+    return bool(renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes())
+
+
+def shows_what_is_translucent(renderer: Any) -> bool:
+    """Whether a renderer shows translucent geometry."""
+    props = renderer.GetViewProps()
+    there = (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems()))
+    return any(p.GetVisibility() and p.HasTranslucentPolygonalGeometry() for p in there)
 
 
 def _below(render_pass: Any) -> set[str]:

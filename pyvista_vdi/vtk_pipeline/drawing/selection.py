@@ -52,12 +52,12 @@ class Selection:
             actor.SetPropertyKeys(keys)
         keys.Set(vtkOpenGLActor.GLDepthMaskOverride(), 1)
 
-    def leave(self, actor: Any, *, occluded: bool) -> None:
+    def leave(self, actor: Any, *, occluded: bool, peeled: bool) -> None:
         """Have it draw its image, in the frame that begins, whatever was drawn last.
 
-        ``occluded`` is for :func:`show_image`.
+        ``occluded`` and ``peeled`` are for :func:`show_image`.
         """
-        show_image(actor, occluded=occluded)
+        show_image(actor, occluded=occluded, peeled=peeled)
         keys = actor.GetPropertyKeys()
         if keys is not None:
             keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())

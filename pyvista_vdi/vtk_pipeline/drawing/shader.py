@@ -32,6 +32,17 @@ _LOOKUP = f"""
   finalizeRayCast();
 """
 
+#: Where volumes are peeled VTK has its ray caster draw what lies between two layers of translucent
+#: geometry, again and again, and ``castRay`` is called from what stands in place of the call. The
+#: picture cannot be taken apart: it is given whole to what begins at the near plane, and so lies
+#: before all that is translucent, as without peeling of volumes.
+_PEELED = f"""
+#define castRay(zStart, zEnd) ((zStart) > 0.0 ? vec4(0.0) : \\
+  (g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw)))
+//VTK::CallWorker::Impl
+#undef castRay
+"""
+
 #: Under screen-space ambient occlusion finalizeRayCast writes depth, place and normal of what VTK's
 #: ray caster has hit: nothing, far away. A VDI leaves those that are there.
 _UNSEEN = """
@@ -111,10 +122,11 @@ _add_vertex = vtkOpenGLShaderProperty.AddVertexShaderReplacement
 _clear_vertex = vtkOpenGLShaderProperty.ClearVertexShaderReplacement
 
 
-def show_image(actor: Any, *, occluded: bool = False) -> None:
+def show_image(actor: Any, *, occluded: bool = False, peeled: bool = False) -> None:
     """Have an actor's shader look its colours up in an image of the viewport.
 
-    ``occluded`` says whether the frame has a pass of screen-space ambient occlusion.
+    ``occluded`` says whether the frame has a pass of screen-space ambient occlusion, ``peeled``
+    whether volumes are drawn by depth peeling.
     """
     shader = actor.GetShaderProperty()
     if _replacement(shader) is None:
@@ -122,7 +134,10 @@ def show_image(actor: Any, *, occluded: bool = False) -> None:
         _add_fragment(shader, _CUSTOM, True, _UNIFORMS, False)
         for unused in _UNUSED:
             _add_fragment(shader, unused, True, "", False)
-    _replace(shader, _LOOKUP + _UNSEEN if occluded else _LOOKUP)
+    if peeled:
+        _replace(shader, _PEELED)
+    else:
+        _replace(shader, _LOOKUP + _UNSEEN if occluded else _LOOKUP)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:

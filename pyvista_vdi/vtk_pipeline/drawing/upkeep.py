@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.errors import VDIError
+from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import TRIAL_SIZE
@@ -89,7 +89,7 @@ class Upkeep:
         self._made_at: Any = None
 
     def set_input(self, source: Input | None, changed: Callable[..., Any]) -> None:
-        """Keep another input; ``changed`` is called when its bounds may be others."""
+        """Keep another input; ``changed`` is called when what is before it may be another."""
         if self.input is not None:
             self.input.watch(None)
             self.input.rest()
@@ -190,6 +190,25 @@ class Upkeep:
         self._clock = weakref.ref(frame.clock)
         if self.automatic_view:
             source.set_view_if_missing(frame.renderer, frame.model_transform)
+        try:
+            return self._current(source, frame, ask, only=only, joint=joint)
+        except Cancelled as error:  # the next frame asks again
+            shown = self._lasting or source.last()
+            if shown is None:
+                source.forget_view()
+                raise
+            self._complain(error)
+            return shown
+
+    def _current(
+        self,
+        source: Input,
+        frame: Frame,
+        ask: Callable[[], VDIStatus],
+        *,
+        only: bool,
+        joint: bool,
+    ) -> VDI | StandIn | None:
         if not isinstance(source, SourceInput):
             if isinstance(source, SeriesInput):
                 source.player.device = frame.painter.device
@@ -433,6 +452,12 @@ class Upkeep:
             return source.last()
         try:
             vdi = source.vdi()
+        except Cancelled:  # of one execution
+            raise
+        except InvalidVolumeError:  # soon found again
+            if not source.has_what_it_had():
+                raise
+            return source.last()  # as VTK's mappers, which draw the data that are there
         except BaseException:
             self._failed_at = source.stamp()
             raise

@@ -262,6 +262,18 @@ def wanted_time(information: Any) -> float | None:
     return information.Get(UPDATE_TIME_STEP) if information.Has(UPDATE_TIME_STEP) else None
 
 
+def is_aborted(algorithm: Any) -> bool:
+    """Whether an algorithm or one before it was told to stop, which leaves values out."""
+    there = [algorithm]
+    for each in there:
+        for port in range(each.GetNumberOfInputPorts()):
+            for i in range(each.GetNumberOfInputConnections(port)):
+                before = each.GetInputAlgorithm(port, i)
+                if before not in there:
+                    there.append(before)
+    return any(each.GetAbortExecute() for each in there)
+
+
 def ask_for_all(inputs: Any) -> None:
     """Ask for the whole input, whatever part of the output is wanted."""
     information = inputs[0].GetInformationObject(0)

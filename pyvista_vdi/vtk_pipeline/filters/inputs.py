@@ -15,9 +15,10 @@ from pyvista_vdi.series.player import Player
 from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.sets.shower import SetShower
 from pyvista_vdi.sets.vdi_set import VDISet
-from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
+from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build
 
 
@@ -46,12 +47,26 @@ class Input:
     def set_view_if_missing(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
         """Take the frame's view as the generating view, if there is none yet."""
 
+    def forget_view(self) -> None:
+        """Wait for the view of another frame, where that of a frame was taken."""
+
     def shared(self) -> Input:
         """Return an input of the same VDI for another mapper."""
         return self
 
+    def before(self) -> Any:
+        """Return the port of what the bounds depend on; ``None`` where they depend on nothing."""
+
+    def ask(self, inputs: Any) -> None:
+        """Ask what is before for as much as is needed."""
+        ask_for_all(inputs)
+
+    def has_what_it_had(self) -> bool:
+        """Whether the data of the VDI made last are still there, though an update fails."""
+        return False
+
     def watch(self, changed: Callable[..., Any] | None) -> None:
-        """Have this called when the bounds may have changed; ``None`` ends it."""
+        """Have this called when what is before it may be another; ``None`` ends it."""
 
     def rest(self) -> None:
         """End what goes on behind the frames, which may begin anew."""
@@ -164,8 +179,23 @@ class SourceInput(Input):
         return self.source.GetCurrentVDI()
 
     def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds: the volume's, or those of the updated image."""
+        """Return the bounds of the volume, brought up to date."""
         return self.source.GetInputBounds()
+
+    def before(self) -> Any:
+        """Return the port that the volume comes from."""
+        source = self.source
+        connected = source.GetNumberOfInputConnections(0) > 0
+        return source.GetInputConnection(0, 0) if connected else None
+
+    def has_what_it_had(self) -> bool:
+        """Whether the data at the source's input are still those of the VDI made last."""
+        made = self.source.GetCurrentRequest()
+        return made is not None and self.source.GetVolume() is made.volume
+
+    def ask(self, inputs: Any) -> None:
+        """Ask for what the source asks for."""
+        self.source.RequestUpdateExtent(None, inputs, None)
 
     def stamp(self) -> Any:
         """Return the newest time stamp of all that it depends on."""
@@ -179,11 +209,25 @@ class SourceInput(Input):
         return max(stamps)
 
     def set_view_if_missing(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
-        """Take the renderer's view."""
-        if self.source.GetCamera() is None:
+        """Take the renderer's view, unless nothing can be drawn from it; this raises why not."""
+        source = self.source
+        if source.GetCamera() is not None and source.GetWindowSize() is not None:
+            return
+        seen = Camera.from_any(renderer.GetActiveCamera(), model_transform=model_transform)
+        view = View(source.GetCamera() or seen, source.GetWindowSize() or _size(renderer))
+        source.MakeRequest(view)
+        if source.GetCamera() is None:
             self.take_camera(renderer, model_transform)
-        if self.source.GetWindowSize() is None:
+        if source.GetWindowSize() is None:
             self.take_size(renderer)
+
+    def forget_view(self) -> None:
+        """Wait for the view of another frame, where that of a frame was taken."""
+        if self._camera is not None and self.source.GetCamera() is self._camera:
+            self.source.SetCamera(None)
+        if self._size is not None and self.source.GetWindowSize() == self._size:
+            self.source.SetWindowSize(None)
+        self._camera = self._size = None
 
     def take_camera(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
         """Have the next VDI made from the renderer's view."""
@@ -192,8 +236,7 @@ class SourceInput(Input):
 
     def take_size(self, renderer: Any) -> None:
         """Have the next VDI made for the renderer's window."""
-        width, height = renderer.GetSize()
-        self.source.SetWindowSize(max(1, width), max(1, height))
+        self.source.SetWindowSize(_size(renderer))
         self._size = self.source.GetWindowSize()
 
     def follow_if_changed(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
@@ -232,6 +275,10 @@ class ImageInput(Input):
             self._read_at = image.GetMTime()
         return self._vdi
 
+    def before(self) -> Any:
+        """Return the port that the image comes from."""
+        return self._port
+
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds: the volume's, or those of the updated image."""
         vdi = self.vdi()
@@ -244,6 +291,11 @@ class ImageInput(Input):
             time = wanted_time(self._producer.GetOutputInformation(self._port.GetIndex()))
             return self._producer.GetMTime(), time
         return self._image.GetMTime()
+
+
+def _size(renderer: Any) -> tuple[int, int]:
+    width, height = renderer.GetSize()
+    return max(1, width), max(1, height)
 
 
 def input_of(data: Any) -> Input:
@@ -273,4 +325,6 @@ def input_of_port(port: Any) -> Input:
     producer = port.GetProducer()
     if isinstance(producer, VDISource):
         return SourceInput(producer)
-    return ImageInput(port=port)
+    image = ImageInput(port=port)
+    image.vdi()  # refuse what is no VDI now
+    return image

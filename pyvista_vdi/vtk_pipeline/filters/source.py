@@ -29,6 +29,7 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     UPDATE_TIME_STEP,
     announce,
     ask_for_all,
+    is_aborted,
     wanted_time,
     whole_extent,
 )
@@ -200,6 +201,10 @@ class VDISource(SourceSettings):
         other._vdi, other._request = self._vdi, self._request
         return other
 
+    def NewInstance(self) -> VDISource:
+        """Return another source of this class, with no input and no settings."""
+        return type(self)()
+
     def UpdateInput(self) -> Any:
         """Return the data at the input, up to date and as of the time that is asked of the source.
 
@@ -217,7 +222,20 @@ class VDISource(SourceSettings):
         return self.GetInputDataObject(0, 0)
 
     def GetInputBounds(self) -> tuple[float, ...] | None:
-        """Return the volume's bounds, model frame, without making a VDI; ``None`` without input."""
+        """Return the volume's bounds, model frame; ``None`` where there is no volume.
+
+        The input is brought up to date, as by VTK's mappers, because many filters announce other
+        bounds than they give; no VDI is made.
+        """
+        if self.GetNumberOfInputConnections(0) == 0:
+            return None
+        data = self.UpdateInput()
+        if isinstance(data, vtkImageData) and self._holds_all(data):
+            return tuple(data.GetBounds()) if data.GetNumberOfPoints() else None
+        return self._known_bounds()
+
+    def _known_bounds(self) -> tuple[float, ...] | None:
+        """Return the volume's bounds, as far as they are known without reading it."""
         image = self._input_grid()
         return None if image is None else tuple(image.GetBounds())
 
@@ -312,7 +330,7 @@ class VDISource(SourceSettings):
         direction = image.GetDirectionMatrix()
         key = (
             array.GetAddressAsString(""),
-            array.GetMTime(),
+            image.GetMTime(),  # newer than the arrays': values may have been written in place
             image.GetExtent(),
             image.GetSpacing(),
             image.GetOrigin(),
@@ -325,6 +343,8 @@ class VDISource(SourceSettings):
             ),
         )
         if self._volume is None or key != self._volume_key:
+            if is_aborted(self.GetInputAlgorithm(0, 0)):
+                raise Cancelled("what is before VDISource was aborted: its data are not whole")
             self._volume = volume_from_vtk(image, self._scalars, self._preference)
             self._volume_key = key
         return self._volume

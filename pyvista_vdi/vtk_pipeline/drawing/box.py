@@ -1,0 +1,117 @@
+"""The box that VTK draws in place of a VDI: as large as the data at the input are by now."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, Held, watch
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkStreamingDemandDrivenPipeline
+
+_EXTENT = (0, 1, 0, 1, 0, 1)
+_EMPTY = (0, -1, 0, -1, 0, -1)
+
+
+class Box(Algorithm):
+    """What is before the mapper in VTK's pipeline: an image of 2 x 2 x 2 voxels.
+
+    VTK's mappers bring their input up to date when they are asked for their bounds, as by
+    ``ResetCamera()``, which calls no method in Python. So this is connected to whatever is before
+    the source, executes whenever that does, and makes no VDI.
+
+    Attributes
+    ----------
+    image : vtkImageData
+        The output. It has no points where nothing is at the input.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(nInputPorts=1, nOutputPorts=1, outputType="vtkImageData")
+        self._shown: Input | None = None
+        self._components = 1
+        self._stands = False
+        self._watched: tuple[Held, int] | None = None
+        self.Update()
+        self.image = self.GetOutputDataObject(0)
+
+    def FillInputPortInformation(self, port: int, information: Any) -> int:
+        """Take whatever the source is to refuse, or nothing."""
+        information.Set(self.INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject")
+        information.Set(self.INPUT_IS_OPTIONAL(), 1)
+        return 1
+
+    def show(self, shown: Input | None) -> None:
+        """Have the bounds of another input from now on."""
+        self._shown = shown
+        self.connect()
+        self.Modified()
+
+    def connect(self) -> None:
+        """Follow what the input is made of, which may be something else by now."""
+        port = None if self._shown is None else self._shown.before()
+        if self._watched is not None:
+            self._watched[0].get().RemoveObserver(self._watched[1])
+        self._watched = None
+        if port is not None:
+            producer = port.GetProducer()
+            self._watched = Held(producer), watch(producer, self, Box._executed, "EndEvent")
+        self.SetInputConnection(port)
+
+    def _executed(self) -> None:
+        """Have no bounds where what is before gives nothing, as if it fails: this is not asked."""
+        data = self.GetInputDataObject(0, 0)
+        if not self._stands and (
+            data is None or data.GetNumberOfElements(vtkDataObject.POINT) == 0
+        ):
+            self.place(None)
+
+    def give_components(self, components: int) -> None:
+        """Give the voxels components: VTK asks for four where they are dependent."""
+        self._components = components
+        self._allocate()
+
+    def place(self, bounds: tuple[float, ...] | None) -> None:
+        """Have these bounds, model frame; ``None``: none."""
+        extent = _EMPTY if bounds is None else _EXTENT
+        if self.image.GetExtent() != extent or self.image.GetPointData().GetScalars() is None:
+            self.image.SetExtent(extent)
+            self._allocate()
+        if bounds is not None:
+            low, high = np.asarray(bounds[::2]), np.asarray(bounds[1::2])
+            self.image.SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1)  # VTK passes on the input's
+            self.image.SetOrigin(*low)
+            self.image.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
+
+    def begin(self) -> None:
+        """Have points while a frame is drawn: VTK writes an error where there are none."""
+        self._stands = self.image.GetNumberOfPoints() == 0
+        if self._stands:
+            self.place((0, 1, 0, 1, 0, 1))
+
+    def end(self) -> None:
+        """Have none again, if there are none."""
+        if self._stands:
+            self._stands = False
+            self.place(None)
+
+    def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Announce the voxels."""
+        key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+        outputs.GetInformationObject(0).Set(key, _EXTENT, 6)
+        return 1
+
+    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Ask for what the input asks for."""
+        if self._shown is not None and self.GetNumberOfInputConnections(0) > 0:
+            self._shown.ask(inputs)
+        return 1
+
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        self.image = vtkDataObject.GetData(outputs, 0)
+        self.place(None if self._shown is None else self._shown.bounds())
+
+    def _allocate(self) -> None:
+        self.image.AllocateScalars(3, self._components)  # VTK_UNSIGNED_CHAR
+        self.image.GetPointData().GetScalars().Fill(0)
