@@ -51,6 +51,8 @@ def select(mapper, array):
 
 
 def select_by_name(mapper):
+    if not hasattr(mapper, "SetArrayName"):
+        pytest.skip("this VTK has no such method")
     mapper.scalar_map_mode = "point_field"
     mapper.SetArrayAccessMode(1)
     mapper.array_name = "w"

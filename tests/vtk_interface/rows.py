@@ -84,14 +84,14 @@ def cropped(s):
     s.mapper.SetCroppingRegionPlanes(4, 9, 4, 9, 4, 9)
 
 
-def chosen(s, **how):
+def chosen(s, array="w"):
+    by_name = isinstance(array, str)
     s.mapper.SetScalarModeToUsePointFieldData()
-    if "number" in how:
-        s.mapper.SetArrayAccessMode(0)
-        s.mapper.SetArrayId(how["number"])
-    else:
-        s.mapper.SetArrayAccessMode(1)
-        s.mapper.SetArrayName("w")
+    if hasattr(s.mapper, "SetArrayName"):
+        (s.mapper.SetArrayName if by_name else s.mapper.SetArrayId)(array)
+    else:  # older VTKs
+        s.mapper.SelectScalarArray(array)
+    s.mapper.SetArrayAccessMode(int(by_name))
 
 
 def color_image(s):
@@ -118,7 +118,7 @@ MAPPER = (
         s.mapper.SetFinalColorWindow(0.6), s.mapper.SetFinalColorLevel(0.3))[:0]),
     Row("ScalarMode ScalarModeToUsePointFieldData ArrayName ArrayAccessMode", SAME,
         "arrays of points and cells alike; the VDI is made anew", chosen),
-    Row("ArrayId", SAME, "", lambda s: chosen(s, number=1)),
+    Row("ArrayId", SAME, "", lambda s: chosen(s, 1)),
     Row("SelectScalarArray", SAME, "", lambda s: (
         s.mapper.SelectScalarArray("w"), s.mapper.SetScalarModeToUsePointFieldData())[:0]),
     Row("ScalarModeToUseCellData ScalarModeToUseCellFieldData", REFUSED,
@@ -370,6 +370,11 @@ def by_components(numbers):
     return array
 
 
+def _wrapped(name, make):
+    """Return a change to scalars of a class, if this VTK has it for Python."""
+    return with_scalars(make) if hasattr(vtkCommonCore, name) else None
+
+
 def rectilinear(image):
     grid = vtkRectilinearGrid()
     grid.SetDimensions(N, N, N)
@@ -411,8 +416,8 @@ IMAGE = (
         lambda v: np.stack([v, v], -1)), "have 2 components"),
     Row("components:3", REFUSED, "pass one component, or the vectors' length", with_scalars(
         lambda v: np.stack([v, v, v], -1)), "have 3 components"),
-    Row("implicit arrays", SAME, "of every kind: copied", with_scalars(affine)),
-    Row("arrays by components (SOA)", SAME, "copied", with_scalars(by_components)),
+    Row("implicit arrays", SAME, "of every kind: copied", _wrapped("vtkAffineTypeFloat32Array", affine)),
+    Row("arrays by components (SOA)", SAME, "copied", _wrapped("vtkSOATypeFloat32Array", by_components)),
     Row("an array without a name", SAME, "", image_with(lambda image: image_of(name=None))),
     Row("active scalars", SAME, "", image_with(lambda image: image.GetPointData().SetActiveScalars("w") and None)),
     Row("the only array, not active", SAME, "drawn all the same; VTK's mapper draws nothing"),

@@ -178,7 +178,8 @@ def constant():
 
 
 @pytest.mark.skipif(
-    not hasattr(vtkCommonCore, "vtkIndexedTypeFloat32Array"), reason="VTK before 9.6 wraps none"
+    not hasattr(vtkCommonCore, "vtkIndexedTypeFloat32Array"),
+    reason="this VTK wraps none for Python",
 )
 @pytest.mark.parametrize(
     ("make", "expected"),

@@ -101,12 +101,12 @@ class ArrayChoiceMethods:
 
     def SetArrayName(self, name: str) -> None:
         """Choose an array by name, if it is accessed by name."""
-        super().SetArrayName(name)  # type: ignore[misc]
+        self._note_array(name)
         self.choose_array()
 
     def SetArrayId(self, number: int) -> None:
         """Choose an array by id, if it is accessed by id."""
-        super().SetArrayId(number)  # type: ignore[misc]
+        self._note_array(number)
         self.choose_array()
 
     def SetArrayAccessMode(self, mode: int) -> None:
@@ -117,10 +117,17 @@ class ArrayChoiceMethods:
     def take_array_choice(self: Any, other: ArrayChoiceMethods) -> None:
         """Say of the chosen array what another mapper, of the same source, says."""
         theirs: Any = other
-        super().SetArrayName(theirs.GetArrayName())  # type: ignore[misc]
-        super().SetArrayId(theirs.GetArrayId())  # type: ignore[misc]
+        self._note_array(theirs.GetArrayId())
+        if theirs.GetArrayName() is not None:
+            self._note_array(theirs.GetArrayName())
         super().SetArrayAccessMode(theirs.GetArrayAccessMode())  # type: ignore[misc]
         self._scalar_mode, self._added = other._scalar_mode, other._added
+
+    def _note_array(self: Any, array: str | int) -> None:
+        """Set name or id, and not which of them counts, by what VTK 9.4 has as well."""
+        mode = self.GetArrayAccessMode()
+        super().SelectScalarArray(array)  # type: ignore[misc]
+        super().SetArrayAccessMode(mode)  # type: ignore[misc]
 
     def choose_array(self: Any) -> None:
         """Tell the source what is chosen by now, if that is an array, and there is a source."""
