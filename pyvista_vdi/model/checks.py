@@ -74,7 +74,10 @@ def one_of(value: Any, name: str, names: Sequence[str]) -> str:
     if isinstance(value, str) and value in names:
         return value
     error = InvalidArgumentError if isinstance(value, str) else InvalidArgumentTypeError
-    raise error(f"{name} must be one of {', '.join(names[:-1])} and {names[-1]}; got {value!r}")
+    known = f"one of {', '.join(names[:-1])} and {names[-1]}"
+    if len(names) == 2:
+        known = " or ".join(map(repr, names))
+    raise error(f"{name} must be {known}; got {value!r}")
 
 
 def check_callback(function: Any, name: str = "progress") -> None:
