@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_flag, check_callback
 from pyvista_vdi.model.classification import BLENDINGS, DEFAULTS, IN_PLACE, Classification
 from pyvista_vdi.model.inputs import as_vdi, as_volume
 from pyvista_vdi.model.options import GenerationOptions, MediumOptions
@@ -185,6 +186,7 @@ def generate(
     >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
     """
     looks = _looks(generate, classification)
+    check_callback(progress)
     view = Camera.from_any(camera)
     dial = Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle)
     options = GenerationOptions(
@@ -517,7 +519,7 @@ def render_volume(
     looks = _looks(render_volume, classification, BLENDINGS)
     view = Camera.from_any(camera)
     volume = as_volume(volume, looks.scalars, looks.preference)
-    cutoff = TRANSMITTANCE_CUTOFF if early_termination else 0.0
+    cutoff = TRANSMITTANCE_CUTOFF if as_flag(early_termination, "early_termination") else 0.0
     options = RenderOptions(
         clipping_planes, cropping, opacity_multiplier, skip_empty, transmittance_cutoff=cutoff
     )
@@ -657,11 +659,12 @@ def _seen_in_scene(
     vdis: Sequence[Any], view: Camera, model_transforms: Sequence[ArrayLike] | None
 ) -> list[VDI]:
     """Return the VDIs of a scene, each seen where its model transform places it."""
-    if model_transforms is None or len(model_transforms) != len(vdis):  # refused where it is used
+    given = list(model_transforms) if np.iterable(model_transforms) else ()
+    if model_transforms is None or len(given) != len(vdis):  # refused where it is used
         return [_seen(vdi, view) for vdi in vdis]
     return [
         _seen(vdi, view.replace(model_transform=placed)) if isinstance(vdi, VDISet) else as_vdi(vdi)
-        for vdi, placed in zip(vdis, model_transforms, strict=True)
+        for vdi, placed in zip(vdis, given, strict=True)
     ]
 
 

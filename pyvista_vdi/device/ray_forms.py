@@ -350,7 +350,7 @@ def checked_opaque_depth(
     if not (isinstance(depth, np.ndarray) and depth.dtype in (np.float32, np.float64)):
         try:
             depth = np.asarray(opaque_depth, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InvalidArgumentError(f"{wanted}; got {opaque_depth!r}") from error
     if depth.shape != window_size[::-1]:
         raise InvalidArgumentError(f"{wanted}; got {depth.shape}")

@@ -24,7 +24,7 @@ from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.series.continuing import check_goes_on, check_way, refused
+from pyvista_vdi.series.continuing import check_goes_on, checked_way, refused
 from pyvista_vdi.series.series import checked_time
 from pyvista_vdi.series.writer import SeriesWriter
 
@@ -117,7 +117,7 @@ class InSitu:
             self._path = _checked_path(path)
             self._every = _checked_every(every)
             self._check(camera, window_size, dimensions, spacing, origin, options)
-            check_way(append, overwrite)
+            append, overwrite = checked_way(append, overwrite)
         require_same(comm, every=self._every, kind_of_file=self._series)
         with together(comm, "InSitu"):
             if comm.rank == 0:

@@ -222,7 +222,7 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
         names = (*names, "precision")
     _check_names("written", path, options, names)
     compression, level = options.get("compression", compressions[0]), options.get("level")
-    if compression not in compressions:
+    if not isinstance(compression, str) or compression not in compressions:
         known = f"one of {', '.join(compressions[:-1])} and " if compressions[1:] else ""
         raise InvalidArgumentError(
             f"compression of {path} must be {known}{compressions[-1]}; got {compression!r}"

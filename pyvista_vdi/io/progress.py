@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pyvista_vdi.errors import Cancelled
+from pyvista_vdi.model.checks import check_callback
 
 #: Called with the finished fraction, 0 to 1; work ends where it returns False.
 Progress = Callable[[float], object]
@@ -14,6 +15,7 @@ class Pieces:
     """Counts pieces of work and reports their share."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
+        check_callback(progress)
         self._progress, self._total, self._done = progress, max(1, total), 0
 
     def __call__(self) -> None:

@@ -20,6 +20,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.io.ranges import ZARR_FILES
+from pyvista_vdi.io.whole_file import as_path
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import closed, opened
 from pyvista_vdi.model.grid import Grid
@@ -276,6 +277,7 @@ def open_volume(
 
 
 def _parts(path: str | os.PathLike[str]) -> tuple[str, str]:
+    as_path(path)
     outer, _, inner = os.fspath(path).partition("::")
     return outer, inner.strip("/")
 
@@ -284,7 +286,7 @@ def _chosen(
     store: Store, level: int | str, camera: Any, window_size: Sequence[int] | None
 ) -> tuple[int, str]:
     count = len(store.levels)
-    if level != "auto":
+    if not (isinstance(level, str) and level == "auto"):
         if not isinstance(level, (int, np.integer)) or not 0 <= level < count:
             raise InvalidArgumentError(
                 f'level must be "auto" or from 0, the finest, to {count - 1}, as {store.path} has '

@@ -8,9 +8,9 @@ import secrets
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.errors import InvalidArgumentTypeError, VDIFileError, with_article
 
 
 @contextlib.contextmanager
@@ -76,6 +76,15 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
     stream.close()
     temporary.unlink()
     return target
+
+
+def as_path(path: Any) -> Path:
+    """Return a path, or raise InvalidArgumentTypeError if it is none."""
+    if not isinstance(path, str | os.PathLike):
+        raise InvalidArgumentTypeError(
+            f"a path is a text or a pathlib.Path; got {with_article(type(path).__name__)}"
+        )
+    return Path(path)
 
 
 def with_suffix(target: Path, suffixes: tuple[str, ...], kind: str) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
-from pyvista_vdi.model.checks import as_float, as_floats
+from pyvista_vdi.model.checks import as_flag, as_float, as_floats
 
 Matrix: TypeAlias = NDArray[np.float64]
 
@@ -134,10 +134,11 @@ class Camera:
         put(self, "focal_point", _vector("focal_point", focal_point, 3))
         put(self, "view_up", _vector("view_up", view_up, 3))
         put(self, "view_angle", as_float(view_angle))
-        put(self, "parallel_projection", bool(parallel_projection))
+        put(self, "parallel_projection", as_flag(parallel_projection, "parallel_projection"))
         put(self, "parallel_scale", as_float(parallel_scale))
         put(self, "window_center", _vector("window_center", window_center, 2))
-        put(self, "use_horizontal_view_angle", bool(use_horizontal_view_angle))
+        horizontal = as_flag(use_horizontal_view_angle, "use_horizontal_view_angle")
+        put(self, "use_horizontal_view_angle", horizontal)
         put(self, "model_transform", _affine(model_transform))
         put(self, "_key", self._make_key())
         self._check()
@@ -271,7 +272,10 @@ class Camera:
         """
         window = np.array(check_window_size(window_size))
         tile = np.array(check_window_size(tile_size, name="tile_size"))
-        first = np.asarray(corner)
+        try:
+            first = np.asarray(corner)
+        except ValueError:  # lists of different lengths
+            first = np.empty(0)
         if first.shape != (2,) or first.dtype.kind not in "iu":
             raise InvalidArgumentError(
                 f"corner must be (column, row), two whole numbers of pixels; got {corner!r}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,42 @@ def not_taken(value: Any) -> type[InvalidArgumentError]:
     """Return the error by which ``value`` is refused where a number is wanted."""
     number = isinstance(value, int | float | np.number)
     return InvalidArgumentError if number else InvalidArgumentTypeError
+
+
+def as_flag(value: Any, name: str) -> bool:
+    """Return what is true or false as a bool.
+
+    Raises
+    ------
+    InvalidArgumentTypeError
+        If it is anything else than a truth value, a number or ``None``.
+    """
+    if isinstance(value, bool | np.bool_ | int | float | np.number | None):
+        return bool(value)
+    raise InvalidArgumentTypeError(f"{name} must be True or False; got {value!r}")
+
+
+def one_of(value: Any, name: str, names: Sequence[str]) -> str:
+    """Return a text that is one of some.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If it is not.
+    """
+    if isinstance(value, str) and value in names:
+        return value
+    error = InvalidArgumentError if isinstance(value, str) else InvalidArgumentTypeError
+    known = f"one of {', '.join(names[:-1])} and {names[-1]}"
+    if len(names) == 2:
+        known = " or ".join(map(repr, names))
+    raise error(f"{name} must be {known}; got {value!r}")
+
+
+def check_callback(function: Any, name: str = "progress") -> None:
+    """Raise InvalidArgumentTypeError if something is neither a function nor ``None``."""
+    if function is not None and not callable(function):
+        raise InvalidArgumentTypeError(f"{name} must be a function; got {function!r}")
 
 
 def as_range(values: Any) -> tuple[float, float]:

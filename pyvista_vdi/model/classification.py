@@ -17,6 +17,7 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
     UnsupportedError,
 )
+from pyvista_vdi.model.checks import as_flag, one_of
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
@@ -197,25 +198,17 @@ class Classification:
             )
 
     def _refuse_unsupported(self, blendings: Sequence[str]) -> None:
-        if self.blending not in BLENDINGS:
-            raise InvalidArgumentError(
-                f"blending must be one of {', '.join(BLENDINGS)}; got {self.blending!r}"
-            )
+        one_of(self.blending, "blending", BLENDINGS)
         if self.blending not in blendings:
             raise UnsupportedError(
                 f"blending={self.blending!r} is not supported: a VDI stores what is composited "
                 "along a ray; pass blending='composite', or draw the volume itself by "
                 "Plotter.add_volume or pyvista_vdi.render_volume"
             )
-        interpolation = self._given.get("interpolation", "nearest")
-        if interpolation not in ("nearest", "linear"):
-            raise InvalidArgumentError(
-                f"interpolation must be 'nearest' or 'linear'; got {interpolation!r}"
-            )
-        if self.preference not in ("point", "cell"):
-            raise InvalidArgumentError(
-                f"preference must be 'point' or 'cell'; got {self.preference!r}"
-            )
+        one_of(self._given.get("interpolation", "nearest"), "interpolation", ("nearest", "linear"))
+        one_of(self.preference, "preference", ("point", "cell"))
+        for name in ("flip_scalars", "log_scale", "shade"):
+            as_flag(self._given.get(name), name)
 
     def _checked_transfer_function(self) -> TransferFunction:
         table = self._in_place["transfer_function"]

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError
+from pyvista_vdi.errors import (
+    InvalidArgumentTypeError,
+    InvalidVDIError,
+    InvalidVolumeError,
+    InvalidVolumeTypeError,
+)
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -44,9 +50,10 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
             f"got a NumPy array of shape {volume.shape}, which has no spacing: "
             "wrap it as pyvista_vdi.Volume(array, spacing), indexed [z, y, x]"
         )
-    raise InvalidVolumeError(
+    opened = ": open it by pyvista_vdi.open_volume(path) or pyvista.read(path)"
+    raise InvalidVolumeTypeError(
         f"expected a pyvista.ImageData, a vtkImageData or a pyvista_vdi.Volume; "
-        f"got {_described(volume)}"
+        f"got {_described(volume)}{opened if isinstance(volume, str | os.PathLike) else ''}"
     )
 
 
@@ -57,7 +64,10 @@ def _with_scalars(volume: Volume, scalars: Any) -> Volume:
                 f"the volume has no array {scalars!r}: its only one is {volume.name!r}"
             )
         return volume
-    values = np.asarray(scalars)
+    try:
+        values = np.asarray(scalars)
+    except ValueError:  # lists of different lengths
+        values = np.empty(0)
     rgba = values.ndim > 1 and values.shape[-1] == 4 and values.dtype == np.uint8
     points = volume.scalars.size
     if values.size != points * (4 if rgba else 1):
@@ -93,6 +103,15 @@ def as_vdi(vdi: Any) -> VDI:
     raise InvalidVDIError(
         f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
     )
+
+
+def each_of(vdis: Any) -> Iterable[Any]:
+    """Return several VDIs, or raise InvalidArgumentTypeError if these are not several things."""
+    if isinstance(vdis, str | bytes | os.PathLike) or not np.iterable(vdis):
+        raise InvalidArgumentTypeError(
+            f"vdis must be several VDIs; got {_described(vdis)}: pass a list of them"
+        )
+    return vdis  # type: ignore[no-any-return]
 
 
 def _described(thing: object) -> str:

@@ -7,7 +7,7 @@ its colours when it is generated (docs/conventions.md, "Lighting").
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float, as_floats, not_taken
+from pyvista_vdi.model.checks import as_flag, as_float, as_floats, not_taken, one_of
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -89,15 +89,14 @@ class Light:
     intensity: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InvalidArgumentError(f"a light's kind must be one of {KINDS}; got {self.kind!r}")
+        one_of(self.kind, "a light's kind", KINDS)
         put = object.__setattr__
         vectors = ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation")
         for name in vectors:
             put(self, name, _vector(f"a light's {name}", getattr(self, name)))
         for name in ("cone_angle", "exponent", "intensity"):
             put(self, name, _number(f"a light's {name}", getattr(self, name)))
-        put(self, "positional", bool(self.positional))
+        put(self, "positional", as_flag(self.positional, "a light's positional"))
         if self.kind == "headlight":  # wherever the eye is, it is the same light
             put(self, "position", Light.position)
             put(self, "focal_point", Light.focal_point)
@@ -196,7 +195,7 @@ class Lights:
             if not on and lights.GetAutomaticLightCreation():
                 return cls(two_sided=bool(lights.GetTwoSidedLighting()))
             return cls(on, bool(lights.GetTwoSidedLighting()))
-        if not isinstance(lights, Iterable) or isinstance(lights, str | Mapping):
+        if not np.iterable(lights) or isinstance(lights, str | Mapping):
             raise InvalidArgumentError(
                 "lights must be Light or vtkLight objects, or the renderer whose lights are "
                 f"meant; got {type(lights).__name__}"

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_floats
 
 #: Arguments of ``skimage.metrics.structural_similarity``: Wang et al. 2004.
 SSIM_ARGUMENTS: MappingProxyType[str, Any] = MappingProxyType(
@@ -83,7 +84,10 @@ def over_background(
     InvalidArgumentError
         If it is not such an image, or not finite.
     """
-    pixels = np.asarray(image)
+    try:
+        pixels = np.asarray(image)
+    except ValueError:  # lists of different lengths
+        pixels = np.empty(0)
     if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype.kind != "f":
         raise InvalidArgumentError(
             "an image is an array of floats of shape (height, width, 4), premultiplied RGBA, or "
@@ -94,7 +98,7 @@ def over_background(
         raise InvalidArgumentError(
             f"the image is not finite: pixel (column {column}, row {row}) is {pixels[row, column]}"
         )
-    behind = np.asarray(background, dtype=np.float64)
+    behind = as_floats(background)
     if behind.shape != (3,) or not ((behind >= 0) & (behind <= 1)).all():
         raise InvalidArgumentError(
             f"background must be three numbers from 0 to 1; got {background!r}"

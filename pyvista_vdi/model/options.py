@@ -10,7 +10,7 @@ import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
-from pyvista_vdi.model.checks import as_float, as_whole, memory_limit_bytes
+from pyvista_vdi.model.checks import as_float, as_whole, memory_limit_bytes, one_of
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.volume import Volume
@@ -133,10 +133,7 @@ class GenerationOptions(MediumOptions):
 
     def __post_init__(self) -> None:
         self._put("max_supersegments", check_max_supersegments(self.max_supersegments))
-        if self.criterion not in CRITERIA:
-            raise InvalidArgumentError(
-                f"criterion must be one of {', '.join(CRITERIA)}; got {self.criterion!r}"
-            )
+        one_of(self.criterion, "criterion", CRITERIA)
         check_precision(self.precision)
         difference, angle = as_float(self.tolerance), as_float(self.view_cone)
         if not 0 <= difference < np.inf:

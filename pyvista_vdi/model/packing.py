@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.host_memory import aligned_empty
 
 #: What a supersegment takes: 24 bytes as it was made, or less.
@@ -184,12 +185,7 @@ Packing = Packed16 | Packed8
 
 def check_precision(precision: object) -> str:
     """Return one of :data:`PRECISIONS`, or raise InvalidArgumentError."""
-    if precision not in PRECISIONS:
-        raise InvalidArgumentError(
-            f"precision must be one of {', '.join(PRECISIONS[:-1])} and {PRECISIONS[-1]}; "
-            f"got {precision!r}"
-        )
-    return str(precision)
+    return one_of(precision, "precision", PRECISIONS)
 
 
 def packing_of(vdi: Lists, precision: str) -> Packing:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_whole
+from pyvista_vdi.model.checks import as_flag, as_float, as_whole
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
 
 #: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
@@ -69,7 +69,7 @@ class RenderOptions:
         put(self, "clipping_planes", checked_planes(self.clipping_planes))
         put(self, "cropping", Cropping.from_any(self.cropping))
         put(self, "opacity_multiplier", checked_opacity_multiplier(self.opacity_multiplier))
-        put(self, "skip_empty", bool(self.skip_empty))
+        put(self, "skip_empty", as_flag(self.skip_empty, "skip_empty"))
         if self.preview_samples is not None:
             put(self, "preview_samples", checked_preview_samples(self.preview_samples))
         put(self, "transmittance_cutoff", checked_transmittance_cutoff(self.transmittance_cutoff))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
-from pyvista_vdi.model.checks import as_float, as_range
+from pyvista_vdi.model.checks import as_float, as_range, one_of
 from pyvista_vdi.model.lighting import Shading
 
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
@@ -105,11 +105,7 @@ class TransferFunction:
                 f"unit_distance must be a positive length in model units; got {unit_distance!r}"
             )
         self.unit_distance = unit
-        if interpolation not in ("nearest", "linear"):
-            raise InvalidArgumentError(
-                f"interpolation must be 'nearest' or 'linear'; got {interpolation!r}"
-            )
-        self.interpolation = interpolation
+        self.interpolation = one_of(interpolation, "interpolation", ("nearest", "linear"))
         if not isinstance(shading, Shading | None):
             raise InvalidArgumentError(
                 f"shading must be a pyvista_vdi.Shading; got {type(shading).__name__}"

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_floats
+from pyvista_vdi.model.checks import as_float, as_floats, as_whole, not_taken
 from pyvista_vdi.model.packing import Packed8, Packing, check_precision, packing_of
 from pyvista_vdi.model.providers import provider
 
@@ -182,6 +182,8 @@ class VDI:
     def list_at(self, x: int, y: int) -> slice:
         """Return the supersegments of pixel (x, y), y = 0 at the bottom, as a slice."""
         width, height = self.window_size
+        if math.isnan(as_whole(x)) or math.isnan(as_whole(y)):
+            raise not_taken(x)(f"x and y must be whole numbers of pixels; got {x!r} and {y!r}")
         if not (0 <= x < width and 0 <= y < height):
             raise IndexError(f"pixel ({x}, {y}) is outside the window of {width} x {height}")
         i = y * width + x
@@ -191,7 +193,8 @@ class VDI:
         """Whether all arrays, the view and the bounds are the same to the last bit."""
         names = ("offsets", *_MEDIA)
         return (
-            self.camera == other.camera
+            isinstance(other, VDI)
+            and self.camera == other.camera
             and self.window_size == other.window_size
             and self.bounds == other.bounds
             and self.depth_origin == other.depth_origin

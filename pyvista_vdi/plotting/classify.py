@@ -255,7 +255,10 @@ def _scalar_range(scalars: Any, clim: float | ArrayLike | None) -> tuple[float, 
 
 def _color_map(cmap: Any) -> Any:
     try:
-        return pv.plotting.colors.get_cmap_safe(cmap)
+        colors = pv.plotting.colors.get_cmap_safe(cmap)
+        if isinstance(cmap, list):
+            colors(0.0)  # names are looked up only now
+        return colors
     except ModuleNotFoundError as error:
         raise MissingDependencyError(str(error)) from error
     except (TypeError, ValueError) as error:

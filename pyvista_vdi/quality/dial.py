@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, warn_external
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_float, one_of
 from pyvista_vdi.model.options import GenerationOptions
 
 if TYPE_CHECKING:
@@ -159,10 +159,8 @@ class Dial:
         InvalidArgumentError
             If one is out of range, or they contradict each other.
         """
-        if quality is not None and quality not in QUALITIES:
-            raise InvalidArgumentError(
-                f"quality must be one of {', '.join(QUALITIES)}; got {quality!r}"
-            )
+        if quality is not None:
+            one_of(quality, "quality", tuple(QUALITIES))
         if quality is not None and target_ssim is not None:
             raise InvalidArgumentError(
                 f"quality={quality!r} and target_ssim={target_ssim!r} both say how good pictures "

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float, as_range
+from pyvista_vdi.model.checks import as_flag, as_float, as_range
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
@@ -84,7 +84,8 @@ class FirstHit(NamedTuple):
     @classmethod
     def of(cls, opacity_threshold: float, accumulated: bool) -> FirstHit:
         """Return it for an opacity, which is checked."""
-        return cls(-math.log1p(-checked_opacity(opacity_threshold)), bool(accumulated))
+        threshold = checked_opacity(opacity_threshold)
+        return cls(-math.log1p(-threshold), as_flag(accumulated, "accumulated"))
 
     def first(self, optical_depths: Floats) -> int | None:
         """Return which of the media that a ray meets is hit; ``None`` if none is."""

@@ -63,7 +63,7 @@ def placed_vdis(
         raise InvalidArgumentError("there is no VDI to render: the sequence is empty")
     cameras = [camera] * count
     if model_transforms is not None:
-        matrices = list(model_transforms)
+        matrices = list(model_transforms) if np.iterable(model_transforms) else []
         wanted = "model_transforms must have one matrix for each of the {} VDIs"
         matrices = _each(matrices, count, wanted, got=len(matrices))
         cameras = [camera.replace(model_transform=matrix) for matrix in matrices]
@@ -138,7 +138,11 @@ def _planes_of_each(planes: Any, count: int) -> list[ArrayLike | None]:
         return [None] * count
     try:
         shape = np.shape(np.asarray(planes, dtype=np.float64))
-    except (TypeError, ValueError):  # None among them, or different numbers of planes
+    except (
+        TypeError,
+        ValueError,
+        OverflowError,
+    ):  # None among them, or different numbers of planes
         shape = ()
     if len(shape) == 2:
         return [planes] * count

@@ -9,6 +9,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.vdi_file.description import to_json
+from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.series import layout
 from pyvista_vdi.series.reader import StepsReader
 
@@ -64,7 +65,7 @@ class Begun:
         check_goes_on(self.path, self.first, step)
 
 
-def begun(path: Path, append: bool, overwrite: bool) -> Begun | None:
+def begun(path: Path, append: Any, overwrite: Any) -> Begun | None:
     """Return what there is of a file to go on with; ``None`` if it is to be written anew.
 
     Raises
@@ -74,7 +75,7 @@ def begun(path: Path, append: bool, overwrite: bool) -> Begun | None:
     InvalidArgumentError
         If both are asked for.
     """
-    check_way(append, overwrite)
+    append, overwrite = checked_way(append, overwrite)
     if overwrite or not path.exists() or path.stat().st_size == 0:
         return None
     try:
@@ -104,12 +105,14 @@ def begun(path: Path, append: bool, overwrite: bool) -> Begun | None:
     )
 
 
-def check_way(append: bool, overwrite: bool) -> None:
-    """Raise InvalidArgumentError if a file is to be both gone on with and replaced."""
+def checked_way(append: Any, overwrite: Any) -> tuple[bool, bool]:
+    """Return both as truth values, or raise InvalidArgumentError if both are asked for."""
+    append, overwrite = as_flag(append, "append"), as_flag(overwrite, "overwrite")
     if append and overwrite:
         raise InvalidArgumentError(
             "append=True goes on with a file and overwrite=True replaces it: pass one of them"
         )
+    return append, overwrite
 
 
 def refused(path: Path, with_what: str) -> VDIFileError:

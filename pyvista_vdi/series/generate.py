@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, naming, warn_external
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    UnsupportedError,
+    naming,
+    warn_external,
+    with_article,
+)
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.large.entrance import generate_in_blocks
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import check_callback
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
@@ -99,6 +108,7 @@ def generate_series(
     --------
     generate : has the options, and the other errors.
     """
+    check_callback(progress)
     steps, known_times = _steps(volumes, times)
     make = StepMaker(
         "generate_series",
@@ -299,9 +309,11 @@ def _steps(
         raise InvalidArgumentError(
             "volumes are the steps of a series, got one volume: pass a list, or call generate"
         )
-    elif not (hasattr(volumes, "__iter__") or hasattr(volumes, "__getitem__")):
-        raise InvalidArgumentError(
-            f"volumes must be an iterable of volumes, or a function; got {type(volumes).__name__}"
+    elif isinstance(volumes, str | bytes | os.PathLike) or not np.iterable(volumes):
+        raise InvalidArgumentTypeError(
+            "volumes must be an iterable of volumes, or a function; got "
+            f"{with_article(type(volumes).__name__)}: open files by pyvista.read or "
+            "pyvista_vdi.open_volume, one step after the other"
         )
     if known is not None and hasattr(volumes, "__len__") and len(volumes) != len(known):
         raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")

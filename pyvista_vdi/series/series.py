@@ -12,9 +12,9 @@ from typing import Any, overload
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.inputs import as_vdi, each_of
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 
@@ -55,6 +55,10 @@ class VDISeries(Sequence[VDI]):
         volumes: Sequence[Any] | None = None,
     ) -> None:
         self.times = checked_times(times)
+        if not isinstance(steps, Sequence):
+            raise InvalidArgumentTypeError(
+                f"steps must be a sequence of VDIs, got {type(steps).__name__}: pass a list"
+            )
         if not len(steps) == len(self.times) > 0:
             raise InvalidArgumentError(
                 f"a series has a time for each step, and at least one; got {len(steps)} steps "
@@ -86,8 +90,8 @@ class VDISeries(Sequence[VDI]):
         """
         if isinstance(vdis, VDI):
             raise InvalidVDIError("a series is made of several VDIs: pass them in a list")
-        steps = tuple(as_vdi(vdi) for vdi in vdis)
-        return cls(steps, tuple(range(len(steps))) if times is None else tuple(times))
+        steps = tuple(as_vdi(vdi) for vdi in each_of(vdis))
+        return cls(steps, range(len(steps)) if times is None else checked_times(times))
 
     @property
     def camera(self) -> Camera:
@@ -228,6 +232,8 @@ class Called(Sequence[Any]):
 
 def checked_times(times: Iterable[float]) -> tuple[float, ...]:
     """Return times as floats, or raise InvalidArgumentError where they do not ascend."""
+    if not np.iterable(times) or isinstance(times, str | bytes):
+        raise InvalidArgumentTypeError(f"times must be numbers, one for each step; got {times!r}")
     checked = tuple(checked_time(time) for time in times)
     for before, after in pairwise(checked):
         if not before < after:

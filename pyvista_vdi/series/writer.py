@@ -19,7 +19,8 @@ from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import writer as vdi_writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
 from pyvista_vdi.io.vdi_file.description import describe
-from pyvista_vdi.io.whole_file import check_writable, whole_file, with_suffix
+from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.series import layout
@@ -125,7 +126,7 @@ class SeriesWriter:
                 "SeriesWriter", camera, window_size, precision, device=device, **options
             )
         self._steps = StepsWriter(precision, tolerance, key_every, compression, level)
-        self.path = check_writable(with_suffix(Path(path), (layout.SUFFIX,), "a series"))
+        self.path = check_writable(with_suffix(as_path(path), (layout.SUFFIX,), "a series"))
         self._begun = begun(self.path, append, overwrite)
         if self._begun is None:
             with whole_file(self.path) as stream:
@@ -248,7 +249,7 @@ def write(
     progress: Progress | None = None,
 ) -> Path:
     """Write a series to a file, which appears whole or not at all: see :meth:`VDISeries.save`."""
-    target = check_writable(with_suffix(Path(path), (layout.SUFFIX,), "a series"))
+    target = check_writable(with_suffix(as_path(path), (layout.SUFFIX,), "a series"))
     writer = StepsWriter(
         steps[0].precision if precision is None else precision,
         tolerance,
@@ -309,10 +310,7 @@ class StepsWriter:
             raise InvalidArgumentError(
                 f"key_every must be a whole number from 1; got {key_every!r}"
             )
-        if compression not in (*CODECS, "none"):
-            raise InvalidArgumentError(
-                f"compression must be one of {', '.join(CODECS)} and none; got {compression!r}"
-            )
+        one_of(compression, "compression", (*CODECS, "none"))
         check_level(level)
         self._tolerance, self._key_every = float(tolerance), key_every
         self._codec, self._asked_level = compression, level

@@ -13,10 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, warn_external
+from pyvista_vdi.errors import (
+    Cancelled,
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    warn_external,
+)
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_float, check_callback
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.inputs import as_volume
@@ -200,6 +205,7 @@ def generate_set(
     >>> vdis = pvdi.generate_set(volume, window_size=(640, 360), cmap="bone")  # doctest: +SKIP
     >>> vdis.save("brain.vdiset")  # doctest: +SKIP
     """
+    check_callback(progress)
     size = check_window_size(window_size)
     goal = as_float(target_ssim)
     if not 0 < goal < 1:
@@ -241,6 +247,8 @@ def generate_set(
     else:
         if camera is not None:
             raise InvalidArgumentError("camera is for views='sphere': leave it out with cameras")
+        if not np.iterable(views):
+            raise InvalidArgumentTypeError(f"views must be 'sphere' or cameras; got {views!r}")
         probes = [Camera.from_any(view) for view in views]
         if not probes:
             raise InvalidArgumentError("there is no view: pass at least one camera")

@@ -11,10 +11,10 @@ from typing import Any, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.checks import as_float, as_floats
+from pyvista_vdi.model.inputs import as_vdi, each_of
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
@@ -88,7 +88,15 @@ class VDISet(Sequence[VDI]):
         bounds: Sequence[float] | None = None,
         about: Mapping[str, Any] | None = None,
     ) -> None:
-        cameras = [vdi.camera for vdi in views] if cameras is None else cameras
+        if not isinstance(views, Sequence):
+            raise InvalidArgumentTypeError(
+                f"views must be a sequence of VDIs, got {type(views).__name__}: pass a list"
+            )
+        if cameras is None:
+            cameras = [as_vdi(vdi).camera for vdi in views]
+        elif not np.iterable(cameras):
+            raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
+        cameras = [Camera.from_any(camera) for camera in cameras]
         if not len(views) == len(cameras) > 0:
             raise InvalidArgumentError(
                 f"a set has a camera for each VDI, and at least one; got {len(views)} VDIs and "
@@ -97,7 +105,12 @@ class VDISet(Sequence[VDI]):
         self.window_size = check_window_size(
             views[0].picture_size if window_size is None else window_size
         )
-        self.bounds: tuple[float, ...] = tuple(views[0].bounds if bounds is None else bounds)
+        given = as_floats(views[0].bounds if bounds is None else bounds)
+        if given.shape != (6,) or not np.isfinite(given).all():
+            raise InvalidArgumentError(f"bounds must be six finite numbers; got {bounds!r}")
+        self.bounds: tuple[float, ...] = tuple(given.tolist())
+        if not isinstance(about, Mapping | None):
+            raise InvalidArgumentTypeError(f"about must be a mapping of names; got {about!r}")
         self.about: dict[str, Any] = dict(about or {})
         self._views, self._added = views, list[VDI]()
         self._cameras = tuple(cameras)
@@ -125,7 +138,7 @@ class VDISet(Sequence[VDI]):
         """
         if isinstance(vdis, VDI):
             raise InvalidVDIError("a set is made of several VDIs: pass them in a list")
-        views = tuple(as_vdi(vdi) for vdi in vdis)
+        views = tuple(as_vdi(vdi) for vdi in each_of(vdis))
         for i, vdi in enumerate(views):
             if vdi.bounds != views[0].bounds:
                 raise InvalidVDIError(
