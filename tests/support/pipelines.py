@@ -121,7 +121,7 @@ def property_of(*opacity, color=0.0, unit=2.0):
 
 
 class Scene:
-    """A window with one volume; ``way`` is "vtk", or how a VDIMapper draws.
+    """A window with one volume; ``way`` is "vtk", how a VDIMapper draws, or "watched".
 
     Attributes
     ----------
@@ -145,7 +145,11 @@ class Scene:
             )
             self.first.SetSampleDistance(0.2)
             self.first.SetMaxSupersegments(100)
-            self.mapper.SetDraw(way)
+            if way == "watched":  # as if somebody looked at the window
+                self.mapper.SetInteractiveOffScreen(True)
+                self.mapper.SetTargetFrameRate(0)
+            else:
+                self.mapper.SetDraw(way)
             self.mapper.SetInputConnection(self.first.GetOutputPort())
         self.set_property(self.property)
         self.actor.SetMapper(self.mapper)
@@ -197,7 +201,9 @@ class Scene:
         return pixels.reshape(height, width, -1)[::-1, :, :3] / 255
 
     def close(self):
-        """Let go of the window."""
+        """Let go of the window, and end what goes on behind the frames."""
+        if self.way != "vtk":
+            self.mapper.SetInputConnection(None)
         self.window.Finalize()
 
 

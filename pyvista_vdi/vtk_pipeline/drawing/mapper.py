@@ -475,7 +475,7 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     Notes
     -----
     A problem while drawing is reported once as a ``VDIWarning`` and the last good image stays:
-    exceptions cannot pass through VTK's renderer.
+    exceptions cannot pass through VTK's renderer. Where nothing is left to draw, nothing is shown.
     """
 
     def __init__(self) -> None:

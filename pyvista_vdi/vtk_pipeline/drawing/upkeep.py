@@ -254,6 +254,7 @@ class Upkeep:
         joint: bool,
     ) -> VDI | StandIn | None:
         """Return what is drawn where somebody watches: VDIs are made behind the frames."""
+        source.source.GetVolume()  # raises where there is nothing to draw any more
         first = source.last() is None
         if first and (joint or self.draw == "vdi"):
             vdi = self._updated(source)

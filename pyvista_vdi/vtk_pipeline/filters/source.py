@@ -84,9 +84,9 @@ class VDISource(SourceSettings):
     -----
     :meth:`SetCamera` keeps a copy of the view: turning the renderer's camera afterwards does not
     regenerate, unless :meth:`SetTrackCamera` asks for it. Without a camera, a :class:`VDIMapper`
-    behind it sets the view of its first frame. Settings are checked when they are set. Python's
-    ``Update`` and :meth:`GetVDI` raise what went wrong; an update that VTK asks for writes it to
-    VTK's output window and gives an empty image.
+    behind it sets the view of its first frame that has something to draw. Settings are checked when
+    they are set. Python's ``Update`` and :meth:`GetVDI` raise what went wrong; an update that VTK
+    asks for writes it to VTK's output window and gives an empty image.
 
     ``ProgressEvent`` is invoked while it works, and ``SetAbortExecute(1)`` or
     ``SetAbortExecuteAndUpdateTime()`` stops the work, also from before the update or in an
@@ -327,21 +327,8 @@ class VDISource(SourceSettings):
             raise InvalidVolumeError("what is before VDISource gives no data: check its input")
         image = require_image(image)
         array = scalars_of(image, self._scalars, self._preference)
-        direction = image.GetDirectionMatrix()
-        key = (
-            array.GetAddressAsString(""),
-            image.GetMTime(),  # newer than the arrays': values may have been written in place
-            image.GetExtent(),
-            image.GetSpacing(),
-            image.GetOrigin(),
-            tuple(direction.GetElement(i, j) for i in range(3) for j in range(3)),
-            *(
-                # Blanking a point modifies nothing; whoever has done it modifies the image
-                (ghosts.GetAddressAsString(""), ghosts.GetMTime(), image.GetMTime())
-                for ghosts in (image.GetPointGhostArray(), image.GetCellGhostArray())
-                if ghosts is not None
-            ),
-        )
+        # The image's time is newer than its arrays', whose values may have been written in place
+        key = (array.GetAddressAsString(""), image.GetMTime())
         if self._volume is None or key != self._volume_key:
             if is_aborted(self.GetInputAlgorithm(0, 0)):
                 raise Cancelled("what is before VDISource was aborted: its data are not whole")
