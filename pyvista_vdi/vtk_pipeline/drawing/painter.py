@@ -162,7 +162,7 @@ class Painter:
 
     def take_settings(self, other: Painter) -> None:
         """Take over how dense another draws, what it allows and when it regenerates."""
-        self.box.give_components(other.proxy.GetNumberOfScalarComponents())
+        self.box.give_components(other.box.components)
         self.opacity_multiplier = other.opacity_multiplier
         self.image_distance = other.image_distance
         self.upkeep.draw = other.upkeep.draw
