@@ -252,6 +252,12 @@ def failed(scene):
     maker = Maker(image_of(values()))
     scale = vtkImageShiftScale()
     connect(scale, maker)
+    shown(scene, maker)
+    yield "before"
+    maker.do("raise")
+    scene.set_input(scale)
+    yield "behind what fails from the first", "blank"
+    maker.do("")
     for made, blank in ((maker, ["blank"]), (scale, [])):  # further up, the data before stay
         shown(scene, made)
         yield "whole"

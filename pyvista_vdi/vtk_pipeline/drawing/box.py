@@ -25,12 +25,14 @@ class Box(Algorithm):
     ----------
     image : vtkImageData
         The output. It has no points where nothing is at the input.
+    components : int
+        Those of its scalars.
     """
 
     def __init__(self) -> None:
         super().__init__(nInputPorts=1, nOutputPorts=1, outputType="vtkImageData")
         self._shown: Input | None = None
-        self._components = 1
+        self.components = 1
         self._stands = False
         self._watched: tuple[Held, int] | None = None
         self.Update()
@@ -46,6 +48,8 @@ class Box(Algorithm):
         """Have the bounds of another input from now on."""
         self._shown = shown
         self.connect()
+        if shown is not None and self.GetNumberOfInputConnections(0) == 0:
+            self.place(shown.bounds())
         self.Modified()
 
     def connect(self) -> None:
@@ -58,10 +62,12 @@ class Box(Algorithm):
             producer = port.GetProducer()
             self._watched = Held(producer), watch(producer, self, Box._executed, "EndEvent")
         self.SetInputConnection(port)
+        self._executed()  # what fails from the first has no bounds either
 
     def _executed(self) -> None:
         """Have no bounds where what is before gives nothing, as if it fails: this is not asked."""
-        data = self.GetInputDataObject(0, 0)
+        connected = self.GetNumberOfInputConnections(0) > 0
+        data = self.GetInputDataObject(0, 0) if connected else None
         if not self._stands and (
             data is None or data.GetNumberOfElements(vtkDataObject.POINT) == 0
         ):
@@ -69,7 +75,7 @@ class Box(Algorithm):
 
     def give_components(self, components: int) -> None:
         """Give the voxels components: VTK asks for four where they are dependent."""
-        self._components = components
+        self.components = components
         self._allocate()
 
     def place(self, bounds: tuple[float, ...] | None) -> None:
@@ -113,5 +119,5 @@ class Box(Algorithm):
         self.place(None if self._shown is None else self._shown.bounds())
 
     def _allocate(self) -> None:
-        self.image.AllocateScalars(3, self._components)  # VTK_UNSIGNED_CHAR
+        self.image.AllocateScalars(3, self.components)  # VTK_UNSIGNED_CHAR
         self.image.GetPointData().GetScalars().Fill(0)
