@@ -212,10 +212,7 @@ def test_rungs_are_in_order_and_in_range_whatever_was_measured(losses):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        (
-            {"quality": "best"},
-            "quality must be one of reference, high, balanced and fast; got 'best'",
-        ),
+        ({"quality": "best"}, "one of reference, high, balanced and fast; got 'best'"),
         ({"quality": 1}, "quality must be one of"),
         ({"target_ssim": 1.0}, "target_ssim must be an SSIM between 0 and 1; got 1.0"),
         ({"target_ssim": True}, "target_ssim must be"),

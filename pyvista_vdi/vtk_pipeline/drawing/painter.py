@@ -226,7 +226,7 @@ class Painter:
             return
         # VTK asks for four where the actor's property says that they are dependent
         components = 1 if self.actor.GetProperty().GetIndependentComponents() else 4
-        if self.proxy.GetNumberOfScalarComponents() != components:
+        if self.box.components != components:
             self.box.give_components(components)
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
