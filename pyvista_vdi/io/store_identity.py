@@ -163,7 +163,7 @@ class _Chunks:
     @classmethod
     def of(cls, metadata: Path, index: Sequence[int | slice] | None) -> _Chunks | None:
         """Read the metadata of an array; ``None`` where its files are called in other ways."""
-        said = json.loads(metadata.read_text())
+        said = json.loads(metadata.read_text(encoding="utf-8"))
         if said["zarr_format"] == 2:
             lengths, before, separator = said["chunks"], "", said.get("dimension_separator", ".")
         elif said["chunk_grid"]["name"] == "regular":

@@ -117,7 +117,10 @@ class Volume(Geometry):
         return self.chunks is not None
 
     def _checked_blanked(self, blanked: ArrayLike) -> NDArray[np.uint8]:
-        octants = np.ascontiguousarray(blanked)
+        try:
+            octants = np.ascontiguousarray(blanked)
+        except ValueError:  # lists of several lengths
+            octants = np.empty(0)
         if self.chunked:
             raise UnsupportedError(
                 "blanked is of volumes in memory, and this one is read chunk by chunk: load it "

@@ -41,9 +41,6 @@ def opacity_of_colours(plotter, tmp_path):
 
 
 def a_mapper_of_vtk(plotter, tmp_path):
-    from pyvista_vdi.plotting.classify import note_mapper
-
-    note_mapper.cache_clear()
     plotter.add_vdi(VALUES, mapper="gpu")
 
 

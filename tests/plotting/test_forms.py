@@ -21,7 +21,6 @@ from pyvista.plotting.plotter import _ALL_PLOTTERS
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.plotting import classify
 from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
 from pyvista_vdi.plotting.component import AddVDI
 
@@ -95,14 +94,12 @@ def test_a_rectilinear_grid_of_equidistant_points_is_the_uniform_grid(plotter, d
         plotter.add_vdi(pv.RectilinearGrid(axis, axis, axis))
 
 
-def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted_once(plotter):
-    classify.note_mapper.cache_clear()
+def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted(plotter):
     with pytest.warns(VDIWarning, match="mapper='gpu' chooses among VTK's.*is ignored"):
         plotter.add_vdi(soft_ball(8), mapper="gpu", multi_colors=True, name="it", **LOOKS)
     named = shown(plotter)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        plotter.add_vdi(soft_ball(8), mapper="gpu", name="it", **LOOKS)
         plotter.add_vdi(soft_ball(8), name="it", **LOOKS)
     np.testing.assert_array_equal(shown(plotter), named)
 

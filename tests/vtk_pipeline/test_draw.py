@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, add_judge, shown, soft_ball
 from skimage.metrics import structural_similarity
-from watched_windows import MOVING, WINDOW, finish, frame, small_vdi, watched
+from watched_windows import MOVING, WINDOW, finish, frame, frames_until, small_vdi, watched
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.quality.ways import Ways
@@ -118,7 +118,9 @@ def test_in_motion_errors_are_estimated_of_vdis_that_are_drawn(
 ):
     monkeypatch.setattr(regeneration, "_ESTIMATE_PERIOD_IN_MOTION", 0.0)
     no_estimates.ssim = 0.99
-    watched(plotter, draw="auto", regenerate="auto")
+    actor = watched(plotter, draw="auto", regenerate="auto")
+    frames_until(plotter, lambda: actor.mapper.GetVDI() is not None)
+    finish("estimate")
 
     def asked():
         for _ in range(3):
