@@ -46,6 +46,7 @@ class Case:
     #: ``add_volume`` raises, and so does ``add_vdi``: one of this package's errors, or the same
     both_refuse: bool = False
     warns: str | None = None  # a pattern of a VDIWarning that comes with the right picture
+    warns_if: tuple[str, ...] = ("auto", "vdi")  # and with which ways of drawing it comes
     #: Where ``add_volume`` is wrong: how, and what the picture is compared with instead
     note: str = ""
     quick: bool = False  # runs with every change, not only at night
@@ -54,7 +55,7 @@ class Case:
 
 def expectations(keywords):
     """Take what is said about a case, rather than given to ``add_volume``, out of keywords."""
-    said = ("refused", "both_refuse", "warns", "note", "quick", "defect")
+    said = ("refused", "both_refuse", "warns", "warns_if", "note", "quick", "defect")
     return {name: keywords.pop(name) for name in said if name in keywords}
 
 
@@ -215,11 +216,11 @@ def outcome(case, off_screen=True, way="vdi"):
             return Outcome()
         return Outcome(f"is not refused by {case.refused[0]!r}: {ours.error!r}, {ours.ours}")
     theirs = draw(case, False, off_screen)
-    wrong = _errors(case, theirs, ours)
+    wrong = _errors(case, theirs, ours, case.warns if way in case.warns_if else None)
     return Outcome(wrong) if wrong or case.both_refuse else _compared(theirs, ours)
 
 
-def _errors(case, theirs, ours):
+def _errors(case, theirs, ours, warns):
     if case.both_refuse:
         if theirs.error is None or not isinstance(ours.error, VDIError | type(theirs.error)):
             return f"add_volume: {theirs.error!r}; add_vdi: {ours.error!r}"
@@ -227,9 +228,9 @@ def _errors(case, theirs, ours):
     for who, drawn in (("add_volume", theirs), ("add_vdi", ours)):
         if drawn.error is not None:
             return f"{who}: {drawn.error!r}"
-    expected = [each for each in ours.ours if case.warns and re.search(case.warns, each)]
-    if case.warns and not expected:
-        return f"no warning {case.warns!r}"
+    expected = [each for each in ours.ours if warns and re.search(warns, each)]
+    if warns and not expected:
+        return f"no warning {warns!r}"
     unexpected = [each for each in ours.ours if each not in expected]
     unexpected += [each for each in ours.said if each not in theirs.said]
     return f"said {unexpected}" if unexpected else ""

@@ -84,7 +84,7 @@ def give_another(pl):
 
 view("clipping_range", clip)
 INSIDE = "coverage='bounds' needs the eye outside"
-view("camera inside the volume", go_inside, warns=INSIDE)
+view("camera inside the volume", go_inside, warns=INSIDE, warns_if=("vdi",))
 view("a camera of its own", give_another)
 view("a camera that is turned before", lambda pl: (pl.view_yz(), pl.reset_camera()))
 camera("model_transform_matrix", pv.Transform().rotate_z(30).matrix)
