@@ -401,6 +401,17 @@ def exercise():
     return plotter, actor
 
 
+def test_an_actor_that_was_removed_is_let_go_of(plotter):
+    """At once, and not when the next is drawn."""
+    actor, mapper = plotter.add_vdi(soft_ball(8), **LOOKS), vtkWeakReference()
+    mapper.Set(actor.mapper)
+    shown(plotter)
+    plotter.remove_actor(actor)
+    actor = plotter.volume = plotter.mapper = None  # PyVista keeps the last of each
+    gc.collect()
+    assert mapper.Get() is None
+
+
 @pytest.mark.parametrize("end", ["close", "deep_clean"])
 def test_nothing_is_left(no_leaks, end):
     plotter, actor = exercise()

@@ -167,6 +167,7 @@ class Load:
             cmap="viridis",
             opacity=[0, 0.1, 0.4],
             max_supersegments=int(self.rng.integers(2, 13)),
+            draw="vdi",  # off-screen a volume would draw most of these views itself
             regenerate="auto",
             regenerate_below=0.9,
             show_scalar_bar=bool(self.rng.random() < 0.5),

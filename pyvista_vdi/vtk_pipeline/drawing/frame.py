@@ -27,6 +27,7 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkFloatArray,
     vtkPixelBufferObject,
+    vtkPropCollection,
     vtkTextureObject,
 )
 
@@ -404,6 +405,17 @@ def consumers(prop: Any) -> Iterator[Any]:
             yield consumer
             if consumer.IsA("vtkProp"):
                 yield from consumers(consumer)
+
+
+def volumes(renderer: Any) -> list[Any]:
+    """Return a renderer's volumes, those in assemblies too.
+
+    ``vtkRenderer.GetVolumes`` would hold them until it is called again.
+    """
+    found, props = vtkPropCollection(), renderer.GetViewProps()
+    for i in range(props.GetNumberOfItems()):
+        props.GetItemAsObject(i).GetVolumes(found)
+    return [found.GetItemAsObject(i) for i in range(found.GetNumberOfItems())]
 
 
 def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:

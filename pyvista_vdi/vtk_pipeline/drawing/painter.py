@@ -31,6 +31,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import (
     consumers,
     same_depth,
     viewport,
+    volumes,
 )
 from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
 from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, touch
@@ -255,9 +256,8 @@ class Painter:
 
     def _is_behind_another(self, mapper: Any, renderer: Any) -> bool:
         """Whether a renderer shows a volume with this mapper that is not our actor."""
-        props, actor = renderer.GetVolumes(), self._actor.Get()
-        volumes = (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems()))
-        return any(each is not actor and each.GetMapper() is mapper for each in volumes)
+        actor = self._actor.Get()
+        return any(each is not actor and each.GetMapper() is mapper for each in volumes(renderer))
 
     def end(self) -> None:
         """Let go of the texture unit."""
@@ -340,10 +340,9 @@ class Painter:
 
     def _overlapped(self, frame: Frame) -> bool:
         """Whether another volume of ours lies where this one does in the picture."""
-        props = frame.renderer.GetVolumes()
+        shown = volumes(frame.renderer)
         rectangles: list[Matrix | None] = []
-        for i in range(props.GetNumberOfItems() if props.GetNumberOfItems() > 1 else 0):
-            prop = props.GetItemAsObject(i)
+        for prop in shown if len(shown) > 1 else []:
             painter = getattr(prop.GetMapper(), "painter", None)
             source = painter.input if isinstance(painter, Painter) else None
             bounds = None if source is None or not prop.GetVisibility() else source.bounds()
