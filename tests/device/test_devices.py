@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import sys
@@ -201,6 +202,7 @@ def vendors(tmp_path, monkeypatch):
     monkeypatch.setattr(icd, "SYSTEM_VENDORS", system)
     monkeypatch.setattr(icd, "vendor_folders", lambda: [system])
     monkeypatch.setattr(icd, "intel_library", lambda: library)
+    gc.collect()  # buffers that are garbage by now are released by pyopencl, which goes
     monkeypatch.delitem(sys.modules, "pyopencl", raising=False)
     for name in icd.USER_VARIABLES:
         monkeypatch.delenv(name, raising=False)
