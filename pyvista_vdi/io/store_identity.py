@@ -68,7 +68,7 @@ def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> Store
         return None
     library, path = found
     if library == "h5py":
-        return StoreIdentity(str(path), (("", _sampled(path, _OF_FILE)),))
+        return StoreIdentity(str(path), (("", _digest(path, "")),))
     try:
         (metadata,) = [name for name in ARRAY_FILES if (path / name).is_file()][:1]
         chunks = _Chunks.of(path / metadata, index)
@@ -76,10 +76,9 @@ def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> Store
         return None
     if chunks is None:
         return None
-    picked = [chunks.file(at) for at in chunks.spread(_CHUNKS)]
-    samples = [(name, _sampled(path / name, _OF_CHUNK)) for name in picked]
-    whole = (metadata, hashlib.sha256((path / metadata).read_bytes()).hexdigest())
-    return StoreIdentity(str(path), (whole, *samples), chunks, chunks.absent(path))
+    names = [metadata, *(chunks.file(at) for at in chunks.spread(_CHUNKS))]
+    samples = tuple((name, _digest(path / name, name)) for name in names)
+    return StoreIdentity(str(path), samples, chunks, chunks.absent(path))
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ class StoreIdentity:
         for name, digest in self.samples:
             file = Path(self.path) / name if name else Path(self.path)
             try:
-                found = self._digest(file, name)
+                found = _digest(file, name)
             except OSError as error:
                 raise InvalidVolumeError(
                     f"{file} cannot be read there: {error.strerror}; give the process that reads "
@@ -140,14 +139,6 @@ class StoreIdentity:
                     f"{self.path}/{name}, a chunk's file, is not found there: mount or copy all of "
                     f"{self.path} to the same path"
                 )
-
-    def _digest(self, file: Path, name: str) -> str | None:
-        if name in ARRAY_FILES:
-            try:
-                return hashlib.sha256(file.read_bytes()).hexdigest()
-            except (FileNotFoundError, NotADirectoryError):
-                return None
-        return _sampled(file, _OF_CHUNK if name else _OF_FILE)
 
 
 @dataclass(frozen=True)
@@ -216,6 +207,16 @@ class _Chunks:
             next(along) if k is None else k // length
             for k, length in zip(self.taken, self.lengths, strict=True)
         )
+
+
+def _digest(file: Path, name: str) -> str | None:
+    """Return a digest of metadata, all of it, or of samples of a file; ``None`` if it is absent."""
+    if name in ARRAY_FILES:
+        try:
+            return hashlib.sha256(file.read_bytes()).hexdigest()
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+    return _sampled(file, _OF_CHUNK if name else _OF_FILE)
 
 
 def _sampled(file: Path, pieces: int) -> str | None:
