@@ -196,7 +196,9 @@ def assembled(
         scene = "" if view.scene is None else _SCENE.format(_text(view.scene))
         viewer = "" if number else viewer_script(scene=has_scene, series=has_series)
         script = f"<script>\n{viewer}</script>\n" if viewer else ""
-        named = {name: html.escape(value) for name, value in view.attributes.items()}
+        width, height = view.still_size
+        said = {"fit": f"{width}/{height}", **view.attributes}
+        named = {name: html.escape(value) for name, value in said.items()}
         parts.append(
             _VIEW.format(
                 title=title,

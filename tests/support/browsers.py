@@ -76,6 +76,17 @@ for (const kind of ["Texture", "Framebuffer", "Renderbuffer", "Buffer", "VertexA
 }
 """
 
+#: Counts the contexts of WebGL that a page makes, and keeps them.
+CONTEXTS = """
+window.contexts = [];
+const getContext = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+  const made = getContext.call(this, kind, ...rest);
+  if (kind === "webgl2" && !contexts.includes(made)) contexts.push(made);
+  return made;
+};
+"""
+
 PAGE = """<!doctype html><meta charset="utf-8"><style>body {{ margin: 0 }}</style>
 <body></body><script type="module">
 import "./element.js";
@@ -331,6 +342,6 @@ def open_page(chromium, shared_pages):
     for context in contexts:
         context.close()
     for page, url in pages:
-        assert not page.complaints
+        assert not page.complaints, page.complaints
         ours = url and (url.partition("?")[0], "blob:", "data:")
         assert not url or not [each for each in page.urls if not each.startswith(ours)]

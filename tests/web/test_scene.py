@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import COUNTING, file_of, in_base64, picture
+from browsers import CONTEXTS, COUNTING, file_of, in_base64, picture
 from plugin_scenes import soft_ball
 from scipy import ndimage
 from skimage.metrics import structural_similarity
@@ -372,9 +372,9 @@ def test_labels_stand_at_their_points_and_nearer_ones_before_others(plotter, pag
 
 @pytest.fixture
 def from_disk(open_page):
-    def from_disk(path):
+    def from_disk(path, **options):
         viewport = {"width": SIZE[0], "height": SIZE[1]}
-        return open_page(url=path.as_uri(), viewport=viewport, offline=True)
+        return open_page(url=path.as_uri(), viewport=viewport, offline=True, **options)
 
     return from_disk
 
@@ -459,23 +459,11 @@ def test_scenes_that_follow_each_other_leave_nothing_behind(plotter, open_page):
 def test_a_lost_context_is_made_up_for(plotter, from_disk, tmp_path):
     meshes(plotter)
     plotter.export_html(tmp_path / "scene.html")
-    page = from_disk(tmp_path / "scene.html")
+    page = from_disk(tmp_path / "scene.html", before=CONTEXTS)
     page.ready()
     before = shot(page)
-    page.evaluate(
-        """async () => {
-          const canvas = viewer.shadowRoot.querySelector("canvas");
-          const lose = canvas.getContext("webgl2").getExtension("WEBGL_lose_context");
-          const once = (name) => new Promise((done) =>
-            canvas.addEventListener(name, () => setTimeout(done), { once: true }));
-          const lost = once("webglcontextlost");
-          lose.loseContext();
-          await lost;
-          const restored = once("webglcontextrestored");
-          lose.restoreContext();
-          await restored;
-        }"""
-    )
+    page.evaluate("contexts.at(-1).getExtension('WEBGL_lose_context').loseContext()")
+    page.wait_for("contexts.at(-1).isContextLost()")
     np.testing.assert_array_equal(shot(page), before)
 
 

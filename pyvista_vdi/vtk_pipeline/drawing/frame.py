@@ -410,11 +410,20 @@ def consumers(prop: Any) -> Iterator[Any]:
 def volumes(renderer: Any) -> list[Any]:
     """Return a renderer's volumes, those in assemblies too.
 
-    ``vtkRenderer.GetVolumes`` would hold them until it is called again.
+    ``vtkRenderer.GetVolumes`` would hold them until it is called again, and an assembly that is
+    asked for its volumes while it draws its parts loses its place among them.
     """
-    found, props = vtkPropCollection(), renderer.GetViewProps()
-    for i in range(props.GetNumberOfItems()):
-        props.GetItemAsObject(i).GetVolumes(found)
+    found = vtkPropCollection()
+
+    def take(props: Any) -> None:
+        for i in range(props.GetNumberOfItems()):
+            prop = props.GetItemAsObject(i)
+            if hasattr(prop, "GetParts"):
+                take(prop.GetParts())
+            else:
+                prop.GetVolumes(found)
+
+    take(renderer.GetViewProps())
     return [found.GetItemAsObject(i) for i in range(found.GetNumberOfItems())]
 
 

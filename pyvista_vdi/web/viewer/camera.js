@@ -94,6 +94,19 @@ export function nearer(camera, factor) {
   return { ...camera, position: add(camera.focal_point, from, 1 / factor) };
 }
 
+/**
+ * Widen a view, so that a picture of some width over height is seen whole in a window that is
+ * narrower.
+ */
+export function fitted(camera, aspect, [width, height]) {
+  const wider = (aspect * height) / width;
+  if (!(wider > 1)) return camera;
+  const { view_angle, parallel_scale, window_center: [x, y] = [0, 0] } = camera;
+  const lens = isParallel(camera) ? { parallel_scale: wider * parallel_scale }
+    : { view_angle: (360 / Math.PI) * Math.atan(wider * Math.tan((view_angle * Math.PI) / 360)) };
+  return { ...camera, ...lens, window_center: [x, y / wider] };
+}
+
 /** Move with what is in the focal plane: by parts of the viewport's height, right and up. */
 export function panned(camera, right, up) {
   const axes = cameraAxes(camera);

@@ -1,7 +1,9 @@
 // <vdi-viewer src="brain.vdi">: a VDI that people turn. docs/web.md has its contract, which is that of
 // one class: hence more than 500 lines.
-import { checkedCamera, checkedPlane } from "./camera.js";
-import { interact } from "./interaction.js";
+import { checkedCamera, checkedPlane, fitted } from "./camera.js";
+import { leaveGraphics, showPicture, takeGraphics } from "./graphics.js";
+import { htmlElement } from "./html.js";
+import { hearKeys, interact, keyed, scrollsAround } from "./interaction.js";
 import { embedded, load } from "./loader.js";
 import { Pacer } from "./pacer.js";
 import { Player, playerControls } from "./player.js";
@@ -12,13 +14,13 @@ import { Surround } from "./surround.js";
 
 const STYLE = `
 :host { display: block; position: relative; width: 100%; aspect-ratio: 16 / 9; overflow: hidden;
-  background: black; }
+  background: black; print-color-adjust: exact; }
 :host([hidden]) { display: none; }
 canvas, img { position: absolute; width: 100%; height: 100%; inset: 0; }
 canvas { touch-action: none; outline-offset: -2px; }
 .over { pointer-events: none; }
 .without { object-fit: contain; }
-p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 14px sans-serif;
+p, .hint { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 14px sans-serif;
   color: white; background: #000a; }
 .controls { position: absolute; inset: auto 0 0 0; display: flex; align-items: center; gap: 0.5em;
   padding: 0.2em 0.5em; font: 14px sans-serif; color: white; background: #0008; }
@@ -26,23 +28,36 @@ p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 
   background: none; cursor: pointer; }
 .controls input { flex: 1; min-width: 3em; accent-color: white; }
 .controls output { min-width: 3em; overflow: hidden; text-align: right; font-variant-numeric: tabular-nums; }
-.controls:not([hidden]) ~ p { bottom: 2.4em; }
+.controls:not([hidden]) ~ :is(p, .hint) { bottom: 2.4em; }
 progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; border: 0; }
-[hidden] { display: none !important; }`;
+[hidden] { display: none !important; }
+@media print { canvas { object-fit: contain; } }`;
 
 /** Milliseconds after the last movement from which a view rests, and is drawn with all pixels. */
 const REST = 150;
+/** Milliseconds without a frame after which a viewer out of sight keeps its picture alone. */
+const IDLE = 1000;
+/** Milliseconds after which what is not drawn is drawn with other graphics than those lost. */
+const LOST = 250;
+/** Milliseconds between two looks at how dense the screen's pixels are. */
+const DENSITY = 500;
+/** Milliseconds that a hint is read in. */
+const HINT = 1500;
+
+/** What a viewer is called without a name of its own. */
+const LABEL = "volume, to be turned";
+
+/** Properties that may be set before this module has come. */
+const PROPERTIES = ["src", "background", "camera", "clippingPlanes", "scene"];
 
 /** The element. */
 export class VDIViewer extends HTMLElement {
-  static observedAttributes = ["src", "background", "still"];
+  static observedAttributes = ["src", "background", "still", "fit", "aria-label"];
 
   #parts = {};
+  #holder = { lost: () => this.#lose() }; // of a part of the page's graphics
   #gl = null;
-  #context = null; // its extension
-  #lost = false; // and whether it was given back by the element itself
-  #released = false;
-  #raycaster = null;
+  #raycaster = null; // without one there is but the last picture
   #pacer = null;
   #prepared = null;
   #camera = null;
@@ -56,25 +71,41 @@ export class VDIViewer extends HTMLElement {
   #drawing = false;
   #asked = false;
   #wake = () => {};
+  #seen = true;
+  #shots = 0; // pictures that are being made
+  #retiring = 0; // a timer, as the next
+  #hinting = 0;
+  #aspect = 0; // of what is to be seen whole
   #scene = null; // what is drawn
   #coming = null; // what will be, as soon as it can
   #still = null; // URL of the picture that is laid over it
   #series = null;
   #player = null;
   #step = null; // that is drawn with the next frame
-  #showPlayer = () => {};
+  #controls = null;
 
   constructor() {
     super();
     const root = this.attachShadow({ mode: "open" });
-    root.innerHTML = `<style>${STYLE}</style><img class="without" hidden alt="">` +
-      `<canvas tabindex="0" role="img"></canvas><img class="over" hidden alt="">` +
-      `<canvas class="over" hidden></canvas><slot hidden></slot>` +
-      `<div class="controls" hidden></div><progress max="1" hidden></progress>` +
-      `<p role="alert" hidden></p>`;
-    for (const name of ["img", "canvas", "progress", "p"]) this.#parts[name] = root.querySelector(name);
-    this.#parts.over = root.querySelector("canvas.over");
-    this.#parts.laid = root.querySelector("img.over");
+    // No markup in text: pages may forbid what is not in a file of theirs
+    const style = new CSSStyleSheet();
+    style.replaceSync(STYLE);
+    root.adoptedStyleSheets = [style];
+    const make = (name, className, more) => htmlElement(name, { className, hidden: true, ...more });
+    const parts = this.#parts = {
+      img: make("img", "without", { alt: "" }),
+      canvas: make("canvas", "", { hidden: false, tabIndex: 0, role: "img" }),
+      laid: make("img", "over", { alt: "" }),
+      over: make("canvas", "over"),
+      slot: make("slot"),
+      controls: make("div", "controls"),
+      progress: make("progress", "", { max: 1 }),
+      p: make("p", "", { role: "alert" }),
+      hint: make("div", "hint over", { role: "status" }),
+    };
+    root.append(...Object.values(parts));
+    parts.picture = parts.canvas.getContext("2d");
+    parts.canvas.setAttribute("aria-label", LABEL);
     this.#ready.promise.catch(() => {}); // who awaits it is told; nobody need
   }
 
@@ -83,6 +114,15 @@ export class VDIViewer extends HTMLElement {
   /** Fulfilled with the element when all of the VDI is drawn; rejected if it cannot be. */
   get ready() {
     return this.#ready.promise;
+  }
+
+  /** Where the VDI, the series or the set comes from; another one is loaded when it is set. */
+  get src() {
+    return this.getAttribute("src") ?? "";
+  }
+
+  set src(src) {
+    this.setAttribute("src", src);
   }
 
   /** The view: position, focal_point, view_up and view_angle or parallel_scale; null before one. */
@@ -183,6 +223,7 @@ export class VDIViewer extends HTMLElement {
    */
   async screenshot({ width = this.#parts.canvas.width, height = this.#parts.canvas.height } = {}) {
     await this.ready;
+    if (this.isConnected) this.#begin();
     const gl = this.#gl, pacer = this.#pacer, scene = this.#scene, camera = this.#camera;
     const require = (good) => {
       if (!good) throw new Error("A viewer whose graphics are lost, or off the page, has no picture.");
@@ -194,12 +235,13 @@ export class VDIViewer extends HTMLElement {
         `got ${width} x ${height}.`);
     }
     const target = pacer.target(width, height);
+    ++this.#shots;
     try {
       require(await pacer.inBands(target, width, height, this.#painter(camera, width, height)));
       const data = new Uint8ClampedArray(4 * width * height), row = 4 * width;
       const upsideDown = new Uint8Array(data.length);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-      scene?.paintTexts(camera, width, height);
+      scene?.paintTexts(this.#fitted(camera, width, height), width, height);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upsideDown);
       for (let y = 0; y < height; ++y) {
         data.set(upsideDown.subarray((height - 1 - y) * row, (height - y) * row), y * row);
@@ -207,13 +249,15 @@ export class VDIViewer extends HTMLElement {
       return { width, height, data };
     } finally {
       pacer.free(target);
+      --this.#shots;
+      this.#retire();
     }
   }
 
   /**
-   * Show what a URL, bytes or a stream hold: a .vdi file, a series, .vdis, or a set, .vdiset.
+   * Show what a URL, bytes, a file or a stream hold: a .vdi file, a series, .vdis, or a set, .vdiset.
    *
-   * @param {string|URL|Uint8Array|ReadableStream} source
+   * @param {string|URL|Uint8Array|Blob|ReadableStream} source A File is a Blob.
    * @returns {Promise<VDIViewer>} When all of it is drawn.
    */
   async load(source) {
@@ -299,9 +343,15 @@ export class VDIViewer extends HTMLElement {
 
   set scene(scene) {
     if (scene === this.#coming) return;
+    if (this.#coming?.broken) this.#recover();
     this.#coming = scene;
     const isWanted = () => scene === this.#coming;
-    if (scene) scene.failed = (error) => isWanted() && this.#fail(error);
+    if (scene) {
+      scene.failed = (error) => {
+        scene.broken = true;
+        if (isWanted()) this.#fail(error);
+      };
+    }
     if (!scene || !this.#scene) this.#takeScene(scene);
     else scene.whole.then(() => isWanted() && this.#takeScene(scene), () => {});
     scene?.loaded.then(() => {
@@ -312,6 +362,13 @@ export class VDIViewer extends HTMLElement {
       this.#tell({ state: "full", progress: 1 }); // there is no VDI of its own
       this.invalidate(false);
     }, () => {});
+  }
+
+  // Go on with what is there: what was wrong is no more.
+  #recover() {
+    if (this.#ready.settled) this.#renew();
+    if (this.#prepared) this.setPrepared(this.#prepared);
+    else this.#tell({ state: "empty", progress: 0, message: undefined });
   }
 
   #takeScene(scene) {
@@ -336,13 +393,14 @@ export class VDIViewer extends HTMLElement {
       show: (prepared, time, step) => this.#showStep({ prepared, time, step }),
       changed: () => {
         if (!player.playing) this.#awaitStep();
-        this.#showPlayer();
+        this.#controls?.show();
       },
       failed: (error) => player === this.#player && this.#fail(error),
     });
-    series.changed = () => this.#showPlayer();
-    this.#showPlayer();
-    if (this.hasAttribute("autoplay")) player.play();
+    series.changed = () => this.#controls?.show();
+    this.#controls?.show();
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (this.hasAttribute("autoplay") && !still) player.play();
   }
 
   // The nearest VDI of a set is a step that the view chooses.
@@ -360,7 +418,7 @@ export class VDIViewer extends HTMLElement {
   #endSeries() {
     this.#player?.close();
     this.#player = this.#series = this.#step = null;
-    this.#showPlayer();
+    this.#controls?.show();
   }
 
   #played() {
@@ -400,55 +458,111 @@ export class VDIViewer extends HTMLElement {
   // -- life --------------------------------------------------------------------------------------
 
   connectedCallback() {
-    const { canvas } = this.#parts;
+    const { canvas, controls } = this.#parts;
     const { signal } = (this.#connected = new AbortController());
-    if (!this.hasAttribute("aria-label")) canvas.setAttribute("aria-label", "volume, to be turned");
+    try {
+      for (const name of PROPERTIES.filter((each) => Object.hasOwn(this, each))) {
+        const value = this[name];
+        delete this[name]; // it hides the accessor
+        this[name] = value;
+      }
+    } catch (error) {
+      this.#fail(error);
+    }
     // First: decoding goes on while the browser starts its graphics
     this.#loadEmbedded();
     if (document.readyState === "loading") { // what is in it may come yet
-      document.addEventListener("DOMContentLoaded", () => this.#loadEmbedded(), { signal });
+      document.addEventListener("DOMContentLoaded", () => {
+        this.#loadEmbedded();
+        if (!this.#gl) this.#showWithout();
+      }, { signal });
     }
-    const gl = canvas.getContext("webgl2", { antialias: false, depth: false });
-    if (!gl) {
+    this.#begin();
+    if (!this.#gl) {
       this.#loading?.abort();
-      this.#parts.canvas.hidden = true;
-      this.#parts.img.src ||= this.querySelector("img")?.src ?? "";
-      this.#parts.img.hidden = !this.#parts.img.getAttribute("src");
+      this.#showWithout();
       this.#fail(new Error("This browser draws no WebGL 2, which turning this picture takes."));
       return;
     }
-    if (!this.#gl) {
-      canvas.addEventListener("webglcontextlost", (event) => {
-        event.preventDefault();
-        this.#raycaster = this.#pacer = null;
-        this.#lost = true;
-        // Given up by an element that was moved, and is on the page again by now
-        if (this.#released && this.isConnected) setTimeout(() => this.#restore());
-      });
-      canvas.addEventListener("webglcontextrestored", () => this.isConnected && this.#begin());
-    }
-    this.#gl = gl;
-    this.#context ??= gl.getExtension("WEBGL_lose_context"); // there is none of a lost one
-    if (!gl.isContextLost()) this.#begin();
-    else if (this.#lost) this.#restore(); // otherwise when it is said that it is lost
     if (this.#source && this.#loading.signal.aborted) this.load(this.#source).catch(() => {});
     this.#player?.resume();
-    const viewer = this;
-    interact(canvas, {
-      get camera() { return viewer.#camera; },
-      move(camera) { viewer.camera = camera; },
-      rest() { viewer.#moved = -Infinity; viewer.invalidate(); },
-      reset() { viewer.resetCamera(); },
-    }, signal);
-    this.#showPlayer = playerControls?.(this.shadowRoot.querySelector(".controls"), this.shadowRoot,
-      () => this.series && this.#player, () => this.#series.times, {
+    this.#controls = playerControls?.(controls, () => this.series && this.#player,
+      () => this.#series.times, {
         toggle: () => this.playing ? this.pause() : this.play(),
         seek: (step) => this.#seek(step),
-      }, signal) ?? (() => {});
-    this.#showPlayer();
+      }, signal);
+    this.#controls?.show();
+    this.#listen(signal);
+    this.invalidate(false);
+  }
+
+  // Hear of what people do, of the canvas' size and of whether it is in sight.
+  #listen(signal) {
+    const viewer = this, { canvas } = this.#parts;
+    interact(canvas, {
+      get camera() { return viewer.#camera; },
+      get height() { // pixels that the camera's angle spans
+        const { clientWidth, clientHeight } = canvas;
+        return viewer.#aspect ? Math.min(clientHeight, clientWidth / viewer.#aspect) : clientHeight;
+      },
+      get shared() { return viewer.#share(); },
+      move(camera) { viewer.camera = camera; },
+      rest() { viewer.#moved = -Infinity; viewer.invalidate(); },
+      hint(text) { viewer.#hint(text); },
+    }, signal);
+    hearKeys(this.shadowRoot, (event, target) => this.#key(event, target), signal);
     const sizes = new ResizeObserver(() => this.#resize());
-    sizes.observe(this);
-    signal.addEventListener("abort", () => sizes.disconnect());
+    for (const each of [this, document.documentElement]) sizes.observe(each);
+    const sight = new IntersectionObserver((entries) => {
+      this.#seen = entries.at(-1).isIntersecting;
+      this.#share();
+      if (this.#seen && !this.#raycaster) this.invalidate(false);
+      this.#retire();
+    }, { rootMargin: "50%" });
+    sight.observe(this);
+    signal.addEventListener("abort", () => [sizes, sight].forEach((each) => each.disconnect()));
+    canvas.addEventListener("contextrestored", () => this.invalidate(false), { signal });
+    // Another screen, or the browser's zoom: not all ways to change it are told
+    const density = setInterval(() => this.#seen && this.#resize(), DENSITY);
+    signal.addEventListener("abort", () => clearInterval(density));
+  }
+
+  // Whether fingers and the wheel move the page, too: then a viewer does not take all of them.
+  #share() {
+    const wanted = this.getAttribute("gestures");
+    const shared = wanted ? wanted === "shared" : scrollsAround(this);
+    this.#parts.canvas.style.touchAction = shared ? "pan-y" : "";
+    return shared;
+  }
+
+  // Whether a key that is pressed in here is taken.
+  #key(event, target) {
+    if (event.altKey || event.metaKey || event.ctrlKey) return false;
+    if (target !== this.#parts.canvas || !this.#camera) {
+      return this.#controls?.key(event, target) ?? false;
+    }
+    const camera = keyed(this.#camera, event);
+    if (camera) this.camera = camera;
+    else if (event.key === "r" || event.key === "R") this.resetCamera();
+    else return this.#controls?.key(event, target) ?? false;
+    event.preventDefault();
+    return true;
+  }
+
+  #hint(text) {
+    const { hint } = this.#parts;
+    hint.textContent = text;
+    hint.hidden = false;
+    clearTimeout(this.#hinting);
+    this.#hinting = setTimeout(() => (hint.hidden = true), HINT);
+  }
+
+  // The still picture, in place of one that can be turned.
+  #showWithout() {
+    const { img, canvas } = this.#parts;
+    canvas.hidden = true;
+    if (!img.getAttribute("src")) img.src = this.querySelector("img")?.src ?? "";
+    img.hidden = !img.getAttribute("src");
   }
 
   #loadEmbedded() {
@@ -465,13 +579,8 @@ export class VDIViewer extends HTMLElement {
       this.#loading?.abort();
       this.#series?.close(); // its worker; another one starts when it is needed again
     });
-    this.#raycaster?.dispose();
-    this.#pacer?.dispose();
-    this.#scene?.dispose();
-    this.#raycaster = this.#pacer = null;
-    // Browsers keep some sixteen contexts, and take the oldest from who still shows it
-    this.#released = true;
-    this.#context?.loseContext();
+    this.#release();
+    leaveGraphics(this.#holder);
   }
 
   attributeChangedCallback(name, before, value) {
@@ -479,22 +588,50 @@ export class VDIViewer extends HTMLElement {
     if (name === "src" && value) this.load(value).catch(() => {});
     if (name === "background") this.style.background = value ?? "";
     if (name === "still" && value) this.#parts.img.src = value;
+    if (name === "aria-label") this.#parts.canvas.setAttribute("aria-label", value ?? LABEL);
+    if (name === "fit") {
+      const [width, height = 1] = (value ?? "").split("/").map(Number);
+      this.#aspect = width > 0 && height > 0 ? width / height : 0;
+      this.invalidate();
+    }
   }
 
-  #restore() {
-    if (this.#gl.isContextLost()) this.#context?.restoreContext();
-  }
-
-  // Take the graphics that there is, at first and after it was lost.
+  // Take part in the page's graphics: at first, and after it was lost or given back.
   #begin() {
-    const gl = this.#gl;
-    if (gl.isContextLost()) return;
-    this.#lost = this.#released = false;
+    if (this.#raycaster && !this.#gl.isContextLost()) return;
+    const gl = (this.#gl = takeGraphics(this.#holder));
+    if (!gl) return;
     this.#raycaster = new Raycaster(gl);
     this.#pacer = new Pacer(gl);
     if (this.#scene) this.#give(this.#scene);
+    try {
+      if (this.#prepared) this.#raycaster.set(this.#prepared);
+    } catch (error) {
+      this.#fail(error);
+    }
     this.#resize();
-    if (this.#prepared) this.setPrepared(this.#prepared);
+  }
+
+  // Give back what is in the graphics' memory; the canvas keeps its picture.
+  #release() {
+    clearTimeout(this.#retiring);
+    this.#raycaster?.dispose();
+    this.#pacer?.dispose();
+    this.#scene?.dispose();
+    this.#raycaster = this.#pacer = null;
+  }
+
+  #retire() {
+    clearTimeout(this.#retiring);
+    if (this.#seen) return;
+    const busy = () => this.#drawing || this.#shots || this.playing;
+    this.#retiring = setTimeout(() => busy() || this.#release(), IDLE);
+  }
+
+  // What is drawn stays; what is not yet is drawn with other graphics.
+  #lose() {
+    this.#release();
+    if (this.#drawing || this.#asked) setTimeout(() => this.invalidate(false), LOST);
   }
 
   #give(scene) {
@@ -523,7 +660,9 @@ export class VDIViewer extends HTMLElement {
     this.#asked = true;
     this.#wake();
     const something = this.#prepared || this.#scene?.head;
-    if (!this.#drawing && this.#raycaster && something && this.#camera) {
+    if (this.#drawing || !something || !this.#camera || !this.isConnected) return;
+    this.#begin(); // which may come here itself
+    if (this.#raycaster && !this.#drawing) {
       this.#drawing = true;
       requestAnimationFrame(() => this.#frames());
     }
@@ -550,8 +689,8 @@ export class VDIViewer extends HTMLElement {
           () => !full || !this.#asked || moving);
         if (this.#gl.isContextLost()) return;
         if (pacer !== this.#pacer || !done) continue;
-        pacer.show(target, size, [width, height]);
-        this.#scene?.annotate(this.#parts.over, camera, [width, height]);
+        showPicture(target.framebuffer, size, this.#parts.picture);
+        this.#scene?.annotate(this.#parts.over, this.#fitted(camera, width, height), [width, height]);
         this.#drawn(full, shown === this.#prepared);
         if (this.#asked) continue;
         if (full) return;
@@ -564,9 +703,8 @@ export class VDIViewer extends HTMLElement {
       if (!this.#gl.isContextLost()) this.#fail(error);
     } finally {
       this.#drawing = false;
-      if (this.#asked && this.#raycaster && this.isConnected && this.#status.state !== "error") {
-        this.invalidate(false);
-      }
+      if (this.#asked && this.#raycaster && this.#status.state !== "error") this.invalidate(false);
+      this.#retire();
     }
   }
 
@@ -584,6 +722,7 @@ export class VDIViewer extends HTMLElement {
   // pixels of it for one of the page, which lines and points are as wide as; `few`: of few lists.
   #painter(camera, width, height, { density = 1, moving = false, few = false } = {}) {
     const gl = this.#gl, raycaster = this.#raycaster, scene = this.#scene, planes = this.#planes;
+    camera = this.#fitted(camera, width, height);
     const view = { camera, width, height, density, moving, few, clippingPlanes: planes };
     return (target) => {
       if (scene) {
@@ -595,6 +734,10 @@ export class VDIViewer extends HTMLElement {
       raycaster.draw({ camera, width, height, clippingPlanes: planes, few });
       gl.disable(gl.BLEND);
     };
+  }
+
+  #fitted(camera, width, height) {
+    return this.#aspect ? fitted(camera, this.#aspect, [width, height]) : camera;
   }
 
   // What was drawn, and whether it is still what is to be shown: another level may have come since.

@@ -9,8 +9,8 @@ const FIRST_BYTES = 1 << 16; // of a series that is read by ranges
 /**
  * Load a VDI: first its coarse level, where the file has one, then the whole. Or a series or a set.
  *
- * @param {string|URL|Uint8Array|ArrayBuffer|ReadableStream|AsyncIterable} source A .vdi, .vdis or
- *   .vdiset file: where it is, its bytes, or its pieces, which may be base64 text as
+ * @param {string|URL|Uint8Array|ArrayBuffer|Blob|ReadableStream|AsyncIterable} source A .vdi, .vdis
+ *   or .vdiset file: where it is, its bytes, or its pieces, which may be base64 text as
  *   {@link embedded} gives it.
  * @param {object} options
  * @param {(prepared: object) => void} options.onLevel Called with each level as prepare.js makes
@@ -114,6 +114,7 @@ async function* embeddedTexts(element) {
 
 async function* piecesOf(source, onProgress, signal) {
   if (source instanceof ArrayBuffer) source = new Uint8Array(source);
+  if (source instanceof Blob) source = source.stream();
   if (source instanceof Uint8Array) {
     yield source;
     onProgress(1);

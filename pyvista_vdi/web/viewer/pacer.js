@@ -109,16 +109,6 @@ export class Pacer {
     return this.#screen;
   }
 
-  /** Bring the lower left part of a target to the canvas, made as large as that is. */
-  show({ framebuffer }, [width, height], [canvasWidth, canvasHeight]) {
-    const { gl } = this;
-    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, framebuffer);
-    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
-    gl.blitFramebuffer(0, 0, width, height, 0, 0, canvasWidth, canvasHeight, gl.COLOR_BUFFER_BIT,
-      width === canvasWidth ? gl.NEAREST : gl.LINEAR);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-  }
-
   free(target) {
     if (!target) return;
     this.gl.deleteFramebuffer(target.framebuffer);

@@ -1,4 +1,5 @@
 // Which step of a series is shown, and when; steps are decoded ahead, in a worker.
+import { htmlElement } from "./html.js";
 
 /** Steps per second of films. */
 const RATE = 24;
@@ -7,8 +8,8 @@ const AHEAD = 3;
 /** Share of the last step's decoding in what the next one is expected to take. */
 const LAST = 0.3;
 
-const CONTROLS = `<button type="button"></button>
-<input type="range" min="0" step="1" aria-label="Time"><output></output>`;
+/** Keys that a slider takes by itself. */
+const OF_SLIDERS = /^(Arrow|Page|Home|End)/;
 
 /**
  * Shows one step of a series after the other, at a rate, leaving out what is not ready: where
@@ -232,28 +233,20 @@ export class Player {
  * back and forth.
  *
  * @param {HTMLElement} bar What they are put in.
- * @param {ShadowRoot} root Whose keys are heard.
  * @param {() => (Player|null)} playerOf
  * @param {() => number[]} timesOf
  * @param {{toggle: function(), seek: function(number)}} does
  * @param {AbortSignal} signal Ends it.
- * @returns {() => void} Shows what has changed.
+ * @returns {{show: function(), key: function(KeyboardEvent, EventTarget): boolean}} `show` what has
+ *   changed; whether a `key` is taken.
  */
-export function playerControls(bar, root, playerOf, timesOf, does, signal) {
-  bar.innerHTML = CONTROLS;
-  const [button, slider, output] = bar.children;
+export function playerControls(bar, playerOf, timesOf, does, signal) {
+  const button = htmlElement("button", { type: "button" }), output = htmlElement("output");
+  const slider = htmlElement("input", { type: "range", min: 0, step: 1, ariaLabel: "Time" });
+  bar.replaceChildren(button, slider, output);
   button.addEventListener("click", does.toggle, { signal });
   slider.addEventListener("input", () => does.seek(Number(slider.value)), { signal });
-  root.addEventListener("keydown", (event) => {
-    const player = playerOf();
-    if (!player || event.altKey || event.metaKey || event.ctrlKey) return;
-    const steps = { ",": -1, ".": 1 }[event.key];
-    if (steps) does.seek(player.step + steps);
-    else if (event.key === " " && event.target !== button) does.toggle();
-    else return;
-    event.preventDefault();
-  }, { signal });
-  return () => {
+  const show = () => {
     const player = playerOf();
     bar.hidden = !player;
     if (!player) return;
@@ -266,4 +259,17 @@ export function playerControls(bar, root, playerOf, timesOf, does, signal) {
     slider.setAttribute("aria-valuetext", time);
     output.textContent = time;
   };
+  const key = (event, target) => {
+    const player = playerOf();
+    if (!player) return false;
+    const steps = { ",": -1, ".": 1 }[event.key];
+    if (target === slider && OF_SLIDERS.test(event.key)) return true; // it does
+    if (target === button && [" ", "Enter"].includes(event.key)) return true; // so does this
+    if (steps) does.seek(player.step + steps);
+    else if (event.key === " ") does.toggle();
+    else return false;
+    event.preventDefault();
+    return true;
+  };
+  return { show, key };
 }

@@ -19,7 +19,7 @@ export class Raycaster {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
     this.gl = gl;
-    this.programs = new Map();
+    this.programs = programsOf(gl);
     this.vdi = null;
     this.vertices = gl.createVertexArray();
   }
@@ -184,7 +184,9 @@ export class Raycaster {
     const frame = frameOf(vdi), space = listSpace(frame, vdi);
     const rays = pixelRays(frame, camera, windowSize);
     const { planes } = frameForms(frame, space, windowSize, rays, space.parallel, []);
+    const known = this.programs.size;
     const { program, uniforms } = this.program(space, true, null, planes);
+    if (this.programs.size === known) return;
     gl.useProgram(program);
     gl.uniform3fv(uniforms.planeValue, new Float32Array(3 * planes.length).fill(-1));
     const everything = this.texture(new Uint32Array(4), "RGBA32UI", 1);
@@ -221,10 +223,16 @@ export class Raycaster {
   /** Free all of the graphics memory that it has taken. */
   dispose() {
     this.free();
-    this.programs.forEach(({ program }) => this.gl.deleteProgram(program));
-    this.programs.clear();
     this.gl.deleteVertexArray(this.vertices);
   }
+}
+
+const compiled = new WeakMap();
+
+/** The programs that were compiled, by names of their own: all viewers of a page share them. */
+export function programsOf(gl) {
+  if (!compiled.has(gl)) compiled.set(gl, new Map());
+  return compiled.get(gl);
 }
 
 /**

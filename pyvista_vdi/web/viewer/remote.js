@@ -3,6 +3,7 @@
 // The viewer draws what it has. Its view is told to the server, which sends another VDI when it
 // finds that the picture is too far from the volume's: a coarse one first. Each is swapped whole.
 // Where the view rests, the volume's own picture of it is laid over the VDI until it moves again.
+import { htmlElement } from "./html.js";
 
 /** Milliseconds between two messages of a moving view, and without one after which it rests. */
 const VIEW_PERIOD = 50;
@@ -206,13 +207,6 @@ export class RemoteVDI extends EventTarget {
   _status(doing, text) {
     this.dispatchEvent(new CustomEvent("status", { detail: { doing, text } }));
   }
-}
-
-/** Return an element with attributes and children. */
-function htmlElement(name, attributes = {}, ...children) {
-  const made = Object.assign(document.createElement(name), attributes);
-  made.append(...children);
-  return made;
 }
 
 /** Fill a panel with plain controls of what the server offers. */

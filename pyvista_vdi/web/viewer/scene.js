@@ -6,9 +6,10 @@ import { load } from "./loader.js";
 import {
   COPY_SHADER, LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, meshFragmentShader, meshVertexShader,
 } from "./mesh_shader.js";
-import { Raycaster, linked } from "./raycast.js";
+import { Raycaster, linked, programsOf } from "./raycast.js";
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
 import { VERTEX_SHADER } from "./shader.js";
+import { VDIFileError } from "./unpack.js";
 import { cross, dot, subtract, times } from "./vectors.js";
 
 /** Samples of a pixel where meshes are drawn, as in PyVista's windows. */
@@ -447,23 +448,19 @@ export class Scene {
 
 const matrixOf = ({ matrix }) => matrix;
 
-const compiled = new WeakMap(); // programs by graphics: scenes that follow each other share them
-
-function programsOf(gl) {
-  const known = compiled.get(gl)?.values().next().value;
-  // Those of a context that was lost are gone
-  if (!known || !gl.isProgram(known.program)) compiled.set(gl, new Map());
-  return compiled.get(gl);
-}
-
 // -- from bytes to arrays ------------------------------------------------------------------------
 
 // The head and the arrays of a packed scene: deflated, bytes of each array in planes.
 async function unpackedScene(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const buffer = await new Response(stream).arrayBuffer();
-  const length = new DataView(buffer).getUint32(0, true);
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let buffer, length, head;
+  try {
+    buffer = await new Response(stream).arrayBuffer();
+    length = new DataView(buffer).getUint32(0, true);
+    head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  } catch {
+    throw new VDIFileError("the scene beside the VDI is damaged: load it again, or export it anew");
+  }
   const kinds = { Float32Array, Int16Array, Uint8Array, Uint32Array };
   const arrays = head.arrays.map(([name, at, count]) => {
     const Kind = kinds[name], width = Kind.BYTES_PER_ELEMENT;

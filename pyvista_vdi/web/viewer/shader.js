@@ -10,9 +10,9 @@
 import { STACK_SHIFT, TEXTURE_WIDTH } from "./prepare.js";
 
 /** Planes of the user's that a ray can be clipped to. */
-export const MOST_CLIPPING_PLANES = 8;
-/** All of them: box, viewport and eyes, too. */
-export const MOST_PLANES = 12 + MOST_CLIPPING_PLANES;
+export const MOST_CLIPPING_PLANES = 24;
+/** All of them: a scene's for a VDI, box, viewport, eyes and slab, too. WebGL has room for them. */
+export const MOST_PLANES = 14 + 2 * MOST_CLIPPING_PLANES;
 
 /** A triangle that covers the viewport. */
 export const VERTEX_SHADER = `#version 300 es
