@@ -25,10 +25,10 @@ export async function decodingPort() {
     }
   }
   if (!warned) {
-    console.warn(`<vdi-viewer> starts no worker, and decodes on the page's own thread: ${causes.join("; ")}. ` +
-      "Is worker.js there, and allowed by the page's policy (worker-src)?");
+    console.warn("<vdi-viewer> decodes on the page's own thread, as no worker starts: " +
+      `${causes.join("; ")}. Is worker.js there, and does the page's policy allow it (worker-src)?`);
+    warned = true;
   }
-  warned = true;
   const port = { onmessage: null, terminate() {} };
   const scope = { postMessage: (data) => port.onmessage?.({ data }) };
   port.postMessage = (data) => scope.onmessage({ data });
