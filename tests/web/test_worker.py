@@ -97,7 +97,7 @@ def assert_a_worker_starts(chromium, url):
     assert not warnings
 
 
-POLICIES = ["", "default-src 'self'", "script-src 'self' blob:; worker-src blob:"]
+POLICIES = ["", "default-src 'self'", "worker-src 'self'"]
 
 
 @pytest.mark.parametrize("policy", POLICIES)

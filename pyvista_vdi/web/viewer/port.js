@@ -9,7 +9,7 @@ let warned = false;
 /** A worker that listens, or what stands for one on this thread where none may be started. */
 export async function decodingPort() {
   if (idle.length) return idle.pop();
-  const causes = [];
+  const causes = new Set();
   for (const spawn of waysToSpawn) {
     let worker = null;
     try {
@@ -21,12 +21,12 @@ export async function decodingPort() {
       return worker;
     } catch (error) {
       worker?.terminate();
-      causes.push(error.message || "its script cannot be loaded");
+      causes.add(error.message || "its script cannot be loaded");
     }
   }
   if (!warned) {
     console.warn("<vdi-viewer> decodes on the page's own thread, as no worker starts: " +
-      `${causes.join("; ")}. Is worker.js there, and does the page's policy allow it (worker-src)?`);
+      `${[...causes].join("; ")}. Is worker.js there, and does the page's policy allow it (worker-src)?`);
     warned = true;
   }
   const port = { onmessage: null, terminate() {} };
