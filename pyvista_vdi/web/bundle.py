@@ -2,12 +2,11 @@
 
 The modules in ``viewer/`` run as they are, without a build step. Browsers load no module that lies
 beside a page on disk, however, so a page that stands alone holds them as one script: imports and
-exports fall away, and what a module needs comes before it. That asks three things of every module:
+exports fall away, and what a module needs comes before it. What is written otherwise is refused:
 
-- ``import { a, b } from "./x.js";`` is the only form of an import, in one statement;
-- ``export`` stands at the begin of a line, before ``function``, ``async function``, ``class``,
-  ``const`` or ``let``;
-- no two modules have a name at top level in common.
+- ``import { a, b } from "./x.js";`` is the only form of an import; it ends with its semicolon;
+- ``export`` stands before ``function``, ``async function``, ``class``, ``const`` or ``let``;
+- no two modules have a name at top level in common, and none waits there by ``await``.
 
 What runs in a worker, ``worker.js`` and what it imports, stands in a function of its own: its text
 is the worker's program, and where no worker may be started the page calls it itself.
@@ -19,6 +18,9 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import resources
+from typing import NamedTuple
+
+from pyvista_vdi.web.javascript import DOTS, declared, tokens_of
 
 #: The module that is the worker's program, and the one that starts it where modules are files.
 WORKER = "worker.js"
@@ -30,25 +32,29 @@ OF_SERIES = (
     "zstd.js",
 )
 
-#: What takes the place of SPAWN. The text ends with a call of what stands in it.
+#: What takes the place of SPAWN.
 _SPAWN_BUNDLED = """\
-function spawnWorker() {
-  const text = `"use strict";(${workerPart})().serve(self);`;
+export const waysToSpawn = [() => {
+  const text = `"use strict";(${workerPart})();`;
   const url = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
   try {
     return new Worker(url);
   } finally {
     URL.revokeObjectURL(url);
   }
-}
+}];
 """
 
-_IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([\w.]+)";\n', re.MULTILINE)
-_EXPORT = re.compile(r"^export (?=(?:(?:async )?function\*?|class|const|let) (\w+))", re.MULTILINE)
-_TOP_LEVEL = re.compile(
-    r"^(?:(?:async )?function\*?|class|const|let) (\w+)(?=\s*(?:[=(;{]|extends))", re.MULTILINE
-)
-_COMMENT = re.compile(r"^[ \t]*(?://[^\n]*|/\*\*.*?\*/[ \t]*)\n", re.MULTILINE | re.DOTALL)
+_IMPORT = re.compile(r'import \{ ((?:[\w$]+ , )*[\w$]+ (?:, )?)\} from (["\'])\./([\w.]+)\2 ;')
+
+_DECLARE = ("async", "class", "const", "function", "let", "var")
+
+
+class _Module(NamedTuple):
+    text: str  # without imports, exports and comments
+    needs: dict[str, list[str]]  # names that are imported, by module
+    names: list[str]  # at top level
+    exports: dict[str, str]  # names, and what declares them: "const", "function", ...
 
 
 @cache
@@ -82,7 +88,9 @@ def viewer_script(
         if entry.name.endswith(".js")
     }
     if not series:
-        sources |= {name: _absent(sources[name]) for name in OF_SERIES if name in sources}
+        for name in OF_SERIES:
+            exports = _module(name, sources[name]).exports
+            sources[name] = "".join(f"export const {each} = null;\n" for each in exports)
     entries = ["element.js", *["scene.js"] * scene, *["remote.js"] * remote]
     script = bundled(sources, entries)
     return script if module else f'(() => {{\n"use strict";\n{script}}})();\n'
@@ -101,69 +109,99 @@ def bundled(sources: Mapping[str, str], entries: Iterable[str]) -> str:
     Returns
     -------
     str
-        The script, without comments that have lines of their own.
+        The script, without comments and indentation.
 
     Raises
     ------
     ValueError
         If a module is not written as the head of this file asks.
     """
-    bare, names, needs = {}, {}, {}
-    for name, text in sources.items():
-        needs[name] = [module for _, module in _IMPORT.findall(text)]
-        names[name] = _EXPORT.findall(text)
-        bare[name] = _COMMENT.sub("", _EXPORT.sub("", _IMPORT.sub("", text)))
-        if re.search(r"^(import|export)\b", bare[name], re.MULTILINE):
-            raise ValueError(f"{name} has an import or an export of a form that is not bundled")
-    wanted = _in_order(entries, needs)
-    in_worker = _in_order([WORKER], needs) if SPAWN in wanted else []
-    page = [name for name in wanted if name not in in_worker and name != SPAWN]
-    _check_unique({name: bare[name] for name in (*in_worker, *page)})
-    parts = [bare[name] for name in page]
+    if SPAWN in sources:
+        sources = {**sources, SPAWN: _SPAWN_BUNDLED}
+    wanted = _in_order(entries, sources)
+    in_worker = _in_order([WORKER], sources) if SPAWN in wanted else {}
+    modules = in_worker | wanted
+    home = {"workerPart": "the bundle"} if in_worker else {}
+    for name, module in modules.items():
+        for each in module.names:
+            if home.setdefault(each, name) != name:
+                raise ValueError(f"{home[each]} and {name} both have {each} at top level")
+        for needed, names in module.needs.items():
+            if absent := [each for each in names if each not in modules[needed].exports]:
+                raise ValueError(f"{name} imports {absent[0]}, which {needed} does not export")
+        for each, how in module.exports.items():
+            if name in in_worker and how in ("let", "var"):
+                raise ValueError(f"{name} has export {how} {each}: a worker's change of it is lost")
+    script = "".join(module.text for name, module in wanted.items() if name not in in_worker)
     if in_worker:
-        shared = ", ".join(name for module in in_worker for name in names[module])
-        body = "".join(bare[name] for name in in_worker)
-        parts.insert(
-            0,
+        shared = ", ".join(each for module in in_worker.values() for each in module.exports)
+        body = "".join(module.text for module in in_worker.values())
+        script = (
             f"const workerPart = () => {{\n{body}return {{ {shared} }};\n}};\n"
-            f"const {{ {shared} }} = workerPart();\n{_SPAWN_BUNDLED}",
+            f"const {{ {shared} }} = workerPart();\n{script}"
         )
-    script = "".join(parts)
     if re.search(r"</script|<!--", script, re.IGNORECASE):
         raise ValueError("a module holds what would end a <script> or begin a comment of HTML")
     return script
 
 
-def _absent(text: str) -> str:
-    """Return a module in which all that another one exports is null."""
-    return "".join(f"export const {name} = null;\n" for name in _EXPORT.findall(text))
-
-
-def _in_order(entries: Iterable[str], needs: Mapping[str, list[str]]) -> list[str]:
+def _in_order(entries: Iterable[str], sources: Mapping[str, str]) -> dict[str, _Module]:
     """Return modules and what they need, which comes first."""
-    order: list[str] = []
+    order: dict[str, _Module] = {}
 
     def visit(name: str, above: tuple[str, ...]) -> None:
         if name in above:
             raise ValueError(f"modules import each other in a circle: {' -> '.join(above)}")
-        if name not in needs:
+        if name not in sources:
             raise ValueError(
                 f"{above[-1] if above else 'the bundle'} imports {name}, which is none"
             )
         if name not in order:
-            for needed in needs[name]:
+            module = _module(name, sources[name])
+            for needed in module.needs:
                 visit(needed, (*above, name))
-            order.append(name)
+            order[name] = module
 
     for entry in entries:
         visit(entry, ())
     return order
 
 
-def _check_unique(texts: Mapping[str, str]) -> None:
-    home: dict[str, str] = {}
-    for module, text in texts.items():
-        for name in _TOP_LEVEL.findall(text):
-            if name in home:
-                raise ValueError(f"{home[name]} and {module} both have {name} at top level")
-            home[name] = module
+@cache
+def _module(name: str, text: str) -> _Module:
+    """Return a module as the bundle needs it."""
+    tokens = tokens_of(name, text)
+    texts = [token.text for token in tokens]
+    parts, gap, behind = [], "", 1
+    needs: dict[str, list[str]] = {}
+    names: list[str] = []
+    exports: dict[str, str] = {}
+    for k, token in enumerate(tokens):
+        if k < behind:
+            continue
+        word = token.text if token.kind == "word" and texts[k - 1] not in DOTS else ""
+        end = texts.index(";", k) + 1 if word == "import" else k
+        found = _IMPORT.fullmatch(" ".join(texts[k:end])) if token.depth == 0 else None
+        if (
+            (word == "import" and not found)
+            or (word == "export" and texts[k + 1] not in _DECLARE)
+            or (word == "await" and not token.inside)
+        ):
+            form = "".join(part.gap + part.text for part in tokens[k : k + 6]).partition(";")[0]
+            raise ValueError(f"{name} has {form.strip()!r}, of a form that is not bundled")
+        if found:
+            needs.setdefault(found[3], []).extend(re.findall(r"[\w$]+", found[1]))
+            behind = end
+        if found or word == "export":
+            gap = gap or token.gap  # now of what follows, which may begin a statement by it
+            continue
+        parts.append((gap or token.gap) + token.text)
+        gap = ""
+        first = k - (texts[k - 1] == "async")
+        exported = texts[first - 1] == "export"
+        top = token.depth == 0 and (exported or tokens[first].begins)
+        if word in _DECLARE[1:] and (top or (word == "var" and not token.inside)):
+            bound = list(declared(tokens[k:]))
+            names += bound
+            exports |= dict.fromkeys(bound if exported else [], word)
+    return _Module("".join(parts).strip() + "\n", needs, names, exports)

@@ -264,6 +264,66 @@ def test_in_jupyterlab(chromium, lab, vdi):
     context.close()
 
 
+ARROWS = ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown")
+TAKEN = (*ARROWS, *(f"Shift+{key}" for key in ARROWS), "+", "=", "-", "r", "ArrowLeft", "Shift+R")
+
+
+def test_keys_in_jupyterlab(chromium, lab):
+    """In JupyterLab R makes a cell raw, and its output is gone; A and B insert cells, and so on."""
+    context = chromium.new_context(viewport={"width": 900, "height": 1400})
+    notebook = Notebook(context.new_page(), lab[1])
+    page = notebook.page
+
+    def state():
+        """Return the cells' types, which is active and selected, how often it ran, and the mode."""
+        return page.evaluate(
+            """() => {
+              const { content } = jupyterapp.shell.currentWidget;
+              return { types: content.widgets.map(({ model }) => model.type), mode: content.mode,
+                active: content.activeCellIndex, ran: content.activeCell.model.executionCount,
+                selected: content.selectedCells.length };
+            }"""
+        )
+
+    # What the viewer takes it takes alone
+    notebook.run(TURNED)
+    for key in TAKEN:
+        notebook.viewer(TURNED).click()
+        before, camera = state(), notebook.camera(TURNED)
+        page.keyboard.press(key)
+        until(lambda camera=camera: notebook.camera(TURNED) != camera)
+        assert state() == before, key
+    assert before["active"] == TURNED
+    assert before["mode"] == "command"
+    assert before["types"] == ["code"] * len(CELLS)
+
+    # What it does not take does what it does without it, and nothing to the view
+    def press(key, **changes):
+        notebook.viewer(TURNED + added).click()
+        before, camera = state(), notebook.camera(TURNED + added)
+        page.keyboard.press(key)
+        until(lambda: state() == {**before, **changes})
+        return camera
+
+    added = 0
+    camera = press("j", active=TURNED + 1, ran=None)
+    press("Enter", mode="edit")
+    press("Escape")
+    types = ["code"] * (len(CELLS) + 1)
+    press("b", types=types, active=TURNED + 1, ran=None)
+    assert page.evaluate("jupyterapp.shell.currentWidget.context.model.dirty")
+    notebook.viewer(TURNED).click()
+    page.keyboard.press("Control+s")
+    until(lambda: not page.evaluate("jupyterapp.shell.currentWidget.context.model.dirty"))
+    assert notebook.camera(TURNED) == camera
+    press("a", types=[*types, "code"], active=TURNED, ran=None)
+    added = 1
+    press("Shift+Enter", active=TURNED + 2, ran=None)
+    notebook.run(READ + added)  # the kernel has run the other as well
+    press("m", types=["code", "markdown", *types[1:]], ran=None)
+    context.close()
+
+
 def pictures_in(path):
     """Return the pictures that a notebook's file holds, by cell."""
     found = {}

@@ -1,27 +1,39 @@
 // The worker that decodes, or what stands for one on the page's own thread.
-import { spawnWorker } from "./spawn.js";
+import { waysToSpawn } from "./spawn.js";
 import { VDIFileError } from "./unpack.js";
 import { serve } from "./worker.js";
 
 const idle = []; // workers that have nothing to do
+let warned = false;
 
 /** A worker that listens, or what stands for one on this thread where none may be started. */
 export async function decodingPort() {
   if (idle.length) return idle.pop();
-  try {
-    const worker = spawnWorker();
-    await new Promise((resolve, reject) => {
-      worker.onmessage = resolve;
-      worker.onerror = reject;
-    });
-    return worker;
-  } catch {
-    const port = { onmessage: null, terminate() {} };
-    const scope = { postMessage: (data) => port.onmessage?.({ data }) };
-    port.postMessage = (data) => scope.onmessage({ data });
-    serve(scope);
-    return port;
+  const causes = new Set();
+  for (const spawn of waysToSpawn) {
+    let worker = null;
+    try {
+      worker = spawn();
+      await new Promise((resolve, reject) => {
+        worker.onmessage = resolve;
+        worker.onerror = reject;
+      });
+      return worker;
+    } catch (error) {
+      worker?.terminate();
+      causes.add(error.message || "its script cannot be loaded");
+    }
   }
+  if (!warned) {
+    console.warn("<vdi-viewer> decodes on the page's own thread, as no worker starts: " +
+      `${[...causes].join("; ")}. Is worker.js there, and does the page's policy allow it (worker-src)?`);
+    warned = true;
+  }
+  const port = { onmessage: null, terminate() {} };
+  const scope = { postMessage: (data) => port.onmessage?.({ data }) };
+  port.postMessage = (data) => scope.onmessage({ data });
+  serve(scope);
+  return port;
 }
 
 /** Give back a port that has nothing to do. */

@@ -34,3 +34,5 @@ export function serve(scope) {
   };
   scope.postMessage({ ready: true });
 }
+
+if ("WorkerGlobalScope" in globalThis) serve(self);
