@@ -27,8 +27,11 @@ NAMES = ("chromium", "chromium-browser", "google-chrome")
 #: The same without windows, Debian's: tests with it take two thirds of the time.
 WITHOUT_WINDOWS = "chromium-headless-shell"
 
-#: Software WebGL; a container's root has no sandbox.
-FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
+#: Software WebGL; a container's root has no sandbox; what scrolls is where it is to be at once.
+FLAGS = (
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+    *("--no-sandbox", "--disable-smooth-scrolling"),
+)
 
 #: Where pages are, and the viewer's modules beside them; nothing leaves the machine.
 SITE = "http://vdi.test/"

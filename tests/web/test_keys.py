@@ -64,6 +64,7 @@ class Pressed:
               }
               document.querySelector("div").tabIndex = 0;
               document.body.style.height = "5000px";
+              scrollTo(0, 0); // wherever the test before went
             }"""
         )
 

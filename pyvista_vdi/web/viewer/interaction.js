@@ -66,11 +66,12 @@ export function hearKeys(root, take, signal) {
   const hear = (event) => {
     const [target, ...around] = event.composedPath();
     if (!around.includes(root)) return;
-    if (event.type === "keydown" ? !take(event, target) : !taken.delete(event.code)) return;
-    if (event.type === "keydown") taken.add(event.code);
+    if (event.type === "keydown" && take(event, target)) taken.add(event.code);
+    else if (event.type === "keydown" || !taken.has(event.code)) return;
+    if (event.type === "keyup") taken.delete(event.code);
     event.stopImmediatePropagation();
   };
-  for (const type of ["keydown", "keyup"]) {
+  for (const type of ["keydown", "keypress", "keyup"]) {
     window.addEventListener(type, hear, { capture: true, signal });
   }
 }

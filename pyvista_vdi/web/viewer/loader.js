@@ -1,6 +1,6 @@
 // A file from wherever it is to prepared levels: read piece by piece, decoded in a worker.
 import { beginsAsSeries } from "./frames.js";
-import { askPort, decodingPort, releasePort } from "./port.js";
+import { askPort, borrowPort, returnPort } from "./port.js";
 import { Series } from "./series.js";
 import { VDIFileError } from "./unpack.js";
 
@@ -34,7 +34,7 @@ export async function load(
   });
   aborted.catch(() => {});
   const unlessAborted = (promise) => Promise.race([aborted, promise]);
-  const began = decodingPort(); // it starts while the first bytes come
+  const began = borrowPort(); // it starts while the first bytes come
   let working = false; // whether it has been told what it has not finished
   let pieces = null;
   try {
@@ -69,7 +69,7 @@ export async function load(
     working = false;
   } finally {
     pieces?.return().catch(() => {});
-    began.then((port) => working ? port.terminate() : releasePort(port));
+    began.then((port) => returnPort(port, working));
   }
 }
 

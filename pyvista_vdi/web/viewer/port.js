@@ -3,7 +3,12 @@ import { waysToSpawn } from "./spawn.js";
 import { VDIFileError } from "./unpack.js";
 import { serve } from "./worker.js";
 
+/** Files that are decoded at a time, as many as browsers fetch at a time. */
+const MOST_FILES = 6;
+
 const idle = []; // workers that have nothing to do
+const waiting = []; // what goes on when another file is done
+let lent = 0;
 let warned = false;
 
 /** A worker that listens, or what stands for one on this thread where none may be started. */
@@ -40,6 +45,20 @@ export async function decodingPort() {
 export function releasePort(port) {
   port.onmessage = port.onerror = null;
   if (port instanceof Worker) idle.push(port);
+}
+
+/** A port for one file, as soon as no more than MOST_FILES have one. */
+export async function borrowPort() {
+  if (lent >= MOST_FILES) await new Promise((resolve) => waiting.push(resolve));
+  else ++lent;
+  return decodingPort();
+}
+
+/** Give it back, or end it where it still works. */
+export function returnPort(port, works) {
+  works ? port.terminate() : releasePort(port);
+  const next = waiting.shift();
+  next ? next() : --lent;
 }
 
 /**
