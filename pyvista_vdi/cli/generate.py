@@ -111,9 +111,9 @@ def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:
         return camera(options, filling_camera(volume.bounds, options.size))
     if not abs(ELEVATION + options.elevation) < 90:
         raise InvalidArgumentError(
-            f"--elevation lifts the view, {ELEVATION:g} degrees above the volume's middle, "
-            f"to 90 degrees at most, both ways, excluded; got {options.elevation:g}: choose less, "
-            "or give a --position"
+            f"--elevation must lie between {-90 - ELEVATION:g} and {90 - ELEVATION:g} degrees, "
+            f"both excluded, for a view that is {ELEVATION:g} degrees above the volume's middle "
+            f"without it; got {options.elevation:g}: choose another, or give a --position"
         )
     return filling_camera(
         volume.bounds,
