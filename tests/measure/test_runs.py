@@ -55,6 +55,17 @@ def generated(monkeypatch):
     return asked, errors
 
 
+def test_a_volume_that_cannot_be_read_is_said(tmp_path, capsys, monkeypatch, default_runtime):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "no.nrrd").touch()
+    command = "benchmark --datasets empty no.nrrd --no-vtk --out a.json"
+    assert cli.main(command.split()) == 0  # the others would have been measured
+    said = capsys.readouterr().err
+    assert "left out: empty (InvalidVolumeError: the folder empty holds no slices" in said
+    assert "left out: no (InvalidVolumeError: no.nrrd cannot be read as NRRD: it is empty" in said
+
+
 def test_the_engine_alone_can_run_it(verb, default_runtime, tmp_path):
     file = tmp_path / "ball_11x10x12_uint16.raw"
     file.write_bytes(np.load("ball.npy").tobytes())
