@@ -348,8 +348,13 @@ def read_nrrd(file: Path, quantity: str) -> Volume:
 
     try:
         array, header = nrrd.read(str(file), index_order="C")
-    except (nrrd.NRRDError, OSError, ValueError, EOFError) as error:
-        raise InvalidVolumeError(f"{file} cannot be read as NRRD: {error}") from error
+    except MemoryError:
+        raise
+    except Exception as error:  # of many kinds, StopIteration of an empty file among them
+        reason = str(error) or "it is empty, or cut off"
+        raise InvalidVolumeError(
+            f"{file} cannot be read as NRRD: {reason}; write it anew by nrrd.write"
+        ) from error
     # Where a CPU device reads it without a copy of its own
     aligned = aligned_empty(array.shape, array.dtype.newbyteorder("="))
     aligned[...] = array

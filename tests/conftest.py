@@ -109,7 +109,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 #: `tools/README.md` says which mutants of the kernels that lets live.
 LENGTHY = {
     "api": "api engine_errors",
-    "cli": "cli",
+    "cli": "cli wrong_values",
     "extremes": "entries media scenes vdis views volumes",
     "faults": "device_faults",
     "generation": "generation_oracle march_blocks records",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
 from pyvista_vdi import examples
 from pyvista_vdi.cli.inputs import has_vtk, measuring, require_new, say_written
+from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import check_writable
 from pyvista_vdi.measure.paper import (
@@ -32,6 +34,10 @@ def benchmark(options: argparse.Namespace) -> int:
     finally:
         tables = results.path.with_suffix(".md")
         write_text(tables, describe(results.data))
+    for row in results.rows(what="volume"):
+        if "refused" in row:
+            left_out = printable(f"{row['case']['volume']} ({row['refused']})")
+            print(f"left out: {left_out}", file=sys.stderr)
     say_written([results.path, tables])
     return 0
 

@@ -55,8 +55,7 @@ def compare(options: argparse.Namespace) -> int:
         name=stem,
     )
     volume = read_volume(options)
-    files = output_files(options, stem, "vdi", "png", "json")
-    with measuring("comparing") as bar:
+    with output_files(options, stem, "vdi", "png", "json") as files, measuring("comparing") as bar:
         report, vdi, images = measure(volume, settings, bar)
     vdi.save(files["vdi"], compression=options.compression)
     sizes = {**report.sizes, "file_bytes": files["vdi"].stat().st_size}
@@ -74,11 +73,13 @@ def _front(options: argparse.Namespace) -> int:
     refuse(options, of_one, "one volume, and --front measures all")
     from pyvista_vdi import examples
 
-    files = output_files(options, "front", "json", "md")
-    require_new(files["json"], options)
     more = {"window_size": options.size, "repeats": options.repeats}
     plan = Plan.quick(**more) if options.quick else Plan(examples.WHOLE, **more)
-    with measuring("front", files["json"]) as bar:
+    with (
+        output_files(options, "front", "json", "md") as files,
+        measuring("front", files["json"]) as bar,
+    ):
+        require_new(files["json"], options)
         found = measure_front(
             plan, files["json"], resume=options.resume, device=options.device, progress=bar
         )

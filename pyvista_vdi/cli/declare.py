@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
-from pyvista_vdi.model.checks import memory_limit_bytes
+from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
+
+#: More than any screen shows.
+MOST_FRAMES_PER_SECOND = 1000
 
 #: Where options go: a verb's parser, or a group of it.
 Options = argparse._ActionsContainer
@@ -39,14 +43,30 @@ def parse_size(text: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
+def parse_number(text: str) -> float:
+    """Return a number, which neither NaN nor infinity is."""
+    number = as_float(text)
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"expected a number, like 0.5; got {text!r}")
+    return number
+
+
+def parse_whole(text: str) -> int:
+    """Return a whole number."""
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number; got {text!r}") from None
+
+
 def parse_numbers(text: str) -> tuple[float, ...]:
     """Return numbers from ``0,5,30``."""
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError as error:
+    numbers = tuple(as_float(part) for part in text.split(","))
+    if not all(map(math.isfinite, numbers)):
         raise argparse.ArgumentTypeError(
             f"expected numbers with commas between them, like 0,5,30; got {text!r}"
-        ) from error
+        )
+    return numbers
 
 
 def parse_bytes(text: str) -> int | None:
@@ -99,10 +119,12 @@ def parse_rate(text: str) -> float:
 
 
 def parse_frames_per_second(text: str) -> float:
-    """Return frames per second, above 0."""
+    """Return frames per second of what moves."""
     rate = parse_rate(text)
-    if rate == 0:
-        raise argparse.ArgumentTypeError("expected frames per second, above 0; got 0")
+    if not 0 < rate <= MOST_FRAMES_PER_SECOND:
+        raise argparse.ArgumentTypeError(
+            f"expected frames per second, above 0 and up to {MOST_FRAMES_PER_SECOND}; got {text!r}"
+        )
     return rate
 
 
@@ -205,13 +227,13 @@ def grid(options: Options) -> None:
     """Add where a volume's voxels lie, and what is taken of a store of chunks."""
     xyz = ("X", "Y", "Z")
     text = "between voxels, in place of what the volume's file says (1 where it says nothing)"
-    option(options, "--spacing", text, xyz, float, nargs=3)
-    option(options, "--origin", "of its first voxel, in the same way", xyz, float, nargs=3)
+    option(options, "--spacing", text, xyz, parse_number, nargs=3)
+    option(options, "--origin", "of its first voxel, in the same way", xyz, parse_number, nargs=3)
     text = "of a multi-scale store: 0 is the finest; auto (default): what the view requires"
     option(options, "--level", text, "auto|N", parse_level)
     option(options, "--channel", "of a store (default: 0)", "N|NAME", parse_channel)
     text = "of a store: which step (default: 0; of a series or a server all)"
-    option(options, "--time-index", text, "N", int)
+    option(options, "--time-index", text, "N", parse_whole)
 
 
 def array(options: Options) -> None:
@@ -229,9 +251,8 @@ def size(options: Options, default: tuple[int, int] | None) -> None:
 
 def time(options: Options) -> None:
     """Add which step of a series to show."""
-    option(
-        options, "--time", "of a series, the step nearest in time (default: the first)", "T", float
-    )
+    text = "of a series, the step nearest in time (default: the first)"
+    option(options, "--time", text, "T", parse_number)
 
 
 def angles(options: Options, text: str, default: tuple[float, ...] | None = None) -> None:
@@ -259,13 +280,13 @@ def camera(parser: argparse.ArgumentParser, default: str) -> None:
         ("--focal-point", "point looked at, world coordinates"),
         ("--view-up", "direction that is up"),
     ):
-        option(group, name, text, ("X", "Y", "Z"), float, nargs=3)
-    option(group, "--view-angle", "vertical, full", "DEGREES", float)
+        option(group, name, text, ("X", "Y", "Z"), parse_number, nargs=3)
+    option(group, "--view-angle", "vertical, full", "DEGREES", parse_number)
     parallel = "half the viewport's height in world units; makes the projection parallel"
-    option(group, "--parallel-scale", parallel, "LENGTH", float)
+    option(group, "--parallel-scale", parallel, "LENGTH", parse_number)
     option(group, "--camera-json", "Camera.to_dict() as JSON", "FILE")
-    option(group, "--azimuth", "turn by", "DEGREES", float, default=0.0)
-    option(group, "--elevation", "lift by", "DEGREES", float, default=0.0)
+    option(group, "--azimuth", "turn by", "DEGREES", parse_number, default=0.0)
+    option(group, "--elevation", "lift by", "DEGREES", parse_number, default=0.0)
 
 
 def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
@@ -277,16 +298,16 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     option(group, "--tf", standard, choices=tuple(TRANSFER_FUNCTIONS))
     option(group, "--cmap", "colour map", "NAME")
     option(group, "--opacity", "name, or values from 0 to 1", "NAME|A,B,...", parse_opacity)
-    option(group, "--clim", None, ("LOW", "HIGH"), float, nargs=2)
-    option(group, "--n-colors", None, "N", int)
+    option(group, "--clim", None, ("LOW", "HIGH"), parse_number, nargs=2)
+    option(group, "--n-colors", None, "N", parse_whole)
     switch(group, "--flip-scalars", default=None)
     switch(group, "--log-scale", default=None)
-    option(group, "--opacity-unit-distance", None, "LENGTH", float)
+    option(group, "--opacity-unit-distance", None, "LENGTH", parse_number)
     array(group)
     option(group, "--interpolation", None, choices=("nearest", "linear"))
     switch(group, "--shade", "lit by a headlight", default=None)
     for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
-        option(group, name, "of a shaded volume", "X", float)
+        option(group, name, "of a shaded volume", "X", parse_number)
     if tables:
         text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
         option(group, "--transfer-function", text, "FILE")
@@ -297,19 +318,19 @@ def occlusion(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
     switch(group, "--ambient-occlusion", "darken what is hidden from the light around it")
     radius = "how far something hides, model units (default: 0.05 of the bounds' diagonal)"
-    option(group, "--occlusion-radius", radius, "LENGTH", float)
+    option(group, "--occlusion-radius", radius, "LENGTH", parse_number)
     strength = "0 to 1 (default: 0.1; 1 is darkest)"
-    option(group, "--occlusion-strength", strength, "S", float)
+    option(group, "--occlusion-strength", strength, "S", parse_number)
 
 
 def longest(options: Options, text: str | None = None, default: int = 20) -> None:
     """Add how long lists may be."""
-    option(options, "--max-supersegments", text, "N", int, default=default)
+    option(options, "--max-supersegments", text, "N", parse_whole, default=default)
 
 
 def step(options: Options, text: str | None = None) -> None:
     """Add how finely the volume is sampled."""
-    option(options, "--sample-distance", text, "LENGTH", float)
+    option(options, "--sample-distance", text, "LENGTH", parse_number)
 
 
 def limits(parser: argparse.ArgumentParser) -> None:
@@ -325,9 +346,9 @@ def limits(parser: argparse.ArgumentParser) -> None:
         default="least-error",
     )
     step(group, "step along the ray, model units (default: half the smallest spacing)")
-    option(group, "--tolerance", "error traded for length", kind=float, default=0.0)
+    option(group, "--tolerance", "error traded for length", kind=parse_number, default=0.0)
     cone = "half angle of the cone of new views to serve (default: 60)"
-    option(group, "--view-cone", cone, "DEGREES", float, default=60.0)
+    option(group, "--view-cone", cone, "DEGREES", parse_number, default=60.0)
     memory_limit(group)
 
 
@@ -357,12 +378,12 @@ def dial(parser: argparse.ArgumentParser) -> None:
         f"SSIM of {known} against volume rendering; reference: what is made without a dial",
         choices=tuple(QUALITIES),
     )
-    option(group, "--target-ssim", "the same by a number", "S", float)
-    option(group, "--target-fps", "least full frames per second", "RATE", float)
+    option(group, "--target-ssim", "the same by a number", "S", parse_number)
+    option(group, "--target-fps", "least full frames per second", "RATE", parse_number)
     most = "most bytes on the device, like 20MB; files are smaller"
     option(group, "--max-bytes", most, "SIZE", parse_bytes)
     turn = f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})"
-    option(group, "--target-angle", turn, "DEGREES", float, default=TARGET_ANGLE)
+    option(group, "--target-angle", turn, "DEGREES", parse_number, default=TARGET_ANGLE)
 
 
 def file_format(parser: argparse.ArgumentParser) -> None:
@@ -376,7 +397,7 @@ def file_format(parser: argparse.ArgumentParser) -> None:
         choices=("lz4", "zstd", "deflate", "zips", "zlib", "lzma", "none"),
     )
     level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
-    option(group, "--compression-level", level, "N", int)
+    option(group, "--compression-level", level, "N", parse_whole)
     option(
         group,
         "--precision",

@@ -17,7 +17,7 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
     say_vdi,
 )
-from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
@@ -109,6 +109,12 @@ def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:
     """Return V_O: the options' own view, or the one that the volume fills, turned as asked."""
     if has_own_place(options):
         return camera(options, filling_camera(volume.bounds, options.size))
+    if not abs(ELEVATION + options.elevation) < 90:
+        raise InvalidArgumentError(
+            f"--elevation must lie between {-90 - ELEVATION:g} and {90 - ELEVATION:g} degrees, "
+            f"both excluded, for a view that is {ELEVATION:g} degrees above the volume's middle "
+            f"without it; got {options.elevation:g}: choose another, or give a --position"
+        )
     return filling_camera(
         volume.bounds,
         options.size,

@@ -7,7 +7,7 @@ import json
 import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Event, Thread
@@ -161,7 +161,9 @@ def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: st
 
 def volume_name(options: argparse.Namespace) -> str:
     """Return a short name of the volume, for files and reports."""
-    return options.example or Path(options.file).resolve().name.split(".")[0]
+    if options.example is not None:
+        return str(options.example)
+    return Path(options.file).resolve().name.split(".")[0]
 
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:
@@ -186,16 +188,27 @@ def has_vtk(options: argparse.Namespace) -> bool:
     return not options.no_vtk
 
 
-def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> dict[str, Path]:
-    """Return where ``--out`` has the files go, after finding that they can be written there."""
+@contextmanager
+def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterator[dict[str, Path]]:
+    """Yield where ``--out`` has the files go, after finding that they can be written there.
+
+    A folder that is made for them, and into which nothing is written, is gone again.
+    """
     folder = Path(options.out)
+    made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise VDIFileError(
             f"the folder {folder} cannot be made: {error.strerror}; choose another --out"
         ) from error
-    return {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+    try:
+        yield {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+    except BaseException:
+        if made:
+            with suppress(OSError):  # something is there
+                folder.rmdir()
+        raise
 
 
 def require_new(path: Path, options: argparse.Namespace) -> None:
@@ -310,7 +323,9 @@ def from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _T
         state = json.loads(Path(path).read_text(encoding="utf-8"))
         return build(state)
     except OSError as error:
-        raise InvalidArgumentError(f"{path} cannot be read: {error.strerror or error}") from error
+        raise InvalidArgumentError(
+            f"the {kind} {path} cannot be read: {error.strerror or error}; check the file's name"
+        ) from error
     except (ValueError, RecursionError) as error:
         raise InvalidArgumentError(
             f"{path} is no {kind} in JSON ({error}): write one by json.dump(x.to_dict(), file)"

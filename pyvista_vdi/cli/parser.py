@@ -68,7 +68,7 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
     UsageError
         If they make no sense; the message suggests what may have been meant.
     """
-    parser, verbs = _make_parser()
+    parser, verbs = _make_parser(arguments[0] if arguments else "")
     if not arguments:
         print(_LESSON, end="")
         return None
@@ -124,7 +124,8 @@ def _suggestion(name: str, known: Sequence[str]) -> str:
     return f"known are {', '.join(names)}" if len(names) <= _LISTED else "see --help"
 
 
-def _make_parser() -> tuple[_Parser, dict[str, _Parser]]:
+def _make_parser(asked: str) -> tuple[_Parser, dict[str, _Parser]]:
+    """Return the parser and those of all verbs, of which only the one that is asked has options."""
     parser = _Parser(
         prog="pyvista-vdi",
         description=_DESCRIPTION,
@@ -143,7 +144,8 @@ def _make_parser() -> tuple[_Parser, dict[str, _Parser]]:
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )
-        add_options(verbs[name])
+        if name == asked:
+            add_options(verbs[name])
         verbs[name].set_defaults(run=run_verb, module=module)
     return parser, verbs
 
@@ -182,7 +184,7 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     view = "the view that the image shows, where it does not say it: Camera.to_dict() as JSON"
     declare.option(group, "--camera-json", view, "FILE")
     thickness = "world units, given to samples that have none (surfaces)"
-    declare.option(group, "--thickness", thickness, "LENGTH", float)
+    declare.option(group, "--thickness", thickness, "LENGTH", declare.parse_number)
     declare.switch(group, "--from-linear", "the colours are linear light: show it by sRGB's curve")
 
 
@@ -225,7 +227,7 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
         "end rays where less than this is left, 0 to below 1 (0.000001): what a channel may "
         "lose; VTK's mappers stop at about 0.004. For a single file",
         "LIGHT",
-        float,
+        declare.parse_number,
     )
     declare.time(parser)
     declare.camera(parser, "the VDI's generating view")
@@ -294,7 +296,7 @@ def _add_frames(parser: argparse.ArgumentParser, frames: str) -> None:
 def _add_turntable(parser: argparse.ArgumentParser) -> None:
     _add_frames(parser, "of the whole turn (default: four seconds of them)")
     text = "turn by so many in all, about the view's up direction (default: 360)"
-    declare.option(parser, "--degrees", text, "DEGREES", float, default=360.0)
+    declare.option(parser, "--degrees", text, "DEGREES", declare.parse_number, default=360.0)
     declare.camera(parser, "the first view is the VDI's own, or one that the volume fills")
     declare.classification(parser)
     declare.device(parser)
@@ -309,7 +311,7 @@ def _add_movie(parser: argparse.ArgumentParser) -> None:
     text = "views to fly along, each Camera.to_dict() as JSON; two at least"
     declare.option(parser, "--path", text, "FILE", nargs="+")
     text = "turn by so many meanwhile, about the view's up direction (default: 0)"
-    declare.option(parser, "--turn", text, "DEGREES", float, default=0.0)
+    declare.option(parser, "--turn", text, "DEGREES", declare.parse_number, default=0.0)
     declare.camera(parser, "the first view is the VDI's own, or one that the volume fills")
     declare.classification(parser)
     declare.device(parser)
@@ -329,7 +331,7 @@ def _add_serve(parser: argparse.ArgumentParser) -> None:
     text = "most lists of a VDI (default: 1280x720)"
     declare.option(group, "--lists", text, "WxH", declare.parse_size, default=(1280, 720))
     below = "estimated SSIM below which a view gets a VDI of its own (default: 0.95)"
-    declare.option(group, "--regenerate-below", below, "SSIM", float, default=0.95)
+    declare.option(group, "--regenerate-below", below, "SSIM", declare.parse_number, default=0.95)
     declare.classification(parser)
     declare.occlusion(parser)
     group = parser.add_argument_group("limits")
@@ -354,14 +356,14 @@ def _add_series(parser: argparse.ArgumentParser) -> None:
         "what colours times opacity, and opacities, of a supersegment may differ by, 0 to 1, where "
         "that saves bytes (default: 0, every bit is kept)"
     )
-    declare.option(group, "--tolerance", text, "T", float, default=0.0)
+    declare.option(group, "--tolerance", text, "T", declare.parse_number, default=0.0)
     text = "most steps from one that needs no other to the next (default: 16)"
     declare.option(group, "--key-every", text, "N", declare.parse_count, default=16)
     text = "of the supersegments (default: 8-byte, the only one that is written by differences)"
     declare.option(group, "--precision", text, choices=PRECISIONS)
     text = "zstd (default), lz4, deflate or none"
     declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))
-    declare.option(group, "--compression-level", "1 (fast) to 9 (small)", "N", int)
+    declare.option(group, "--compression-level", "1 (fast) to 9 (small)", "N", declare.parse_whole)
     group = parser.add_argument_group("volumes", "What VDIs are made of them; not for VDIs.")
     declare.grid(group)
     declare.size(group, WINDOW_SIZE)
@@ -380,14 +382,14 @@ def _add_set(parser: argparse.ArgumentParser) -> None:
     declare.size(parser, (640, 360))
     group = parser.add_argument_group("goal")
     ssim = "SSIM of every direction against volume rendering (default: 0.98)"
-    declare.option(group, "--target-ssim", ssim, "S", float)
+    declare.option(group, "--target-ssim", ssim, "S", declare.parse_number)
     most = "most bytes of the file, like 70MB; goes before the SSIM"
     declare.option(group, "--max-bytes", most, "SIZE", declare.parse_bytes)
     most = "most VDIs (default: 400)"
     declare.option(group, "--max-views", most, "N", declare.parse_count)
     group = parser.add_argument_group("lists", "By default a short measurement chooses them.")
-    declare.option(group, "--lists", "lists per pixel along an edge", "N", float)
-    declare.option(group, "--max-supersegments", "longest list", "N", int)
+    declare.option(group, "--lists", "lists per pixel along an edge", "N", declare.parse_number)
+    declare.option(group, "--max-supersegments", "longest list", "N", declare.parse_whole)
     declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
     declare.memory_limit(group)
     declare.camera(parser, "the view that the volume fills; it tells distance, lens and up")
@@ -473,7 +475,7 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--interpolation", "(nearest)", choices=("nearest", "linear"))
     declare.option(group, "--seed", "of the made volumes (1)", "N", declare.parse_count)
     tables = "which of the paper's tables (both)"
-    declare.option(group, "--tables", tables, kind=int, nargs="+", choices=(1, 2))
+    declare.option(group, "--tables", tables, kind=declare.parse_whole, nargs="+", choices=(1, 2))
     declare.no_vtk(parser)
     declare.device(parser)
 

@@ -68,7 +68,9 @@ def render(options: argparse.Namespace) -> int:
 
 def view(options: argparse.Namespace) -> int:
     """Open a plotter on a VDI, or write what it shows."""
-    screenshot = options.screenshot and str(checked_png_target(options.screenshot))
+    screenshot = None
+    if options.screenshot is not None:
+        screenshot = str(checked_png_target(options.screenshot))
     if screenshot is None and (trouble := why_no_window()) is not None:
         raise UnsupportedError(
             f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"

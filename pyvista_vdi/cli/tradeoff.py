@@ -45,10 +45,12 @@ def tradeoff(options: argparse.Namespace) -> int:
     if Path(name).name != name:
         raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
     volume = read_volume(options)
-    files = output_files(options, f"tradeoff-{name}", "json", "md", "png")
-    require_new(files["json"], options)
     vtk = has_vtk(options)
-    with measuring("tradeoff", files["json"]) as bar:
+    with (
+        output_files(options, f"tradeoff-{name}", "json", "md", "png") as files,
+        measuring("tradeoff", files["json"]) as bar,
+    ):
+        require_new(files["json"], options)
         found = measure_tradeoff(
             volume,
             settings,

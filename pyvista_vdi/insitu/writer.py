@@ -17,7 +17,7 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.large.on_mpi import checked_ranks, generate_on_mpi, mpi, require_same, together
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_whole, not_taken
+from pyvista_vdi.model.checks import as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
@@ -148,17 +148,9 @@ class InSitu:
         self._looks = Classification(looks, "InSitu", GENERATION_NAMES)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
-        try:
-            x, y, z = (as_whole(n) for n in dimensions)
-        except (TypeError, ValueError):
-            x = y = z = np.nan
-        if not (x >= 2 and y >= 2 and z >= 2):
-            raise InvalidArgumentError(
-                "dimensions must be three whole numbers, the points along x, y and z, 2 at least; "
-                f"got {dimensions!r}"
-            )
+        points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
         of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
-        self._grid = Grid((int(x), int(y), int(z)), of.spacing, of.origin, of.direction)
+        self._grid = Grid(points, of.spacing, of.origin, of.direction)
 
     def _begin(self, append: bool, overwrite: bool) -> None:
         """Begin the file, or find where single files go on; on the first rank."""
@@ -261,8 +253,12 @@ class InSitu:
     def __enter__(self) -> InSitu:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:  # maybe on this rank alone
+            self.close()
+            return
+        with together(self._comm, "closing the file"):
+            self.close()
 
 
 def _checked_path(path: Any) -> str:

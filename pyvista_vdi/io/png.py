@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.io.whole_file import check_writable, whole_file, with_suffix
+from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.model.metrics import over_background
 
 #: The name that a picture's name ends in.
@@ -76,7 +76,7 @@ def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
     """
     from PIL import Image
 
-    target = with_suffix(Path(path), (PNG_SUFFIX,), "a picture")
+    target = with_suffix(as_path(path), (PNG_SUFFIX,), "a picture")
     with whole_file(target) as stream:
         Image.fromarray(pixels).save(stream, format="png")
     return target
@@ -84,4 +84,4 @@ def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
 
 def checked_png_target(path: str | os.PathLike[str]) -> Path:
     """Raise VDIFileError now if a picture could not be written there later."""
-    return check_writable(with_suffix(Path(path), (PNG_SUFFIX,), "a picture"))
+    return check_writable(with_suffix(as_path(path), (PNG_SUFFIX,), "a picture"))

@@ -272,7 +272,8 @@ def open_volume(
         store = _open_zarr(outer, inner)
     number, why = _chosen(store, level, camera, window_size)
     no_time = np.array_equal(time, 0)  # whatever else it is, a number or not
-    if no_time and not (store.named or "c" in store.axes or isinstance(channel, str)):
+    either = "t" in store.axes and "c" not in store.axes and not store.named
+    if either and no_time and not isinstance(channel, str):
         time, channel = channel, 0  # of four axes without names the first may be either
     return StoredVolume(store, number, why, time, channel)
 

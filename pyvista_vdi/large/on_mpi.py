@@ -33,7 +33,7 @@ from pyvista_vdi.large.generate import NOWHERE, vdi_of
 from pyvista_vdi.large.passes import Piece, Task, light_entering
 from pyvista_vdi.large.rows import balanced
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_whole
+from pyvista_vdi.model.checks import three_wholes
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import GenerationOptions
@@ -45,6 +45,8 @@ from pyvista_vdi.model.volume import Volume
 _HALO_TAG = 7100
 #: Ranks that a message tells the blocks of.
 _MOST_NAMED = 8
+#: What ``first`` is, for who gives something else.
+_FIRST = "first must be the index x, y, z of the block's first point in the whole grid"
 
 
 def mpi() -> Any:
@@ -152,8 +154,9 @@ def generate_on_mpi(
         options = GenerationOptions.of(options, changes)
         own = Volume(values, name=name).load()
         size, camera = check_window_size(window_size), Camera.from_any(camera)
-        first = checked_first(first)
+        first = three_wholes(first, _FIRST, 0)
         get_runtime(device)
+        own_ends = own.finite_range() if np.isfinite(own.array).any() else (np.nan, np.nan)
     require_same(
         comm,
         camera=camera.to_dict(),
@@ -165,8 +168,7 @@ def generate_on_mpi(
         values=(f"of type {own.array.dtype}", own.array.shape[3:]),
     )
     blocks, ranks = _blocks(comm, grid, own.dimensions, first)
-    ends = comm.allgather(own.finite_range() if np.isfinite(own.array).any() else (np.nan,) * 2)
-    low, high = zip(*ends, strict=True)
+    low, high = zip(*comm.allgather(own_ends), strict=True)
     scalars = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
     task = Task.of(blocks, camera, size, transfer_function, options, scalars)
     places = {rank: at for at, rank in ranks.items()}
@@ -194,10 +196,12 @@ def generate_on_mpi(
             whole = blocks.with_halo(own.array, parts, task.halo)
             piece = task.second_pass(block, whole, window, light, device, ambient)
     ranges, counted = _ranges(comm, task, piece, light is not None)
-    sent = [
-        piece.rows(*ranges[r]) if light is not None and r < len(ranges) else None
-        for r in range(comm.size)
-    ]
+    sent: list[Piece | None] = []
+    with together(comm, "cutting the lists into rows"):
+        sent = [
+            piece.rows(*ranges[r]) if light is not None and r < len(ranges) else None
+            for r in range(comm.size)
+        ]
     received = comm.alltoall(sent)
     rows = None
     with together(comm, "merging"):
@@ -294,26 +298,6 @@ def require_same(comm: Any, **things: Any) -> None:
                 )
 
 
-def checked_first(first: Any) -> tuple[int, int, int]:
-    """Return the index x, y, z of a block's first point.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it is none.
-    """
-    try:
-        x, y, z = (as_whole(k) for k in first)
-    except (TypeError, ValueError):
-        x = y = z = np.nan
-    if not (x >= 0 and y >= 0 and z >= 0):
-        raise InvalidArgumentError(
-            "first must be the index x, y, z of the block's first point in the whole grid, three "
-            f"whole numbers from 0; got {first!r}"
-        )
-    return int(x), int(y), int(z)
-
-
 def _blocks(
     comm: Any, grid: Grid, points: Sequence[int], first: Sequence[int]
 ) -> tuple[Blocks, dict[Indices, int]]:
@@ -353,12 +337,14 @@ def _exchanged(
     slabs: Mapping[tuple[int, int], Values],
 ) -> dict[Offset, Values]:
     """Return what a block needs of its neighbours' points, which they send."""
-    halo, requests = task.halo, []
-    for number, offset in enumerate(halo.offsets()):
-        z, y, x = (k - along for k, along in zip(block, offset, strict=True))
-        if (z, y, x) in ranks:  # to it, this block is the neighbour in that direction
-            part = np.ascontiguousarray(halo.from_slabs(slabs, offset))
-            requests.append(comm.isend(part, ranks[z, y, x], tag=_HALO_TAG + number))
+    halo, parts = task.halo, []
+    with together(comm, "cutting out what the neighbours need"):
+        for number, offset in enumerate(halo.offsets()):
+            z, y, x = (k - along for k, along in zip(block, offset, strict=True))
+            if (z, y, x) in ranks:  # to it, this block is the neighbour in that direction
+                part = np.ascontiguousarray(halo.from_slabs(slabs, offset))
+                parts.append((part, ranks[z, y, x], _HALO_TAG + number))
+    requests = [comm.isend(part, rank, tag=tag) for part, rank, tag in parts]
     numbers = {offset: number for number, offset in enumerate(halo.offsets())}
     found = {
         offset: comm.recv(source=ranks[other], tag=_HALO_TAG + numbers[offset])

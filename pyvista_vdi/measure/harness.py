@@ -279,7 +279,7 @@ def check_angles(angles: Sequence[float]) -> None:
     if not angles or not all(math.isfinite(a) for a in angles):
         raise InvalidArgumentError(f"angles must be one or more numbers of degrees; got {angles!r}")
     if len(set(angles)) < len(angles):
-        raise InvalidArgumentError(f"an angle is given twice: {angles!r}")
+        raise InvalidArgumentError(f"an angle is given twice: {angles!r}; give each once")
 
 
 def sizes_of(vdi: VDI) -> dict[str, Any]:

@@ -95,6 +95,25 @@ def as_range(values: Any) -> tuple[float, float]:
     return as_float(low), as_float(high)
 
 
+def three_wholes(values: Any, what: str, least: int) -> tuple[int, int, int]:
+    """Return three whole numbers, of which none is below the least.
+
+    ``what`` says what they are: the argument's name, and what it means.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If they are no such numbers.
+    """
+    try:
+        x, y, z = (as_whole(k) for k in values)
+    except (TypeError, ValueError):
+        x = y = z = math.nan
+    if not (x >= least and y >= least and z >= least):
+        raise InvalidArgumentError(f"{what}, three whole numbers from {least}; got {values!r}")
+    return int(x), int(y), int(z)
+
+
 def as_floats(values: Any) -> NDArray[np.float64]:
     """Return numbers as a new float64 array, of shape (0,) where they are none."""
     try:

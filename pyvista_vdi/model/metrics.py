@@ -98,15 +98,21 @@ def over_background(
         raise InvalidArgumentError(
             f"the image is not finite: pixel (column {column}, row {row}) is {pixels[row, column]}"
         )
+    behind = check_background(background)
+    rgb = pixels[..., :3].astype(np.float64)
+    if pixels.shape[2] == 4:
+        rgb += (1.0 - pixels[..., 3:].astype(np.float64)) * behind
+    return np.clip(rgb, 0.0, 1.0)
+
+
+def check_background(background: Any) -> NDArray[np.float64]:
+    """Return RGB as an array, or raise InvalidArgumentError if it is no colour from 0 to 1."""
     behind = as_floats(background)
     if behind.shape != (3,) or not ((behind >= 0) & (behind <= 1)).all():
         raise InvalidArgumentError(
             f"background must be three numbers from 0 to 1; got {background!r}"
         )
-    rgb = pixels[..., :3].astype(np.float64)
-    if pixels.shape[2] == 4:
-        rgb += (1.0 - pixels[..., 3:].astype(np.float64)) * behind
-    return np.clip(rgb, 0.0, 1.0)
+    return behind
 
 
 def compare_images(

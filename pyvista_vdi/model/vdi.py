@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_floats, as_whole, not_taken
+from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
 from pyvista_vdi.model.packing import Packed8, Packing, check_precision, packing_of
 from pyvista_vdi.model.providers import provider
 
@@ -327,9 +328,10 @@ class VDI:
             )
         for name in _MEDIA:
             if len(getattr(self, name)) != n or self.offsets[-1] != n:
+                lengths = [f"{each} has {len(getattr(self, each))}" for each in _MEDIA]
                 raise InvalidVDIError(
-                    f"offsets[-1] = {self.offsets[-1]} supersegments, but front has {n} and "
-                    f"{name} has {len(getattr(self, name))} entries"
+                    f"offsets[-1] = {self.offsets[-1]} supersegments, but {', '.join(lengths)} "
+                    "entries: give each as many"
                 )
 
     def _check_media(self) -> None:
@@ -376,11 +378,16 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
         raise InvalidVDIError(f"{name} must be an array of numbers: {error}") from error
     if array.dtype.kind not in "uif":
         if array.size:
-            raise InvalidVDIError(f"{name} must be numbers; got {array.dtype}")
+            raise InvalidVDIError(
+                f"{name} must be numbers, in an array; got {reprlib.repr(values)}, of {array.dtype}"
+            )
         array = np.zeros(array.shape, dtype)
     counts = dtype is np.uint64 and array.size > 0
     if counts and (array.dtype.kind == "f" or array.min() < 0):
-        raise InvalidVDIError(f"{name} must be whole numbers >= 0; got {array.dtype}")
+        raise InvalidVDIError(
+            f"{name} must be whole numbers >= 0, of an integer type; got {array.min()} among "
+            f"numbers of {array.dtype}"
+        )
     with np.errstate(over="ignore"):  # infinite then: a rule refuses it, and says where
         array = np.ascontiguousarray(array, dtype=dtype)
     if array.size == 0 and item:
@@ -394,7 +401,7 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
 
 
 def _checked_depth_origin(depth_origin: Any) -> float:
-    origin = as_float(depth_origin)
+    origin = as_number(depth_origin)
     if not math.isfinite(origin):
         raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
     return origin

@@ -34,6 +34,7 @@ except ImportError as error:
     ) from error
 
 from pyvista_vdi.errors import VDIError
+from pyvista_vdi.large.on_mpi import together
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.series.reader import is_series_file
@@ -43,7 +44,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     scalars_of,
     vdi_from_image,
 )
-from pyvista_vdi.vtk_pipeline.filters.ranks import RanksVDISource, is_first_rank
+from pyvista_vdi.vtk_pipeline.filters.ranks import RanksVDISource, communicator, is_first_rank
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
 #: What ParaView's plugin manager shows.
@@ -385,12 +386,12 @@ class VDISource(_Looking, RanksVDISource):
             self._set_view()
         return int(super().RequestInformation(request, inputs, outputs))
 
-    def _execute(self, inputs: Any, outputs: Any) -> None:
+    def _execute_here(self, inputs: Any, outputs: Any) -> None:
         # A script may connect what ParaView's menus do not offer
         image = require_image(vtkDataObject.GetData(inputs[0], 0))
         self._set_view()
         self._set_looks(image)
-        super()._execute(inputs, outputs)
+        super()._execute_here(inputs, outputs)
 
     def _set_view(self) -> None:
         view, bounds, size = self._given_camera(), self._known_bounds(), self.GetWindowSize()
@@ -678,13 +679,18 @@ class VDIWriter(vtk_pipeline.VDIWriter):
 
     def Write(self) -> None:
         """Write the file; ParaView's output window says what went wrong."""
+        comm = communicator()
         try:
-            if is_series_file(self.GetFileName()) and not is_first_rank():
-                images, _ = steps_and_times(self.GetInputAlgorithm(0, 0))
-                for _ in images:  # which the first rank's needs the others for
-                    pass
-            else:
+            if comm is None or not is_series_file(self.GetFileName()):
                 super().Write()
+                return
+            with together(comm, "writing the series"):
+                if comm.rank == 0:
+                    super().Write()
+                    return
+                images, _ = steps_and_times(self.GetInputAlgorithm(0, 0))
+                for _ in images:  # which the first rank needs the others for
+                    pass
         except (VDIError, OSError) as error:
             _say(self, error)
 

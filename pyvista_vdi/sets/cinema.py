@@ -16,12 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.errors import InvalidArgumentTypeError, VDIFileError
 from pyvista_vdi.io.png import to_bytes, write_png
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.whole_file import with_suffix
+from pyvista_vdi.io.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.coverage import bounds_corners
+from pyvista_vdi.model.metrics import check_background
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.quality.view_error import eye_from_centre
 from pyvista_vdi.sets.render import blended
@@ -69,6 +71,8 @@ def write(
     ------
     VDIFileError
         If it exists, or cannot be written.
+    InvalidArgumentError
+        If another argument cannot be used.
 
     Notes
     -----
@@ -76,12 +80,17 @@ def write(
     model frame, degrees: the angle about z from x, -180 to 180, and that from z, 0 to 180;
     ``position_x`` to ``view_up_z`` and ``view_angle``, the camera; ``FILE``, the picture.
     """
-    target = with_suffix(Path(path), (SUFFIX,), "a Cinema database")
-    if target.exists():
-        raise VDIFileError(f"{target} exists: remove it, or choose another name")
-    if not target.parent.is_dir():
-        raise VDIFileError(f"the folder {target.parent} does not exist: create it")
+    if not isinstance(vdi_set, VDISet):
+        raise InvalidArgumentTypeError(
+            f"vdi_set must be a VDISet, as of generate_set; got {type(vdi_set).__name__}"
+        )
+    target = with_suffix(as_path(path), (SUFFIX,), "a Cinema database")
+    vdis = as_flag(vdis, "vdis")
+    check_background(background)
     done = Pieces(progress, len(vdi_set))
+    if os.path.lexists(target):
+        raise VDIFileError(f"{target} exists: remove it, or choose another name")
+    check_writable(target)
     try:
         with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
             made = Path(folder) / "made"

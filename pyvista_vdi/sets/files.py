@@ -12,7 +12,7 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
-from pyvista_vdi.io.whole_file import check_writable, whole_file, with_suffix
+from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
@@ -87,7 +87,7 @@ def write(
     progress: Progress | None = None,
 ) -> Path:
     """Write a set to a file, which appears whole or not at all: see :meth:`VDISet.save`."""
-    target = check_writable(with_suffix(Path(path), (SUFFIX,), "a set"))
+    target = check_writable(with_suffix(as_path(path), (SUFFIX,), "a set"))
     writer = StepsWriter(precision, tolerance, 1, compression, level)
     views = list(vdi_set.cameras)
     done = Pieces(progress, len(views))

@@ -26,7 +26,11 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.metrics import SSIM_WINDOW, compare_images
-from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
+from pyvista_vdi.model.options import (
+    GENERATION_NAMES,
+    GenerationOptions,
+    check_max_supersegments,
+)
 from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -216,6 +220,8 @@ def generate_set(
         raise InvalidArgumentError(f"max_views must be 1 or more; got {max_views!r}")
     if lists is not None and not 0.05 <= as_float(lists) <= 8:
         raise InvalidArgumentError(f"lists must be 0.05 to 8 per pixel; got {lists!r}")
+    if max_supersegments is not None:
+        max_supersegments = check_max_supersegments(max_supersegments)
     if min(size) < SSIM_WINDOW:
         raise InvalidArgumentError(
             f"a window of {size[0]} x {size[1]} pixels has no SSIM to place views by: it takes "

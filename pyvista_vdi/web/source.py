@@ -26,6 +26,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
+from pyvista_vdi.volume.classified_volume import checked_sample_distance
 from pyvista_vdi.volume.render import raycast_volume
 from pyvista_vdi.web.messages import Offer, Wish
 from pyvista_vdi.web.still import webp
@@ -143,6 +144,7 @@ class Source:
         self.bounds = first.bounds
         self.range = first.finite_range()
         self.transfer_function(Wish())  # refused now, not when a client has come
+        checked_sample_distance(first, options.sample_distance)  # likewise
         given = looks.given
         self.started_with = {n: given[n] for n in _NAMED if isinstance(given.get(n), str)}
         free = find_spec("pyvista") is not None and not first.rgba and not looks.in_place

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import functools
 import inspect
 import re
+import shutil
 import warnings
 from pathlib import Path
 
@@ -22,6 +24,7 @@ from pyvista_vdi.insitu import InSitu
 from pyvista_vdi.large.on_mpi import generate_on_mpi
 from pyvista_vdi.model.classification import DEFAULTS
 from pyvista_vdi.model.grid import Grid
+from pyvista_vdi.sets import cinema
 
 PACKAGE = Path(pvdi.__file__).parent
 ARRAY = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)
@@ -70,6 +73,11 @@ def in_situ(path, camera, window_size, dimensions, every, values, first, at, **o
 def write(path, step, time, **options):
     with pvdi.SeriesWriter(path, **options) as out:
         out.append(step, time)
+
+
+def in_cinema(vdi_set, path, **options):
+    shutil.rmtree("c.cdb", ignore_errors=True)
+    vdi_set.save_cinema(path, **options)
 
 
 def series_of(vdi):
@@ -163,6 +171,11 @@ ENTRIES = {
     "VDISet.of": lambda vdi: (pvdi.VDISet.of, {"vdis": [vdi]}, None),
     "VDISet.nearest": lambda vdi: (pvdi.VDISet.of([vdi]).nearest, {"camera": CAMERA}, None),
     "VDISet.add": lambda vdi: (pvdi.VDISet.of([vdi]).add, {"vdi": vdi}, None),
+    "VDI": lambda vdi: (
+        pvdi.VDI,
+        {name: getattr(vdi, name) for name in inspect.signature(pvdi.VDI).parameters},
+        None,
+    ),
     "VDI.with_precision": lambda vdi: (vdi.with_precision, {"precision": "exact"}, None),
     "VDI.thinned": lambda vdi: (vdi.thinned, {}, None),
     "VDI.list_at": lambda vdi: (vdi.list_at, {"x": 1, "y": 1}, None),
@@ -177,6 +190,17 @@ ENTRIES = {
         {"path": "v.vdis"},
         ["path", "precision", "compression", "level", "progress", "tolerance", "key_every"],
     ),
+    "VDISet.save": lambda vdi: (
+        pvdi.VDISet.of([vdi]).save,
+        {"path": "v.vdiset"},
+        ["precision", "compression", "level", "progress", "tolerance"],
+    ),
+    "VDISet.save_cinema": lambda vdi: (
+        functools.partial(in_cinema, pvdi.VDISet.of([vdi])),
+        {"path": "c.cdb"},
+        ["background", "vdis", "device", "progress"],
+    ),
+    "cinema.write": lambda vdi: (cinema.write, {"vdi_set": 0, "path": "d.cdb"}, None),
     "Camera.azimuth": lambda vdi: (CAMERA.azimuth, {"degrees": 1}, None),
     "Camera.tile": lambda vdi: (
         CAMERA.tile,

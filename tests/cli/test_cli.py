@@ -230,7 +230,7 @@ def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkey
         ("v.nrrd --max-supersegments 0", "max_supersegments must be .* 1 to 4096; got 0"),
         ("v.nrrd --max-supersegments 4097", "from 1 to 4096; got 4097"),
         ("v.nrrd --criterion depth", "criterion must be one of .*; got 'depth'"),
-        ("v.nrrd --elevation 80", "elevation must lie between -90 and 90"),
+        ("v.nrrd --elevation 80", "elevation must lie between -110 and 70 degrees.*got 80"),
         ("v.nrrd --position 1 1 1 --focal-point 1 1 1", "the same point"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -100,3 +101,32 @@ def test_mistakes_are_named(arguments, message, image, tmp_path, capsys, monkeyp
     monkeypatch.chdir(tmp_path)
     assert main(["generate", *arguments.split(), "-o", "x.vdi", *LOOK]) in (1, 2)
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("store", "options", "message"),
+    [
+        ("x.ome.zarr", "--level 2", "level must be .* from 0, the finest, to 1, .*; got 2"),
+        ("x.ome.zarr", "--channel 2", "has 2 along channel, 0 to 1; got 2"),
+        ("x.ome.zarr", "--channel nobody", "no channel 'nobody': its channels are dapi, gfp"),
+        ("x.ome.zarr", "--time-index 1", "has 1 along time, 0 to 0; got 1"),
+        ("x.ome.zarr", "--time-index -1", "has 1 along time, 0 to 0; got -1"),
+        ("x.ome.zarr", "--scalars nothing", "no array 'nothing': its only one is"),
+        ("s.h5", "--channel 5", "has 1 along channel, 0 to 0; got 5"),
+        ("s.h5", "--channel nobody", "no channel 'nobody': its channels are not named"),
+        ("s.h5::/w", "", "has no array 'w' .*: open one of s.h5::v"),
+    ],
+)
+@pytest.mark.parametrize("verb", ["info", "generate", "series"])
+def test_what_a_store_has_not_is_named(
+    verb, store, options, message, image, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    if store.startswith("s.h5"):
+        with pytest.importorskip("h5py").File("s.h5", "w") as file:
+            file["v"] = VALUES
+    before = sorted(tmp_path.rglob("*"))
+    more = () if verb == "info" else ("-o", f"x.vdi{'s' * (verb == 'series')}", *LOOK)
+    assert main([verb, store, *options.split(), *more]) == 1
+    assert re.search(f"^pyvista-vdi: error: .*{message}", capsys.readouterr().err)
+    assert sorted(tmp_path.rglob("*")) == before

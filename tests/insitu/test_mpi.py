@@ -70,7 +70,12 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
 
 @needs_mpi
 def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(tmp_path, default_runtime):
-    run(2, PROGRAM, "mistakes,pipeline", tmp_path)
+    run(2, PROGRAM, "mistakes", tmp_path)
+
+
+@needs_mpi
+def test_whatever_is_wrong_with_the_input_of_one_rank_all_raise(tmp_path, default_runtime):
+    run(3, PROGRAM, "pipeline,closing", tmp_path)
 
 
 @pytest.mark.slow

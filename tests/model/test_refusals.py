@@ -252,12 +252,13 @@ REFUSED = {
         ({"offsets": [1, 2, 2, 3]}, r"offsets\[0\] must be 0; got 1"),
         ({"offsets": [0, 2, 1, 3]}, r"must not decrease; offsets\[1\] = 2 is followed by 1"),
         ({"offsets": [0, 1, 2, 2]}, r"offsets\[-1\] = 2 supersegments, but front has 3"),
-        ({"offsets": [0, -1, 2, 3]}, "offsets must be whole numbers >= 0"),
-        ({"offsets": [0, 1.5, 2, 3]}, "offsets must be whole numbers >= 0"),
+        ({"offsets": [0, -1, 2, 3]}, "offsets must be whole numbers >= 0, .*; got -1 among"),
+        ({"offsets": [0, 1.5, 2, 3]}, "offsets must be whole numbers >= 0, .* of float64"),
+        ({"offsets": None}, "offsets must be numbers, in an array; got None"),
         ({"offsets": [[0, 2, 2, 3]]}, r"offsets must have shape \(n,\); got \(1, 4\)"),
-        ({"back": [2.0, 3.0]}, "front has 3 and back has 2 entries"),
+        ({"back": [2.0, 3.0]}, "front has 3, back has 2, color has 3, .*: give each as"),
         ({"color": [0, 0, 0]}, r"color must have shape \(n, 3\); got \(3,\)"),
-        ({"front": ["a", "b", "c"]}, "front must be numbers"),
+        ({"front": ["a", "b", "c"]}, r"front must be numbers, .*; got \['a', 'b', 'c'\]"),
         ({"front": [[1, 2], [3]]}, "front must be an array of numbers"),
         (
             {"front": [1.0, 3.0, 1.5]},
@@ -279,7 +280,7 @@ REFUSED = {
         ({"optical_depth": [0, 0, NAN]}, "supersegment 2 .* 'optical_depth >= 0 and finite'"),
         ({"depth_origin": INF}, "depth_origin must be finite; got inf"),
         ({"depth_origin": "x"}, "depth_origin must be finite; got 'x'"),
-        ({"depth_origin": []}, r"depth_origin must be finite; got \[\]"),
+        *(({"depth_origin": x}, "depth_origin must be finite; got") for x in ([], "3", True)),
         *(
             ({"bounds": wrong}, "bounds must be six finite numbers")
             for wrong in ((1, -1, *PLANES[2:]), (0, 1, 0, 1), (*PLANES[1:], NAN), [[1, 2], [3]], {})

@@ -39,6 +39,7 @@ from pyvista_vdi.measure.paper.datasets import (
 )
 from pyvista_vdi.measure.paper.published import paper_targets
 from pyvista_vdi.measure.results import Results
+from pyvista_vdi.model.options import check_max_supersegments
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.frame_rate import FrameRateController
@@ -109,6 +110,8 @@ class Plan:
                 f"{twice[0]!r} is given twice: name files differently, as in kingsnake=FILE"
             )
         check_angles(self.angles)
+        for limit in self.limits:
+            check_max_supersegments(limit)
         if self.seed < 0:
             raise InvalidArgumentError(f"seed must be 0 or above; got {self.seed!r}")
 

@@ -121,7 +121,7 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
         load = partial(examples.load_data, name, as_volume=True)
         return Dataset(name, "example", None, described, "ramp", None, load)
     label, file = _named_file(name)
-    if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
+    if not name or not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
         known = ", ".join([*sorted(examples.VOLUMES), *PROCEDURAL])
         raise InvalidArgumentError(
             f"no volume is called {name!r}, and there is no such file: choose one of {known}, or "

@@ -54,6 +54,12 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference
 #: Frames per second that stand-ins keep where no rate is asked for: changes are followed by eye.
 _STAND_IN_RATE = 30.0
 
+#: What is said where another volume has the mapper.
+_BEHIND_ANOTHER = (
+    "VDIMapper draws only behind its own VDIActor, and is behind another volume: use VDIActor in "
+    "place of vtkVolume, also for copies (VDIActor().ShallowCopy(actor))"
+)
+
 
 class Painter:
     """What happens behind a :class:`VDIMapper` while a frame is drawn.
@@ -215,12 +221,8 @@ class Painter:
         renderer = self.renderer()
         # Else a copy of the actor by vtkVolume.ShallowCopy draws, in another window
         self._astray = renderer is None or not _is_drawing(renderer)
-        if self._astray or self._is_behind_another(mapper, renderer):
-            self._warnings.warn(
-                "VDIMapper draws only behind its own VDIActor, and is behind another volume: use "
-                "VDIActor in place of vtkVolume, also for copies (VDIActor().ShallowCopy(actor))"
-            )
         if self._astray:
+            self._warnings.warn(_BEHIND_ANOTHER)
             self.box.place((0.0,) * 6)  # nothing is seen of it
             if self._actor.Get() is not None:  # whose shader the copy has
                 place_image(self._actor.Get(), 0, (0, 0), (1, 1))
@@ -253,11 +255,6 @@ class Painter:
         self._no_depth.show(window, mapper)
         self.texts.write(renderer, self.status)
         self.upkeep.tick(window)
-
-    def _is_behind_another(self, mapper: Any, renderer: Any) -> bool:
-        """Whether a renderer shows a volume with this mapper that is not our actor."""
-        actor = self._actor.Get()
-        return any(each is not actor and each.GetMapper() is mapper for each in volumes(renderer))
 
     def end(self) -> None:
         """Let go of the texture unit."""
@@ -324,9 +321,11 @@ class Painter:
         frame = Frame.current(renderer, self._actor.Get(), mapper)
         frame.clock.join(self, renderer)
         self._scene = (frame.view, weakref.ref(frame.clock))
-        seen = self.upkeep.current(
-            frame, self.status, only=len(self.renderers()) == 1, joint=self._overlapped(frame)
-        )
+        shown = volumes(renderer)
+        if any(each.GetMapper() is mapper and each is not frame.actor for each in shown):
+            self._warnings.warn(_BEHIND_ANOTHER)
+        joint = len(shown) > 1 and self._overlapped(frame, shown)
+        seen = self.upkeep.current(frame, self.status, only=len(self.renderers()) == 1, joint=joint)
         if seen is None:
             return None
         self.box.place(seen.bounds)
@@ -338,11 +337,10 @@ class Painter:
             self._generation += 1
         return frame.showing(seen)
 
-    def _overlapped(self, frame: Frame) -> bool:
-        """Whether another volume of ours lies where this one does in the picture."""
-        shown = volumes(frame.renderer)
+    def _overlapped(self, frame: Frame, shown: list[Any]) -> bool:
+        """Whether one of the volumes that are shown is ours and lies where this one does."""
         rectangles: list[Matrix | None] = []
-        for prop in shown if len(shown) > 1 else []:
+        for prop in shown:
             painter = getattr(prop.GetMapper(), "painter", None)
             source = painter.input if isinstance(painter, Painter) else None
             bounds = None if source is None or not prop.GetVisibility() else source.bounds()

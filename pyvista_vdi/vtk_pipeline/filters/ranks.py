@@ -7,15 +7,21 @@ VDI together by :func:`pyvista_vdi.large.on_mpi.generate_on_mpi`. A VDI is small
 from __future__ import annotations
 
 import functools
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
-from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi, together
+from pyvista_vdi.errors import (
+    InvalidVolumeError,
+    MissingDependencyError,
+    UnsupportedError,
+    VDIError,
+)
+from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi, require_same, together
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.vdi import VDI
@@ -32,6 +38,9 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkImageData,
     vtkStreamingDemandDrivenPipeline,
 )
+
+#: What fails, for the message that all ranks get.
+_MAKING = "making a VDI"
 
 #: Points that a block has along each axis at least, see generate_on_mpi.
 _LEAST_POINTS = 4
@@ -104,6 +113,48 @@ class RanksVDISource(VDISource):
     def __init__(self) -> None:
         super().__init__()
         self._part: Part | None = None
+        self._refused: VDIError | None = None  # by what was given to this rank as its input
+
+    def FillInputPortInformation(self, port: int, information: Any) -> int:
+        """Take nothing as well, of several ranks: one without an input is to tell the others."""
+        super().FillInputPortInformation(port, information)
+        with suppress(MissingDependencyError):  # RequestData says it
+            if communicator() is not None:
+                information.Set(self.INPUT_IS_OPTIONAL(), 1)
+        return 1
+
+    def SetInputDataObject(self, *args: Any) -> None:
+        """Set the volume; of several ranks, the next update refuses what is none, on all."""
+        with self._refused_later():
+            super().SetInputDataObject(*args)
+
+    def SetInputConnection(self, *args: Any) -> None:
+        """Set what makes the volume; of several ranks, the next update refuses it, on all."""
+        with self._refused_later():
+            super().SetInputConnection(*args)
+
+    @contextmanager
+    def _refused_later(self) -> Iterator[None]:
+        """Keep the error for the next update, which the other ranks take part in."""
+        self._refused = None
+        try:
+            yield
+        except VDIError as error:
+            if communicator() is None:
+                raise
+            self._refused = error
+            self.Modified()
+
+    def Update(self, *args: Any) -> None:
+        """Bring the output up to date, and raise what went wrong, on whichever rank."""
+        try:
+            super().Update(*args)
+        except Exception:
+            comm = communicator()
+            if comm is None:
+                raise
+            with together(comm, _MAKING):  # where the others are, if they do not know it yet
+                raise
 
     def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Ask for the whole input; of several ranks each for its block, and a point around it."""
@@ -130,10 +181,22 @@ class RanksVDISource(VDISource):
     def _execute(self, inputs: Any, outputs: Any) -> None:
         comm = communicator()
         if comm is None:
-            super()._execute(inputs, outputs)
+            self._execute_here(inputs, outputs)
             return
-        with together(comm, "making a VDI"):  # a camera that only one has, say
-            super()._execute(inputs, outputs)
+        with together(comm, _MAKING):  # a camera that only one has, say
+            if self._refused is not None:
+                raise self._refused
+            if self.GetNumberOfInputConnections(0) == 0:
+                raise InvalidVolumeError(self._no_input())
+            self._execute_here(inputs, outputs)
+
+    def _execute_here(self, inputs: Any, outputs: Any) -> None:
+        """Generate; what fails on this rank is told to the others."""
+        super()._execute(inputs, outputs)
+
+    def _check_input(self) -> None:
+        if communicator() is None:  # ranks keep what they have read for one execution
+            super()._check_input()
 
     def _scalar_range(self, image: Any) -> tuple[float, float]:
         """Return the least and the largest scalar of the whole input."""
@@ -149,11 +212,6 @@ class RanksVDISource(VDISource):
 
     def _holds_all(self, data: vtkImageData) -> bool:
         return communicator() is None
-
-    def _aborted(self) -> bool:
-        comm = communicator()
-        here = super()._aborted()
-        return here if comm is None else any(comm.allgather(here))
 
     def _view(
         self, grid: vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool
@@ -310,8 +368,10 @@ def _read_part(comm: Any, image: Any, whole: Any, scalars: str | None, preferenc
         boxes = _boxes(_points(whole), comm.size)
         if image is not None and require_image(image).GetNumberOfPoints():
             here = _Held.of(image, whole, scalars, preference)
+    require_same(comm, extent=tuple(whole))
     of_ranks: list[_Held | None] = comm.allgather(here.described() if here else None)
     held = [each for each in of_ranks if each is not None]
+    sent: list[Any] = []
     with together(comm, "reading the volume"):
         kinds = sorted({f"{each.name} ({each.values.dtype})" for each in held})
         if len(kinds) != 1:
@@ -320,11 +380,10 @@ def _read_part(comm: Any, image: Any, whole: Any, scalars: str | None, preferenc
                 if kinds
                 else "the volume is empty: no rank has points"
             )
-    sent: list[Any] = []
-    for box, of_rank in zip(boxes, of_ranks, strict=True):
-        needed = of_rank is None or of_rank.common(box) != box
-        common = here.common(box) if here and needed else None
-        sent.append((common, here.cut(common)) if here and common else None)
+        for box, of_rank in zip(boxes, of_ranks, strict=True):
+            needed = of_rank is None or of_rank.common(box) != box
+            common = here.common(box) if here and needed else None
+            sent.append((common, here.cut(common)) if here and common else None)
     received = comm.alltoall(sent)
     own = boxes[comm.rank]
     array = np.zeros([end - begin for begin, end in own], held[0].values.dtype)

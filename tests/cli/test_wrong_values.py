@@ -1,0 +1,281 @@
+"""Every option of every verb with wrong values: one sentence, and nothing is written."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shlex
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import cli
+
+pytest.importorskip("pyvista")
+
+#: What is right, of each verb: wrong values come behind it.
+RIGHT = {
+    "devices": "",
+    "generate": "v.npy -o old.vdi --size 12x8 --shade",
+    "render": "a.vdi -o old.png",
+    "view": "v.npy --screenshot old.png --size 12x8 --shade",
+    "turntable": "v.npy -o old.gif --size 12x8 --frames 1 --shade",
+    "movie": "v.npy -o old.gif --size 12x8 --frames 1 --turn 9 --shade",
+    "serve": "v.npy --port 0 --shade",
+    "info": "v.npy",
+    "compare": "v.npy --out new --size 12x8 --angles 5 --repeats 1 --no-vtk --shade",
+    "benchmark": "--out new.json --datasets v.npy --no-vtk",
+    "tradeoff": "v.npy --out new --quick --no-vtk --shade",
+    "convert": "a.vdi -o old.exr",
+    "series": "v.npy -o old.vdis --size 12x8 --shade",
+    "set": "v.npy -o old.vdiset --size 16x12 --shade",
+    "paraview": "",
+}
+
+NO_NUMBER = ("x", "''", "nan", "inf", "1,2")
+NO_WHOLE = ("x", "''", "nan", "1.5", "1e3")
+BELOW_0 = (*NO_NUMBER, "-1")
+NOT_ABOVE_0 = (*BELOW_0, "0")
+NO_COUNT = (*NO_WHOLE, "-1", "0")
+NO_XYZ = tuple(f"0 {number} 0" for number in NO_NUMBER)
+NO_CHOICE = ("x", "''")
+NO_JSON = ("none.json", "folder", "empty", "v.npy", "'[1]'", "list.json", "other.json")
+NO_VOLUME = ("none.npy", "empty", "empty.npy", "empty.nrrd", "folder", "list.json", "old.png")
+NO_VDI = ("none.vdi", "empty", "empty.vdi", "folder", "list.json", "v.npy")
+#: Where nothing can be written: each with what is added to a name.
+NO_TARGET = ("''", "old.txt", "folder", "folder{}", "none/a{}", "old.png/a{}")
+
+#: Wrong values of each option.
+WRONG = {
+    "--allow-host": (),  # any text
+    "--ambient": BELOW_0,
+    "--angles": ("x", "''", "5,nan", "5;6", "5,5", "inf"),
+    "--azimuth": NO_NUMBER,
+    "--background": ("x", "''", "0,0", "0,0,2", "0,0,nan", "#12"),
+    "--camera-json": NO_JSON,
+    "--check": (),  # depends on what is installed
+    "--clim": ("x 1", "0 nan", "inf 1", "2 1"),
+    "--cmap": ("nothing", "''", "1", "nan"),
+    "--compression": NO_CHOICE,
+    "--compression-level": (*NO_WHOLE, "0", "-1", "10"),
+    "--criterion": ("nothing", "''", "1", "nan"),
+    "--datasets": ("nothing", "''", "none.npy"),
+    "--degrees": NO_NUMBER,
+    "--device": ("nothing", "99", "-1"),
+    "--diffuse": BELOW_0,
+    "--draw": NO_CHOICE,
+    "--elevation": NO_NUMBER,
+    "--example": ("nothing", "''", "v.npy"),
+    "--focal-point": NO_XYZ,
+    "--fps": (*NOT_ABOVE_0, "1e9"),
+    "--frames": NO_COUNT,
+    "--generations": NO_COUNT,
+    "--host": ("'no such host'", "999.1.1.1"),
+    "--interpolation": NO_CHOICE,
+    "--key-every": NO_COUNT,
+    "--lists": NOT_ABOVE_0,
+    "--max-bytes": NOT_ABOVE_0,
+    "--max-supersegments": (*NO_COUNT, "4097"),
+    "--max-views": NO_COUNT,
+    "--memory-limit": (*NOT_ABOVE_0, "5parsecs"),
+    "--n-colors": NO_COUNT,
+    "--name": ("a/b",),
+    "--occlusion-radius": NOT_ABOVE_0,
+    "--occlusion-strength": (*BELOW_0, "1.5"),
+    "--opacity": ("nothing", "''", "0,x", "0,nan", "0,1e999"),
+    "--opacity-unit-distance": NOT_ABOVE_0,
+    "--origin": NO_XYZ,
+    "--parallel-scale": NOT_ABOVE_0,
+    "--path": tuple(f"camera.json {file}" for file in NO_JSON),
+    "--port": (*NO_WHOLE, "-1", "65536"),
+    "--position": NO_XYZ,
+    "--precision": NO_CHOICE,
+    "--preference": NO_CHOICE,
+    "--profile": NO_CHOICE,
+    "--quality": NO_CHOICE,
+    "--rate": (*NOT_ABOVE_0, "1e9"),
+    "--regenerate": NO_CHOICE,
+    "--regenerate-below": (*BELOW_0, "1.5"),
+    "--repeats": NO_COUNT,
+    "--sample-distance": NOT_ABOVE_0,
+    "--scalars": ("nothing", "''"),
+    "--seed": NO_COUNT,
+    "--size": ("x", "''", "12", "0x3", "-1x3", "12xnan", "99999x3", "3x2x1"),
+    "--sizes": ("x", "''", "12", "0x3"),
+    "--spacing": (*NO_XYZ, "1 1 0", "1 1 -1"),
+    "--specular": BELOW_0,
+    "--specular-power": BELOW_0,
+    "--sweep": ("nothing", "''", "lists=x", "lists=nan", "lists=0", "precision=x", "skip-empty=1"),
+    "--tables": (*NO_WHOLE, "3"),
+    "--target-angle": (*NOT_ABOVE_0, "180"),
+    "--target-fps": NOT_ABOVE_0,
+    "--target-ssim": (*NOT_ABOVE_0, "1"),
+    "--tf": NO_CHOICE,
+    "--thickness": NOT_ABOVE_0,
+    "--time": NO_NUMBER,
+    "--times": ("x", "''", "1,nan"),
+    "--token": ("''",),
+    "--tolerance": BELOW_0,
+    "--transfer-function": NO_JSON,
+    "--transmittance-cutoff": (*BELOW_0, "1"),
+    "--turn": NO_NUMBER,
+    "--view-angle": (*NOT_ABOVE_0, "180"),
+    "--view-cone": (*BELOW_0, "91"),
+    "--view-up": (*NO_XYZ, "0 0 0"),
+    "--volume": ("none.npy", "a=none.npy", "''"),
+    # Of stores of chunks, which refuse more
+    "--channel": (),
+    "--scheduler": (),
+    "--level": ("x", "''", "-1", "1.5"),
+    "--time-index": NO_WHOLE,
+}
+#: Where a verb's option is another than others'.
+OF_A_VERB = {
+    ("serve", "--lists"): WRONG["--size"],
+    ("generate", "--elevation"): (*NO_NUMBER, "91", "-150"),
+    ("view", "--target-fps"): BELOW_0,
+    ("convert", "--thickness"): NO_NUMBER,
+    ("series", "--tolerance"): (*BELOW_0, "1"),
+    ("tradeoff", "--repeats"): NO_COUNT,
+    ("generate", "--output"): tuple(name.format(".vdi") for name in NO_TARGET),
+    ("render", "--output"): tuple(name.format(".png") for name in NO_TARGET),
+    ("view", "--screenshot"): tuple(name.format(".png") for name in NO_TARGET),
+    ("turntable", "--output"): (*(name.format(".gif") for name in NO_TARGET), "a.png"),
+    ("movie", "--output"): tuple(name.format(".gif") for name in NO_TARGET),
+    ("convert", "--output"): tuple(name.format(".exr") for name in NO_TARGET),
+    ("series", "--output"): tuple(name.format(".vdis") for name in NO_TARGET),
+    ("set", "--output"): tuple(name.format(".vdiset") for name in NO_TARGET),
+    ("compare", "--out"): ("v.npy", "v.npy/a"),
+    ("tradeoff", "--out"): ("v.npy", "v.npy/a"),
+    ("benchmark", "--out"): tuple(name.format(".json") for name in NO_TARGET),
+}
+#: Files in place of the verb's first.
+FILES = {
+    **dict.fromkeys(("generate", "serve", "compare", "tradeoff", "set", "series"), NO_VOLUME),
+    **dict.fromkeys(("info", "view", "turntable", "movie"), (*NO_VOLUME, "none.vdi", "empty.vdi")),
+    **dict.fromkeys(("render", "convert"), NO_VDI),
+}
+#: How messages may call an option, where not by the words of its name.
+CALLED = {
+    "--camera-json": "camera",
+    "--clim": "clim|range",
+    "--compression-level": "level",
+    "--datasets": "volume",
+    "--device": "OpenCL device",
+    "--example": "example",
+    "--host": "listen",
+    "--out": "",
+    "--output": "",
+    "--path": "camera",
+    "--scalars": "array",
+    "--screenshot": "",
+    "--sweep": "sweep|lists|precision",
+    "--view-angle": "view.angle",
+    "--volume": "volume",
+    "": "",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with what is right and what is wrong, and files that must stay as they are."""
+    path = tmp_path_factory.mktemp("wrong")
+    z, y, x = np.mgrid[:6, :5, :4]
+    np.save(path / "v.npy", (x * y + z).astype(np.uint8))
+    camera = pvdi.Camera((2, -30, 3), (2, 2, 2), (0, 0, 1))
+    view = (camera, (2, 1), [0, 1, 1], [20.0], [21.0], [[1, 0.5, 0]], [0.7])
+    pvdi.VDI(*view, (0, 3, 0, 4, 0, 5)).save(path / "a.vdi")
+    (path / "camera.json").write_text(json.dumps(camera.to_dict()))
+    (path / "list.json").write_text("[1]")
+    (path / "other.json").write_text('{"a": 1}')
+    (path / "folder").mkdir()
+    for name in ("folder.vdi", "folder.png", "folder.gif", "folder.exr", "folder.vdis"):
+        (path / name).mkdir()
+    for name in ("folder.vdiset", "folder.json"):
+        (path / name).mkdir()
+    for name in ("", ".npy", ".nrrd", ".vdi"):
+        (path / f"empty{name}").touch()
+    for name in ("vdi", "png", "gif", "exr", "vdis", "vdiset", "txt"):
+        (path / f"old.{name}").write_text("what was here before")
+    return path
+
+
+def contents(folder):
+    return {
+        path.relative_to(folder): path.is_file() and hashlib.sha256(path.read_bytes()).digest()
+        for path in folder.rglob("*")
+    }
+
+
+def options_of(verb, capsys):
+    """Return a verb's options that take values, and those that take none, as its help has them."""
+    assert cli.main([verb, "--help"]) == 0
+    lines = re.findall(r"^ +(?:-o.*?|)(--[a-z-]+)( \S|,|  |$)", capsys.readouterr().out, re.M)
+    found = {True: [], False: []}
+    for name, behind in lines:
+        found[behind.startswith(" ") and not behind.isspace()].append(name)
+    return found[True], found[False]
+
+
+def wrong_values(verb, capsys):
+    """Yield an option, or none for a file, one of its wrong values, and the whole command line."""
+    right = shlex.split(RIGHT[verb])
+    taking, others = options_of(verb, capsys)
+    for option in taking:
+        wrong = OF_A_VERB.get((verb, option))
+        for value in WRONG[option] if wrong is None else wrong:
+            values = shlex.split(value)
+            given = [option, *values] if len(values) > 1 else [f"{option}={values[0]}"]
+            kept = right[1:] if option == "--example" and right[0] == "v.npy" else right
+            yield option, value, [verb, *kept, *given]
+    for option in others:
+        yield option, "x", [verb, *right, f"{option}=x"]
+    for file in FILES.get(verb, ()):
+        yield "", file, [verb, file, *right[1:]]
+
+
+def is_named(option, value, message):
+    """Whether a message names the option and the value that is wrong."""
+    message = message.replace(" x ", "x")
+    words = option.strip("-").removesuffix("s").split("-")
+    named = all(word in message.lower() for word in words)
+    called = option in CALLED and re.search(CALLED[option], message)
+    parts = re.split(r"[ ,=]", value.replace("camera.json ", "").strip("'"))
+    if len(parts) > 1:
+        parts = [part for part in parts if part not in ("0", "1")]  # which are right
+    return (named or called) and all(part.lower() in message.lower() for part in parts)
+
+
+@pytest.mark.parametrize("verb", RIGHT)
+def test_wrong_values_are_named_and_nothing_is_written(
+    verb, folder, capsys, monkeypatch, default_runtime
+):
+    monkeypatch.delenv(cli.DEBUG_VARIABLE, raising=False)
+    if verb == "serve":
+        server = pytest.importorskip("pyvista_vdi.web.server", exc_type=ImportError)
+        monkeypatch.setattr(server.Server, "wait", lambda server: server.close())  # accepted
+    monkeypatch.chdir(folder)
+    before, found = contents(folder), []
+    for option, value, arguments in wrong_values(verb, capsys):
+        try:
+            status = cli.main(arguments)
+        except Exception as error:
+            found.append((option, value, repr(error)))
+            continue
+        out, err = capsys.readouterr()
+        message = err.splitlines()[-1] if err else ""
+        right = (
+            status in (1, 2)
+            and not out
+            and message.startswith("pyvista-vdi: error: ")
+            and "Traceback" not in err
+            and is_named(option, value, message)
+        )
+        if not right:
+            found.append((option, value, status, message, out))
+        if contents(folder) != before:
+            found.append((option, value, "writes"))
+            before = contents(folder)
+    assert not found, "\n".join(map(str, found))
