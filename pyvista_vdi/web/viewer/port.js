@@ -26,7 +26,8 @@ export async function decodingPort() {
   }
   if (!warned) {
     console.warn("<vdi-viewer> decodes on the page's own thread, as no worker starts: " +
-      `${[...causes].join("; ")}. Is worker.js there, and does the page's policy allow it (worker-src)?`);
+      `${[...causes].join("; ")}. Does the page's policy allow it (worker-src), and is worker.js ` +
+      "beside the script (to some bundlers it is to be named as another entry)?");
     warned = true;
   }
   const port = { onmessage: null, terminate() {} };
