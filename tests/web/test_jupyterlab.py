@@ -291,8 +291,8 @@ def test_keys_in_jupyterlab(chromium, lab):
         notebook.viewer(TURNED).click()
         before, camera = state(), notebook.camera(TURNED)
         page.keyboard.press(key)
-        until(lambda camera=camera: notebook.camera(TURNED) != camera)
         assert state() == before, key
+        until(lambda camera=camera: notebook.camera(TURNED) != camera)
     assert before["active"] == TURNED
     assert before["mode"] == "command"
     assert before["types"] == ["code"] * len(CELLS)
@@ -307,7 +307,6 @@ def test_keys_in_jupyterlab(chromium, lab):
 
     added = 0
     camera = press("j", active=TURNED + 1, ran=None)
-    press("Enter", mode="edit")
     press("Escape")
     types = ["code"] * (len(CELLS) + 1)
     press("b", types=types, active=TURNED + 1, ran=None)

@@ -63,8 +63,6 @@ class Pressed:
                 document.body.append(document.createElement(name));
               }
               document.querySelector("div").tabIndex = 0;
-              document.body.style.height = "5000px";
-              scrollTo(0, 0); // wherever the test before went
             }"""
         )
 
@@ -110,8 +108,19 @@ def test_what_it_takes_reaches_nothing_else(key, pressed):
     told = pressed.of_the_viewer("canvas", key)
     assert (look() == first) == (key in ("r", "Shift+R"))
     assert told == []
-    assert pressed.page.evaluate("scrollY") == 0
     assert pressed.anywhere(key)  # the page has its shortcuts still
+
+
+def test_arrows_that_it_takes_do_not_scroll_the_page(data, open_page):
+    pressed = Pressed(
+        open_page(SIZE, data=data, before=LISTENING, viewport={"width": 200, "height": 200})
+    )
+    pressed.page.evaluate("document.body.style.height = '5000px'")
+    pressed.of_the_viewer("canvas", *["ArrowDown"] * 5)
+    pressed.page.page.wait_for_timeout(300)
+    assert pressed.page.evaluate("scrollY") == 0
+    pressed.anywhere("ArrowDown")
+    pressed.page.wait_for("scrollY > 0")
 
 
 @pytest.mark.parametrize("key", NOT_TAKEN)

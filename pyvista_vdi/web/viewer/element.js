@@ -72,6 +72,7 @@ export class VDIViewer extends HTMLElement {
   #asked = false;
   #wake = () => {};
   #seen = true;
+  #shownBefore = null; // bounds, until another address has given something
   #shots = 0; // pictures that are being made
   #retiring = 0; // a timer, as the next
   #hinting = 0;
@@ -131,7 +132,10 @@ export class VDIViewer extends HTMLElement {
   }
 
   set camera(camera) {
-    this.#camera = checkedCamera(camera);
+    const checked = checkedCamera(camera);
+    // Viewers that follow each other would go round for ever
+    if (JSON.stringify(checked) === JSON.stringify(this.#camera)) return;
+    this.#camera = checked;
     this.showStill(null);
     this.#announceCamera();
     this.invalidate();
@@ -275,6 +279,7 @@ export class VDIViewer extends HTMLElement {
           if (loading.signal.aborted) return;
           this.#endSeries();
           this.setPrepared(prepared);
+          this.#comeTo(prepared.bounds);
         },
         onSeries: (series) => this.#beginSeries(series),
         onProgress: (progress) => !loading.signal.aborted && this.#tell({ progress }),
@@ -284,6 +289,13 @@ export class VDIViewer extends HTMLElement {
     }
     if (!loading.signal.aborted) this.#source = null;
     return promise;
+  }
+
+  // Look at what an address gives, where it lies elsewhere than what it gave before.
+  #comeTo(bounds) {
+    const before = this.#shownBefore;
+    this.#shownBefore = null;
+    if (before && before.some((edge, k) => edge !== bounds[k])) this.resetCamera();
   }
 
   /** Show the bytes of a .vdi file; what is there stays until they are decoded. */
@@ -343,6 +355,11 @@ export class VDIViewer extends HTMLElement {
 
   set scene(scene) {
     if (scene === this.#coming) return;
+    if (scene?.viewer) {
+      throw new TypeError("A Scene is shown by one viewer: make another one of the same bytes.");
+    }
+    if (scene) scene.viewer = this;
+    if (this.#coming) this.#coming.viewer = null;
     if (this.#coming?.broken) this.#recover();
     this.#coming = scene;
     const isWanted = () => scene === this.#coming;
@@ -585,7 +602,10 @@ export class VDIViewer extends HTMLElement {
 
   attributeChangedCallback(name, before, value) {
     // What goes wrong is said by the error event, on the page and by ready: nobody awaits this
-    if (name === "src" && value) this.load(value).catch(() => {});
+    if (name === "src" && value) {
+      this.#shownBefore = this.#prepared?.bounds;
+      this.load(value).catch(() => {});
+    }
     if (name === "background") this.style.background = value ?? "";
     if (name === "still" && value) this.#parts.img.src = value;
     if (name === "aria-label") this.#parts.canvas.setAttribute("aria-label", value ?? LABEL);

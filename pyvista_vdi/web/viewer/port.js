@@ -6,6 +6,9 @@ import { serve } from "./worker.js";
 /** Files that are decoded at a time, as many as browsers fetch at a time. */
 const MOST_FILES = 6;
 
+/** Milliseconds in which a worker says that it listens, if it is ours. */
+const PATIENCE = 20000;
+
 const idle = []; // workers that have nothing to do
 const waiting = []; // what goes on when another file is done
 let lent = 0;
@@ -22,6 +25,7 @@ export async function decodingPort() {
       await new Promise((resolve, reject) => {
         worker.onmessage = resolve;
         worker.onerror = reject;
+        setTimeout(reject, PATIENCE, new Error(`it says nothing for ${PATIENCE / 1000} s`));
       });
       return worker;
     } catch (error) {
@@ -31,7 +35,8 @@ export async function decodingPort() {
   }
   if (!warned) {
     console.warn("<vdi-viewer> decodes on the page's own thread, as no worker starts: " +
-      `${[...causes].join("; ")}. Is worker.js there, and does the page's policy allow it (worker-src)?`);
+      `${[...causes].join("; ")}. Does the page's policy allow it (worker-src), and is worker.js ` +
+      "beside the script (to some bundlers it is to be named as another entry)?");
     warned = true;
   }
   const port = { onmessage: null, terminate() {} };

@@ -36,6 +36,8 @@ export class Scene {
     this.camera = null;
     /** Called when there is more to be seen, and with what is wrong. */
     this.changed = this.failed = () => {};
+    /** The viewer that shows it. */
+    this.viewer = null;
     /** Whether all of it can be drawn. */
     this.complete = false;
     /** Fulfilled when meshes and texts are there. */
@@ -118,7 +120,7 @@ export class Scene {
     }
     this.#free();
     gl.deleteVertexArray(this.#vertices);
-    this.#gl = null;
+    this.#gl = this.#vertices = null;
   }
 
   /**
