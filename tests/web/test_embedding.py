@@ -337,3 +337,56 @@ def test_a_scene_that_is_damaged_is_made_up_for_by_the_next(vdi, data, open_page
         assert "scene beside the VDI is damaged" in said[1]
         assert said[2:] == ["full", ""]
     page.assert_shows(vdi, SIZE)
+
+
+def test_a_scene_is_shown_by_one_viewer(open_page, vdi, data):
+    page = open_page(SIZE, script='import { Scene } from "./scene.js"; window.Scene = Scene;')
+    page.load(data)
+    said = page.evaluate(
+        """() => {
+          const broken = new Scene(new Uint8Array([1])), other = document.createElement("vdi-viewer");
+          broken.loaded.catch(() => {});
+          viewer.scene = broken;
+          const refused = () => {
+            try { other.scene = broken; return ""; } catch ({ message }) { return message; }
+          };
+          const first = refused();
+          viewer.scene = null;
+          return [first, refused()];
+        }"""
+    )
+    assert "shown by one viewer" in said[0]
+    assert said[1] == ""
+
+
+def test_viewers_follow_each_other(around):
+    """Both tell the other of each view, without end if an equal one were another."""
+    page = around("{viewer}{viewer}")
+    all_ready(page)
+    page.evaluate(
+        """() => {
+          const [one, other] = document.querySelectorAll("vdi-viewer");
+          for (const [from, to] of [[one, other], [other, one]]) {
+            from.addEventListener("camerachange", () => { to.camera = from.camera; });
+          }
+          one.camera = { ...one.camera, view_angle: 20 };
+        }"""
+    )
+    angles = "[...document.querySelectorAll('vdi-viewer')].map((v) => v.camera.view_angle)"
+    assert page.evaluate(angles) == [20, 20]
+
+
+def test_another_address_is_looked_at_where_it_lies(vdi, data, open_page):
+    """What it gives in the same place is seen from the same view."""
+    far = soft_ball(16)
+    far.origin = np.add(far.origin, (100, 0, 0))
+    elsewhere = pvdi.generate(far, filling_camera(far.bounds, SIZE), SIZE, cmap="bone")
+    page = open_page(SIZE, files={"a.vdi": data, "b.vdi": data, "far.vdi": file_of(elsewhere)})
+    positions = []
+    for name in ("a.vdi", "b.vdi", "far.vdi"):
+        page.evaluate(f"viewer.src = '{name}', viewer.ready.then(() => true)")
+        positions.append(page.evaluate("viewer.camera.position"))
+        if name == "a.vdi":
+            page.evaluate("viewer.camera = {...viewer.camera, position: [3, 2, 1]}")
+    assert positions[1] == [3, 2, 1]
+    np.testing.assert_allclose(positions[2], elsewhere.camera.position)

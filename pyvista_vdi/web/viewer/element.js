@@ -355,7 +355,9 @@ export class VDIViewer extends HTMLElement {
 
   set scene(scene) {
     if (scene === this.#coming) return;
-    if (scene?.viewer) {
+    const { viewer } = scene ?? {};
+    if (viewer && !viewer.isConnected) viewer.scene = null;
+    else if (viewer) {
       throw new TypeError("A Scene is shown by one viewer: make another one of the same bytes.");
     }
     if (scene) scene.viewer = this;
