@@ -344,7 +344,8 @@ def test_a_scene_is_shown_by_one_viewer(open_page, vdi, data):
     page.load(data)
     said = page.evaluate(
         """() => {
-          const broken = new Scene(new Uint8Array([1])), other = document.createElement("vdi-viewer");
+          const broken = new Scene(new Uint8Array([1]));
+          const other = document.createElement("vdi-viewer");
           broken.loaded.catch(() => {});
           viewer.scene = broken;
           const refused = () => {
