@@ -308,6 +308,7 @@ def test_a_viewer_keeps_its_subplot(linked):
         add_ball(plotter)
     if linked:
         plotter.link_views()
+    plotter.screenshot()
     for k in range(2):
         plotter.subplot(0, k)
         with pytest.warns(UserWarning, match="without the other subplots"):
@@ -328,6 +329,7 @@ def test_a_viewer_keeps_its_subplot(linked):
 def test_a_series_in_a_notebook_is_said_to_be_one_step(plotter, vdi):
     series = pvdi.VDISeries.of([vdi, vdi.with_precision("8-byte")], [0.0, 1.5])
     actor = plotter.add_vdi(series, name="of two", show_scalar_bar=False)
+    plotter.screenshot()
     words = r"one of the 2 steps of a series \(of two\).*actor.time.*plotter.vdi.export_html"
     with pytest.warns(UserWarning, match=words):
         widget = show_plotter(plotter)
@@ -571,18 +573,21 @@ def test_a_page_of_nbconvert_has_one_picture(seen, stand_in, widget, open_page):
     else:
         output = f'<img src="data:image/png;base64,{data["image/png"]}">'
     html = CONVERTED.replace("SCRIPT", stand_in).replace("OUTPUT", output)
-    state, files = widget.get_state(), binaries(widget)
-    files |= {"page.html": html, "widget.js": state["_esm"]}
+    state, sent = widget.get_state(), binaries(widget)
+    files = {**sent, "page.html": html, "widget.js": state.pop("_esm")}
     page = open_page(name="page.html", files=files)
     assert page.evaluate(STOOD_IN) == ([SIZE[0]] if seen == "view" else [])
     # A viewer that comes takes it away
     page.evaluate(
-        """async (values) => {
+        """async ([values, binaries]) => {
           const { default: widget } = await import("./widget.js");
+          for (const name of binaries) {
+            values[name] = new DataView(await (await fetch(name)).arrayBuffer());
+          }
           const model = { get: (name) => values[name], on() {}, off() {} };
           widget.render({ model, el: document.getElementById("view") });
         }""",
-        {name: value for name, value in state.items() if name not in files and name != "_esm"},
+        [{name: state[name] for name in state.keys() - sent.keys()}, [*sent]],
     )
     assert page.evaluate(STOOD_IN) == []
 

@@ -257,9 +257,9 @@ function fillPanel(panel, remote, hello, complain) {
     const takeRange = () => {
       const ends = [low, high].map((end, k) => (end.value ? Number(end.value) : hello.range[k]));
       const wrong = [low, high].some((end) => end.validity.badInput)
-        ? "The range is two numbers."
+        ? "the range is two numbers"
         : ends[0] < ends[1] ? ""
-        : `The range is from the lower value to the higher: ${ends[0]} is not below ${ends[1]}.`;
+        : `the range is from the lower value to the higher: ${ends[0]} is not below ${ends[1]}`;
       for (const end of [low, high]) {
         end.setCustomValidity(wrong);
         end.setAttribute("aria-invalid", wrong !== "");
@@ -320,7 +320,7 @@ export function connectPage(viewer, panel, line) {
   const said = { wrong: "", going: "" };
   const say = (what) => {
     Object.assign(said, what);
-    line.textContent = [said.wrong, said.going].filter(Boolean).join(" ");
+    line.textContent = [said.wrong, said.going].filter(Boolean).join("; ");
   };
   let offered = "";
   remote.addEventListener("hello", ({ detail }) => {
