@@ -110,7 +110,7 @@ def stand_in(picture: str, key: str, model_id: str) -> None:
     """
     ipython = sys.modules.get("IPython")
     shell = None if ipython is None else ipython.get_ipython()
-    if hasattr(shell, "kernel"):
+    if shell is not None and hasattr(shell, "kernel"):
         script = _STAND_IN.format(picture=picture, key=key, model_id=model_id)
         shell.display_pub.publish({"application/javascript": script})
 
