@@ -273,7 +273,11 @@ function fillPanel(panel, remote, hello, complain) {
       remote.setLook(Object.fromEntries(Object.entries(look).filter(([, value]) => value)));
     };
     [cmap, opacity].forEach((input) => input.addEventListener("change", tell));
-    [low, high].forEach((input) => input.addEventListener("change", () => takeRange() && tell()));
+    for (const end of [low, high]) {
+      end.addEventListener("change", () => takeRange() && tell());
+      // What is wrong is right as soon as it is: of letters that are deleted there is no change
+      end.addEventListener("input", () => end.validity.valid || (takeRange() && tell()));
+    }
     controls.push(labelled("Colours", cmap), labelled("Opacity", opacity));
     controls.push(labelled("Range", low, high));
   }
