@@ -64,7 +64,7 @@ def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.Str
 
 def several_of(renderer: Any, actors: Sequence[Any]) -> list[str]:
     """Name the series and sets that actors show one VDI of."""
-    called = {actor: name for name, actor in renderer.actors.items()}
+    called = {actor: name for name, actor in renderer.actors.items() if "(Addr" not in name}
     return [
         f"the {len(shown)} {kind} ({called.get(actor, type(actor).__name__)})"
         for actor in actors
