@@ -14,6 +14,8 @@ const LAST_RETRY = 16000;
 const LONGEST_EDGE = 8192;
 /** Why a server ends a connection for good: the client has said something wrong. */
 const REFUSED = 1008;
+/** Code of a connection that has ended, or was not made, without a word. */
+const UNSAID = 1006;
 /** Status of an ordinary request of the socket's address, and of one that is not let in. */
 const NO_SOCKET = 426;
 const FORBIDDEN = 403;
@@ -216,7 +218,9 @@ export class RemoteVDI extends EventTarget {
 // Why there is no connection, and whether there will be none. Of a socket that is refused a browser
 // says nothing; an ordinary request of its address is told.
 async function whyNot({ code, reason }, url) {
-  if (reason) return { why: reason, forGood: code === REFUSED };
+  if (reason || code !== UNSAID) {
+    return { why: reason || "the connection was lost", forGood: code === REFUSED };
+  }
   try {
     const signal = AbortSignal.timeout(LAST_RETRY);
     const answer = await fetch(url.replace(/^ws/, "http"), { cache: "no-store", signal });
