@@ -32,6 +32,6 @@ plotter.add_mesh(volume.outline(), color="gray", line_width=2)
 plotter.add_text("A brain, cut open", position="upper_left", font_size=10)
 plotter.set_background("white", top="lightsteelblue")
 plotter.camera_position = [(560, 330, 240), (x, y, z), (0, 0, 1)]
-plotter.export_html(target)
+plotter.vdi.export_html(target)
 plotter.close()
 print(f"{target}: {target.stat().st_size / 2**20:.1f} MiB")

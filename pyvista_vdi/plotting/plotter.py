@@ -6,14 +6,15 @@ import pyvista as pv
 
 from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
 from pyvista_vdi.plotting.component import AddVDI
+from pyvista_vdi.plotting.pages import PlotterVDIs
 
 
 class Plotter(pv.Plotter):
     """A :class:`pyvista.Plotter` that says what this package adds to it.
 
     Every plotter of PyVista's has ``add_vdi`` where this package is installed; tools that read code
-    do not know that. Of this one they complete and check ``add_vdi`` and ``add_vdi_clip_plane``. It
-    does what PyVista's does, and takes its arguments.
+    do not know that. Of this one they complete and check ``add_vdi``, ``add_vdi_clip_plane`` and
+    ``vdi.export_html``. It does what PyVista's does, and takes its arguments.
 
     Examples
     --------
@@ -25,3 +26,4 @@ class Plotter(pv.Plotter):
 
     add_vdi: AddVDI
     add_vdi_clip_plane: AddVDIClipPlane
+    vdi: PlotterVDIs

@@ -3,9 +3,6 @@
 Data sets get ``vdi`` in the same way: where several threads ask for what an entry point names,
 PyVista gives it to one and an error to others.
 
-Besides, ``export_html`` of a plotter with VDIs writes a page that shows them; of others it is
-PyVista's own.
-
 PyVista imports what its entry points name when a plotter lacks an attribute: in
 ``BasePlotter.__getattr__``. pyvistaqt's plotters derive from a Qt widget first, whose own
 ``__getattr__`` answers before it, so that no entry point is looked at. An attribute of
@@ -14,7 +11,6 @@ PyVista imports what its entry points name when a plotter lacks an attribute: in
 
 from __future__ import annotations
 
-import functools
 import importlib
 import sys
 import weakref
@@ -25,7 +21,6 @@ from types import ModuleType
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.providers import provider
 
 _PLOTTERS = "pyvista.plotting"
 
@@ -34,6 +29,7 @@ _PLOTTERS = "pyvista.plotting"
 COMPONENTS = {
     "add_vdi": "pyvista_vdi.plotting.component",
     "add_vdi_clip_plane": "pyvista_vdi.plotting.clip_plane",
+    "vdi": "pyvista_vdi.plotting.pages",
 }
 ACCESSORS = {"vdi": "pyvista_vdi.plotting.accessor"}
 
@@ -107,30 +103,6 @@ def _offer(plotters: ModuleType) -> None:
         for name, home in offered.items():
             if home not in sys.modules:
                 setattr(kind, name, _Pending(name, home))
-    if hasattr(base, "export_html"):
-        base.export_html = _with_vdis(base.export_html)
-
-
-def _with_vdis(export_html: Any) -> Any:
-    """Return ``Plotter.export_html`` that knows of VDIs."""
-
-    @functools.wraps(export_html)
-    def export(plotter: Any, filename: Any, *args: Any, **options: Any) -> Any:
-        if args or options or not _shows_vdis(plotter):
-            return export_html(plotter, filename, *args, **options)
-        return provider("scene_pages")(plotter, filename)
-
-    return export
-
-
-def _shows_vdis(plotter: Any) -> bool:
-    """Whether a plotter has visible VDIs."""
-    module = sys.modules.get("pyvista_vdi.vtk_pipeline.drawing.actor")
-    return module is not None and any(
-        isinstance(actor, module.VDIActorMethods) and actor.GetVisibility()
-        for renderer in plotter.renderers
-        for actor in renderer.actors.values()
-    )
 
 
 def install() -> None:

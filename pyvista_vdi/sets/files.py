@@ -14,6 +14,7 @@ from pyvista_vdi.io.vdi_file.description import number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
 from pyvista_vdi.series.layout import index_bytes
@@ -89,17 +90,26 @@ def write(
     """Write a set to a file, which appears whole or not at all: see :meth:`VDISet.save`."""
     target = check_writable(with_suffix(as_path(path), (SUFFIX,), "a set"))
     writer = StepsWriter(precision, tolerance, 1, compression, level)
-    views = list(vdi_set.cameras)
-    done = Pieces(progress, len(views))
     with whole_file(target) as stream:
-        _begin(writer, stream, vdi_set)
-        if stream.tell() > MAX_DESCRIPTION_BYTES:
-            raise InvalidVDIError(f"{len(views)} views are more than a file's head can hold")
-        for i in range(len(views)):
-            writer.write(stream, vdi_set[i], float(i))
-            done()
-        writer.finish(stream)
+        write_all(stream, writer, vdi_set, progress)
     return target
+
+
+def write_all(
+    stream: BinaryIO, writer: StepsWriter, vdi_set: VDISet, progress: Progress | None = None
+) -> int:
+    """Write a whole file to a stream; return how many bytes show its first VDI."""
+    views, first = list(vdi_set.cameras), 0
+    done = Pieces(progress, len(views))
+    _begin(writer, stream, vdi_set)
+    if stream.tell() > MAX_DESCRIPTION_BYTES:
+        raise InvalidVDIError(f"{len(views)} views are more than a file's head can hold")
+    for i in range(len(views)):
+        writer.write(stream, vdi_set[i], float(i))
+        first = first or stream.tell()
+        done()
+    writer.finish(stream)
+    return first
 
 
 def bytes_around(vdi_set: VDISet) -> int:
@@ -165,5 +175,8 @@ def read_info(path: str | os.PathLike[str]) -> tuple[SeriesInfo, dict[str, Any]]
 
 
 def is_set_file(path: Any) -> bool:
-    """Whether a file is read as a set: by its name."""
-    return str(path).lower().endswith(SUFFIX)
+    """Whether a file is read as a set: by its name, and a page by its content."""
+    name = str(path).lower()
+    if name.endswith(".html"):
+        return bool(provider("html_files").begins_with(path, MAGIC))
+    return name.endswith(SUFFIX)

@@ -74,7 +74,7 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     except MissingDependencyError as error:
         warn_external(str(error))
         return _shown_by_pyvista(plotter, screenshot, options)
-    from pyvista_vdi.web.scenes.export import around
+    from pyvista_vdi.web.scenes.export import around, several_of
     from pyvista_vdi.web.scenes.scene import scene_of
 
     scene = scene_of(renderer, renderer.actors, camera=False)
@@ -83,6 +83,13 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
         warn_external(
             f"the notebook's viewer shows the scene without {', '.join(without)}: see all by "
             'jupyter_backend="server"'
+        )
+    steps = several_of(renderer, [actor for actor in scene.actors if actor.series is not None])
+    if steps:
+        warn_external(
+            f"the notebook's viewer shows one of {', '.join(steps)}, and has no controls: set "
+            "actor.time and call plotter.render() for another, or have a page that plays written "
+            "by plotter.vdi.export_html"
         )
     return PlotterWidget(plotter, scene, plotter.screenshot(screenshot, return_img=True))
 

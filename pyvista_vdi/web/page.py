@@ -66,6 +66,7 @@ _PAGE = """\
 html, body {{ height: 100%; margin: 0; background: {background}; color: gray; }}
 vdi-viewer {{ width: 100%; height: 100%; aspect-ratio: auto; }}
 vdi-viewer:not(:defined) {{ display: block; text-align: center; }}
+vdi-viewer > img {{ max-width: 100%; max-height: 100%; }}
 p {{ font: 14px sans-serif; text-align: center; }}
 </style>
 </head>
@@ -105,7 +106,7 @@ class View:
     attributes : dict of str to str
         More attributes of the element.
     series : sequence of bytes
-        Parts of a .vdis file; the first shows its first step.
+        Parts of a .vdis file; the first shows its first step. Or those of a .vdiset file.
     """
 
     vdi: VDI | None
@@ -267,24 +268,32 @@ def write_series(
     With ``autoplay`` it plays as soon as it is opened.
     """
     target = Path(os.path.realpath(check_writable(Path(path))))
-    writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
     percents = " ".join(f"{100 * channel:g}%" for channel in background)
     first = series[0]
     still = over_background(_from_generating_view(first), background)
+    writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
     cut = write_all(stream, writer, series, series.times, progress)
-    data, cut = stream.getvalue(), -(-cut // 3) * 3
     view = View(
         None,
         f"rgb({percents})",
         np.rint(still * 255).astype(np.uint8),
         first.picture_size,
         attributes={"autoplay": ""} if autoplay else {},
-        series=[data[:cut], *(data[k : k + _PART] for k in range(cut, len(data), _PART))],
+        series=in_parts(stream.getvalue(), cut),
     )
     content = assembled([view], title=target.stem if title is None else title)
     with whole_file(target) as out:
         out.write(content)
     return target
+
+
+def in_parts(data: bytes, cut: int) -> list[bytes]:
+    """Return the parts in which a page holds a .vdis or .vdiset file; the first has ``cut`` bytes.
+
+    Or a few more: base64 text is decoded by threes of bytes.
+    """
+    cut = -(-cut // 3) * 3
+    return [data[:cut], *(data[k : k + _PART] for k in range(cut, len(data), _PART))]
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:

@@ -21,19 +21,19 @@ _REST = 0.2
 
 
 class PlotterWidget(VDIWidget):
-    """What ``plotter.show(jupyter_backend="vdi")`` shows.
+    """What ``plotter.show(jupyter_backend="vdi")`` shows: the plotter's active renderer.
 
-    What is turned in the browser turns the plotter's camera; after each ``plotter.render()`` the
-    browser has the plotter's camera and background, its VDIs with their clipping planes, opacity
-    multipliers and places, and its meshes, lines, points and texts. When a view rests the plotter
-    is rendered in the kernel's event loop: its VDIs are kept up to date as in a window on a screen.
+    What is turned in the browser turns its camera; after each ``plotter.render()`` the browser has
+    its camera and background, its VDIs with their clipping planes, opacity multipliers and places,
+    and its meshes, lines, points and texts. When a view rests the plotter is rendered in the
+    kernel's event loop: its VDIs are kept up to date as in a window on a screen.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
-        Rendered before; held weakly.
+        Rendered before; held weakly, as its active renderer.
     scene : Scene
-        What its active renderer shows.
+        What that shows.
     picture : numpy.ndarray
         uint8 (H, W, 3), the plotter's picture, which is kept in a saved notebook.
     """
@@ -41,7 +41,8 @@ class PlotterWidget(VDIWidget):
     _esm = viewer_script(scene=True, module=True) + RENDER
 
     def __init__(self, plotter: Any, scene: Any, picture: Any) -> None:
-        self._plotter = weakref.ref(plotter)
+        self._plotter, renderer = weakref.ref(plotter), plotter.renderer
+        self._renderer = weakref.ref(renderer)  # another one may be active later
         self._actor = actor = scene.actor
         self._picture = picture
         self._rest: asyncio.TimerHandle | None = None
@@ -50,10 +51,10 @@ class PlotterWidget(VDIWidget):
             self._loop = asyncio.get_running_loop()
         self._look = look_of(actor)
         shown = as_shown(actor)
-        super().__init__(shown, camera=plotter.camera, background=plotter.background_color)
+        super().__init__(shown, camera=renderer.camera, background=renderer.background_color)
         self.clipping_planes = planes_of(actor)
         self._take(scene)
-        self._picture_size = list(plotter.window_size)
+        self._picture_size = list(renderer.GetSize())
         self.observe(self._turn, "camera")
         me = weakref.ref(self)
 
@@ -62,7 +63,7 @@ class PlotterWidget(VDIWidget):
             if widget is not None:
                 widget._follow()
 
-        plotter.renderer.AddObserver("EndEvent", rendered)
+        renderer.AddObserver("EndEvent", rendered)
         browser.follow(self)
 
     @property
@@ -83,16 +84,16 @@ class PlotterWidget(VDIWidget):
         plotter = self._plotter()
         return None if self.window is None else plotter
 
-    @staticmethod
-    def _plotter_camera(plotter: Any) -> dict[str, Any]:
-        return viewer_camera(plotter.camera, plotter.window_size)
+    def _open_renderer(self) -> Any:
+        """Return what is shown, or ``None`` when the plotter is gone or closed."""
+        return None if self.window is None else self._renderer()
 
     def _turn(self, change: Any) -> None:
-        """Give the plotter the camera that has changed in the browser, or here."""
-        plotter = self._open_plotter()
-        if plotter is None or _same(self._plotter_camera(plotter), change.new):
+        """Give the renderer the camera that has changed in the browser, or here."""
+        renderer = self._open_renderer()
+        if renderer is None or _same(_camera_of(renderer), change.new):
             return
-        state, camera = change.new, plotter.camera
+        state, camera = change.new, renderer.camera
         camera.position, camera.focal_point = state["position"], state["focal_point"]
         camera.up = state["view_up"]
         camera.parallel_projection = "parallel_scale" in state
@@ -100,7 +101,7 @@ class PlotterWidget(VDIWidget):
         if "view_angle" in state:
             camera.SetUseHorizontalViewAngle(False)
             camera.view_angle = state["view_angle"]
-        plotter.renderer.ResetCameraClippingRange()
+        renderer.ResetCameraClippingRange()
         if self._loop is not None:  # messages may come in a thread of their own
             self._loop.call_soon_threadsafe(self._wait_for_rest)
 
@@ -111,16 +112,16 @@ class PlotterWidget(VDIWidget):
         self._rest = self._loop.call_later(_REST, self.draw)
 
     def _follow(self) -> None:
-        """Take what the plotter has drawn; parts of a larger picture have other cameras."""
-        plotter = self._open_plotter()
-        if plotter is None or tuple(plotter.render_window.GetTileScale()) != (1, 1):
+        """Take what the renderer has drawn; parts of a larger picture have other cameras."""
+        renderer = self._open_renderer()
+        if renderer is None or tuple(self.window.GetTileScale()) != (1, 1):
             return
-        camera = self._plotter_camera(plotter)
+        camera = _camera_of(renderer)
         if not _same(camera, self.camera):
             self.camera = camera
-        self.background = plotter.background_color
+        self.background = renderer.background_color
+        self._take_if_new(renderer)
         self.clipping_planes = planes_of(self._actor)
-        self._take_if_new(plotter.renderer)
         if self._actor.vdi is not None and look_of(self._actor) != self._look:
             self._look = look_of(self._actor)
             self.vdi = as_shown(self._actor)
@@ -132,13 +133,17 @@ class PlotterWidget(VDIWidget):
             self._take(scene_of(renderer, camera=False))
 
     def _take(self, scene: Any) -> None:
-        self._known = scene.state
+        self._known, self._actor = scene.state, scene.actor
         if scene.data != self._scene:
             self._scene = scene.data
         self._gradient = scene.background if "gradient" in scene.background else ""
 
     def _still(self) -> str:
         return png(self._picture)
+
+
+def _camera_of(renderer: Any) -> dict[str, Any]:
+    return viewer_camera(renderer.camera, renderer.GetSize())
 
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:

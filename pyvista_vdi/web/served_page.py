@@ -14,11 +14,17 @@ _PAGE = """\
 html, body {{ margin: 0; height: 100%; background: #202020; color: #d0d0d0; }}
 body {{ display: flex; flex-direction: column; font: 14px sans-serif; }}
 vdi-viewer {{ flex: 1; min-height: 0; }}
-form {{ display: flex; flex-wrap: wrap; gap: 4px 16px; padding: 6px 10px; align-items: center; }}
+form {{ position: relative; display: flex; flex-wrap: wrap; gap: 4px 16px; padding: 6px 10px;
+  align-items: center; min-height: 1.5em; }}
 label {{ display: flex; gap: 6px; align-items: center; }}
 input[type="number"] {{ width: 6em; }}
-/* As large whatever it says: the viewer's size is the view that is asked for. */
-output {{ margin-left: auto; width: 14em; height: 1.5em; overflow: auto; text-align: right; }}
+input:invalid {{ outline: 2px solid #ff6060; }}
+/* Over the picture, as high as its text: the viewer's size, which is the view that is asked for,
+   depends on nothing that is said. */
+output {{ position: absolute; right: 0; bottom: 100%; max-width: 100%; box-sizing: border-box;
+  padding: 4px 10px; background: #000c; text-align: right; overflow-wrap: anywhere;
+  pointer-events: none; }}
+output:empty {{ padding: 0; }}
 </style>
 <body>
 <vdi-viewer id="viewer"></vdi-viewer>

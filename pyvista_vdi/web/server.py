@@ -204,7 +204,10 @@ class Server:
             return _refused("pages of other sites are not let in")
         given = request.query.get("token", "").encode()
         if not hmac.compare_digest(given, self.token.encode()):
-            return _refused("the address needs the token that the server has said")
+            return _refused(
+                "this address is no longer valid, or never was: "
+                "open the one that the server printed when it was started"
+            )
         return await handler(request)
 
     def _is_ours(self, place: SplitResult) -> bool:
@@ -237,6 +240,12 @@ class Server:
         connection = web.WebSocketResponse(
             max_msg_size=MAX_MESSAGE, heartbeat=_HEARTBEAT, compress=False
         )
+        if not connection.can_prepare(request):
+            return web.Response(
+                status=426,
+                text="this address is a WebSocket's: open the server's page\n",
+                headers={"Upgrade": "websocket", "Sec-WebSocket-Version": "13"},
+            )
         client = Client(self._source, self._threads, self._below)
         self.clients.add(client)
         try:

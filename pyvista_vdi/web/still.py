@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from base64 import b64encode
 from collections.abc import Sequence
 from typing import Any
@@ -21,6 +22,27 @@ from pyvista_vdi.web.camera import camera_of, viewer_camera
 _EFFORT = {"quality": 0, "method": 1}
 #: Longest edge of a picture that is kept in a saved notebook, pixels.
 _EDGE = 800
+
+#: What an output does that has a picture, for where a widget's view comes to nothing: in a page
+#: that nbconvert has written with the widget's state, which has the view in place of the picture,
+#: and fetches from elsewhere what draws it; and in a notebook that is opened without its kernel.
+#: Viewers say that they are there in ``pyvistaVDIs``, and take the picture away.
+_STAND_IN = """\
+((place) => {{
+  const show = () => {{
+    if (!place || globalThis.pyvistaVDIs?.has("{key}")) return;
+    place.insertAdjacentHTML("beforeend", '<img data-vdi="{key}" style="max-width: 100%" '
+      + 'alt="a still picture of a volume" src="data:image/png;base64,{picture}">');
+  }};
+  const views = 'script[type="application/vnd.jupyter.widget-view+json"]';
+  if (document.readyState === "loading") {{
+    document.addEventListener("DOMContentLoaded", () => {{
+      const among = [...document.querySelectorAll(views)];
+      if (among.some(({{ textContent }}) => textContent.includes("{model_id}"))) show();
+    }});
+  }} else setTimeout(show, 3000);
+}})(typeof element === "undefined" ? null : element[0] ?? element);
+"""
 
 
 def picture(
@@ -79,6 +101,18 @@ def png(pixels: NDArray[np.uint8]) -> str:
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, format="png")
     return b64encode(stream.getvalue()).decode()
+
+
+def stand_in(picture: str, key: str, model_id: str) -> None:
+    """Have a notebook show a picture, base64 PNG, where a widget's view comes to nothing.
+
+    It is an output of its own: of one output, what shows notebooks takes the view alone.
+    """
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    if shell is not None and hasattr(shell, "kernel"):
+        script = _STAND_IN.format(picture=picture, key=key, model_id=model_id)
+        shell.display_pub.publish({"application/javascript": script})
 
 
 def webp(image: NDArray[np.float32]) -> bytes:

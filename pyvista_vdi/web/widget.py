@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import secrets
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,7 +21,7 @@ from pyvista_vdi.model.render_options import checked_planes
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.web.bundle import viewer_script
 from pyvista_vdi.web.camera import viewer_camera
-from pyvista_vdi.web.still import picture, still
+from pyvista_vdi.web.still import picture, stand_in, still
 
 try:
     import anywidget
@@ -77,6 +78,9 @@ function render({ model, el }) {
     viewer.showBytes(bytesOf(model.get("_file"))).catch(() => {}); // the viewer says what is wrong
   };
   el.replaceChildren(viewer);
+  const key = model.get("_key"); // what stands in for the viewer has it, too: still.py
+  (globalThis.pyvistaVDIs ??= new Set()).add(key);
+  document.querySelectorAll(`img[data-vdi="${key}"]`).forEach((picture) => picture.remove());
   const taken = {
     background: takeBackground, _gradient: takeBackground, clipping_planes: takePlanes,
     _scene: takeScene, _file: takeFile, camera: takeCamera,
@@ -168,6 +172,7 @@ class VDIWidget(anywidget.AnyWidget):
     _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
     _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
     _picture_size = traitlets.List(traitlets.Int(), [1, 1]).tag(sync=True)
+    _key = traitlets.Unicode("").tag(sync=True)
     camera = _CameraTrait(allow_none=False).tag(sync=True)
     background = _ColorTrait(None, allow_none=True).tag(sync=True)
     clipping_planes = _PlanesTrait([]).tag(sync=True)
@@ -185,6 +190,7 @@ class VDIWidget(anywidget.AnyWidget):
         super().__init__(
             _file=self._encoded(self._vdi),
             _picture_size=list(self._vdi.picture_size),
+            _key=secrets.token_hex(8),
             camera=self._vdi.camera if camera is None else camera,
             background=background,
         )
@@ -250,7 +256,10 @@ class VDIWidget(anywidget.AnyWidget):
         """Return the view, and a picture for where there can be no view."""
         data, metadata = super()._repr_mimebundle_(**kwargs)
         shown = self._still()
-        return (data if shown is None else {**data, "image/png": shown}), metadata
+        if shown is None:
+            return data, metadata
+        stand_in(shown, self._key, self.model_id)
+        return {**data, "image/png": shown}, metadata
 
     def _still(self) -> str | None:
         """Return that picture as base64 PNG, if it can be had."""

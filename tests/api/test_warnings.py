@@ -65,7 +65,7 @@ def drawn_by_a_renderer(plotter, tmp_path):
 def a_page_without_all(plotter, tmp_path):
     plotter.add_vdi(VALUES, show_scalar_bar=False)
     plotter.add_axes_at_origin()
-    plotter.export_html(tmp_path / "page.html")
+    plotter.vdi.export_html(tmp_path / "page.html")
 
 
 def a_view_from_inside(plotter, tmp_path):

@@ -23,6 +23,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
 from pyvista_vdi.plotting.component import AddVDI
+from pyvista_vdi.plotting.pages import PlotterVDIs
 
 pytestmark = pytest.mark.gl
 
@@ -30,7 +31,7 @@ WINDOW = (60, 50)
 #: That the VDI is missing where a scene is written for another renderer.
 MESSAGE = (
     "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
-    "plotter.export_html, screenshots"
+    "plotter.vdi.export_html, screenshots"
 )
 
 
@@ -165,7 +166,7 @@ def test_help_is_the_method_s_and_what_is_promised_is_there(plotter):
     assert "plane widget" in inspect.getdoc(plotter.add_vdi_clip_plane)
     ours = pvdi.Plotter(off_screen=True, window_size=WINDOW)
     assert isinstance(ours, pv.Plotter)
-    kinds = {"add_vdi": AddVDI, "add_vdi_clip_plane": AddVDIClipPlane}
+    kinds = {"add_vdi": AddVDI, "add_vdi_clip_plane": AddVDIClipPlane, "vdi": PlotterVDIs}
     assert pvdi.Plotter.__annotations__ == {name: kind.__name__ for name, kind in kinds.items()}
     assert {name: type(getattr(ours, name)) for name in kinds} == kinds
 
@@ -204,8 +205,13 @@ def test_asking_for_the_data_to_be_exported_warns_once_and_nothing_else_does(plo
 
 
 @pytest.mark.parametrize("what", ["export_html", "export_vtksz"])
-def test_exports_of_trame_warn(plotter, what):
+@pytest.mark.parametrize("of", ["plotter", "plotter.trame"])
+def test_exports_of_trame_warn(plotter, what, of):
+    """PyVista's own name them deprecated as well, and call them."""
     pytest.importorskip("trame_pyvista")
     added(plotter)
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        getattr(plotter.trame, what)(None)
+    export = getattr(plotter if of == "plotter" else plotter.trame, what)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pv.PyVistaDeprecationWarning)
+        with pytest.warns(VDIWarning, match=MESSAGE):
+            export(None)

@@ -124,7 +124,7 @@ def test_a_scene_is_drawn_as_vtk_draws_it(tmp_path):
     plotter.add_mesh(pv.Sphere(radius=0.4, center=(1.2, 0.9, 0.9)), color="tomato")
     plotter.add_mesh(pv.Cube(center=(-1, 0.9, 0.9)), color="b", opacity=0.5)
     plotter.add_mesh(pv.Line((-2, -1, 0), (2, 1, 1)), color="k", line_width=3)
-    plotter.export_html(tmp_path / "scene.html")
+    plotter.vdi.export_html(tmp_path / "scene.html")
     picture = picture_in_firefox(tmp_path, tmp_path / "scene.html").astype(float)
     got = picture[..., :3] + 255 - picture[..., 3:]
     expected = plotter.screenshot()[..., :3].astype(float)

@@ -332,3 +332,22 @@ def pictures_in(path):
                 png = base64.b64decode(output["data"]["image/png"])
                 found[k] = np.asarray(Image.open(io.BytesIO(png)))
     return found
+
+
+def test_nbconvert_s_page_of_an_executed_notebook_shows_the_picture_offline(
+    chromium, vdi, tmp_path
+):
+    pytest.importorskip("nbconvert")
+    vdi.save(tmp_path / "ball.vdi")
+    nbformat = pytest.importorskip("nbformat")
+    code = 'import pyvista_vdi as pvdi\npvdi.read("ball.vdi")'
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    nbformat.write(book, tmp_path / "book.ipynb")
+    command = ["nbconvert", "--execute", "--to", "html", "book.ipynb"]
+    subprocess.run([sys.executable, "-m", *command], cwd=tmp_path, check=True, timeout=LONG)
+    context = chromium.new_context(offline=True)
+    page = context.new_page()
+    page.goto((tmp_path / "book.html").as_uri(), wait_until="domcontentloaded")
+    [seen] = [image for image in page.locator("img").all() if image.is_visible()]
+    assert seen.evaluate("(it) => it.decode().then(() => it.naturalWidth)") == SIZE[0]
+    context.close()

@@ -6,6 +6,7 @@ import importlib.metadata
 import io
 import json
 import sys
+import types
 import warnings
 from pathlib import Path
 
@@ -296,6 +297,48 @@ def test_what_the_viewer_leaves_out_is_named(plotter):
 
 
 @pytest.mark.gl
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_viewer_keeps_its_subplot(linked):
+    """Whichever is active later; others turn with it if they are linked."""
+    plotter = pv.Plotter(shape=(1, 2), off_screen=True, window_size=SIZE, notebook=True)
+    widgets = []
+    for k, color in enumerate(("navy", "white")):
+        plotter.subplot(0, k)
+        plotter.set_background(color, all_renderers=False)
+        add_ball(plotter)
+    if linked:
+        plotter.link_views()
+    plotter.screenshot()
+    for k in range(2):
+        plotter.subplot(0, k)
+        with pytest.warns(UserWarning, match="without the other subplots"):
+            widgets.append(show_plotter(plotter))
+    before = widgets[1].camera
+    turned = viewer_camera(pvdi.Camera((9, 1, 1), (1, 1, 1), (0, 1, 0), view_angle=20))
+    widgets[0].set_state({"camera": turned})
+    plotter.render()
+    first, second = (viewer_camera(renderer.camera) for renderer in plotter.renderers)
+    assert first == turned
+    assert second == widgets[1].camera == (turned if linked else before)
+    assert [widget.background for widget in widgets] == ["#000080", "#ffffff"]
+    assert widgets[0].camera == turned
+    plotter.close()
+
+
+@pytest.mark.gl
+def test_a_series_in_a_notebook_is_said_to_be_one_step(plotter, vdi):
+    series = pvdi.VDISeries.of([vdi, vdi.with_precision("8-byte")], [0.0, 1.5])
+    actor = plotter.add_vdi(series, name="of two", show_scalar_bar=False)
+    plotter.screenshot()
+    words = r"one of the 2 steps of a series \(of two\).*actor.time.*plotter.vdi.export_html"
+    with pytest.warns(UserWarning, match=words):
+        widget = show_plotter(plotter)
+    actor.time = 1.5
+    plotter.render()
+    assert widget.vdi is series[1]
+
+
+@pytest.mark.gl
 def test_a_scene_is_sent_again_when_something_in_it_is_another(plotter):
     add_ball(plotter, regenerate="never")
     sphere = plotter.add_mesh(pv.Sphere(), color="w")
@@ -495,3 +538,65 @@ def test_the_view_shows_a_plotter_s_scene_and_another_in_its_place(open_widget, 
         [list(binaries(widget))[1], in_base64(scene_of(widget))],
     )
     assert not is_red(picture(page, SIZE, "viewers[0]")).any()
+
+
+#: As nbconvert writes outputs: what an output's script does, and then the view, or the picture.
+CONVERTED = """<!doctype html><meta charset="utf-8"><div id="a"></div>
+<script>var element = document.getElementById("a");</script><script>SCRIPT</script>
+<div id="view">OUTPUT</div>"""
+
+
+@pytest.fixture
+def stand_in(widget, monkeypatch):
+    """What a kernel's output does beside a widget's view."""
+    pytest.importorskip("IPython")
+    said = []
+    publish = types.SimpleNamespace(publish=said.append)
+    shell = types.SimpleNamespace(kernel=None, display_pub=publish)
+    monkeypatch.setattr("IPython.get_ipython", lambda: shell)
+    widget._repr_mimebundle_()
+    [[(kind, script)]] = [each.items() for each in said]
+    assert kind == "application/javascript"
+    return script
+
+
+STOOD_IN = "[...document.querySelectorAll('#a img')].map((it) => it.naturalWidth)"
+
+
+@pytest.mark.parametrize("seen", ["view", "picture"])
+def test_a_page_of_nbconvert_has_one_picture(seen, stand_in, widget, open_page):
+    """Where it has the widget's view, which is drawn by what comes from the network, if at all."""
+    data, _ = widget._repr_mimebundle_()
+    if seen == "view":
+        text = json.dumps(data[WIDGET_VIEW])
+        output = f'<script type="{WIDGET_VIEW}">{text}</script>'
+    else:
+        output = f'<img src="data:image/png;base64,{data["image/png"]}">'
+    html = CONVERTED.replace("SCRIPT", stand_in).replace("OUTPUT", output)
+    state, sent = widget.get_state(), binaries(widget)
+    files = {**sent, "page.html": html, "widget.js": state.pop("_esm")}
+    page = open_page(name="page.html", files=files)
+    assert page.evaluate(STOOD_IN) == ([SIZE[0]] if seen == "view" else [])
+    # A viewer that comes takes it away
+    page.evaluate(
+        """async ([values, binaries]) => {
+          const { default: widget } = await import("./widget.js");
+          for (const name of binaries) {
+            values[name] = new DataView(await (await fetch(name)).arrayBuffer());
+          }
+          const model = { get: (name) => values[name], on() {}, off() {} };
+          widget.render({ model, el: document.getElementById("view") });
+        }""",
+        [{name: state[name] for name in state.keys() - sent.keys()}, [*sent]],
+    )
+    assert page.evaluate(STOOD_IN) == []
+
+
+def test_a_notebook_without_its_kernel_has_the_picture(stand_in, open_page):
+    page = open_page(name="page.html", files={"page.html": "<!doctype html><div id='a'></div>"})
+    run = """(script) => {
+      window.setTimeout = (later) => later();
+      new Function("element", "document", script)(document.getElementById("a"), document);
+    }"""
+    page.evaluate(run, stand_in)
+    page.wait_for(f"{STOOD_IN}.length === 1")

@@ -116,6 +116,17 @@ def test_without_scripts_there_is_the_still_picture(vdi, open_file):
     assert "Scripts are turned off" in page.locator("noscript").inner_text()
 
 
+def test_without_scripts_the_still_picture_is_within_a_narrow_page(vdi, open_page, tmp_path):
+    path = tmp_path / "a.html"
+    path.write_bytes(page_of(vdi))
+    for viewport in ({"width": 60, "height": 200}, {"width": 300, "height": 50}):
+        page = open_page(url=path.as_uri(), viewport=viewport, java_script_enabled=False).page
+        box = page.locator("vdi-viewer > img").bounding_box()
+        assert box["x"] + box["width"] <= viewport["width"]
+        assert box["y"] + box["height"] <= viewport["height"]
+        assert box["width"] / box["height"] == pytest.approx(SIZE[0] / SIZE[1], abs=0.02)
+
+
 def test_without_webgl_2_there_are_a_sentence_and_the_still_picture(vdi, open_file):
     hide = b"<script>HTMLCanvasElement.prototype.getContext = () => null;</script></head>"
     page = open_file(page_of(vdi).replace(b"</head>", hide), expected="WebGL 2")

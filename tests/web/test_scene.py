@@ -385,7 +385,7 @@ def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_
     plotter.camera_position = "xy"
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # nothing is missing, and nothing deprecated
-        assert plotter.export_html(tmp_path / "scene.htm") is None
+        assert plotter.vdi.export_html(tmp_path / "scene.htm") is None
     path = tmp_path / "scene.html"
     page = from_disk(path)
     page.ready()
@@ -408,7 +408,7 @@ def test_subplots_stand_beside_each_other_and_turn_together(from_disk, tmp_path)
     ball(plotter)
     plotter.add_mesh(pv.Sphere(radius=0.3, center=(1, 1, 1)))
     plotter.link_views()
-    plotter.export_html(tmp_path / "scene.html")
+    plotter.vdi.export_html(tmp_path / "scene.html")
     wanted, vdi = plotter.screenshot()[..., :3].astype(float), plotter.volume.vdi
     views = [renderer.GetSize() for renderer in plotter.renderers]
     plotter.close()
@@ -458,7 +458,7 @@ def test_scenes_that_follow_each_other_leave_nothing_behind(plotter, open_page):
 @slow
 def test_a_lost_context_is_made_up_for(plotter, from_disk, tmp_path):
     meshes(plotter)
-    plotter.export_html(tmp_path / "scene.html")
+    plotter.vdi.export_html(tmp_path / "scene.html")
     page = from_disk(tmp_path / "scene.html", before=CONTEXTS)
     page.ready()
     before = shot(page)
@@ -469,7 +469,7 @@ def test_a_lost_context_is_made_up_for(plotter, from_disk, tmp_path):
 
 def test_without_a_name_the_page_is_returned(plotter):
     ball(plotter)
-    stream = plotter.export_html(None)
+    stream = plotter.vdi.export_html(None)
     assert isinstance(stream, io.StringIO)
     text = stream.read()
     assert text.startswith("<!doctype html>")
@@ -485,32 +485,17 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
     plotter.add_mesh(pv.Sphere(), pbr=True, name="ball")
     plotter.show_grid()
     with pytest.warns(VDIWarning, match="shows the scene without") as warned:
-        plotter.export_html(None)
+        plotter.vdi.export_html(None)
     assert len(warned) == 1
     words = str(warned[0].message)
     for what in ("cropping", "physically based shading (ball)", "CubeAxes"):
         assert what in words
 
 
-class Asked:
-    """In the place of trame's component."""
-
-    def __init__(self, asked):
-        self.export_html = lambda name: asked.append(name) or "PyVista's"
-
-
-@pytest.mark.skipif(
-    not hasattr(pv.BasePlotter, "_trame_component"), reason="another PyVista exports by itself"
-)
-def test_a_scene_without_vdis_is_written_by_pyvista(plotter, monkeypatch):
+def test_a_renderer_without_vdis_is_none_for_the_viewer(plotter):
     plotter.add_mesh(pv.Sphere())
-    hidden = ball(plotter)
-    hidden.visibility = False
-    asked = []
-    monkeypatch.setattr(pv.BasePlotter, "_trame_component", lambda plotter: Asked(asked))
-    with pytest.warns(pv.PyVistaDeprecationWarning, match="plotter.trame"):
-        assert plotter.export_html("a.html") == "PyVista's"
-    assert asked == ["a.html"]
+    ball(plotter).visibility = False
+    plotter.show(auto_close=False)
     with pytest.raises(UnsupportedError, match="shows no VDI"):
         scene_of(plotter.renderer)
 

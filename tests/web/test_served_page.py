@@ -155,3 +155,74 @@ def test_a_lost_connection_comes_back(page):
     wait(page, "remote.received.full === 1")
     page.evaluate("sockets.at(-1).close(); viewer.camera = { ...viewer.camera, view_angle: 5 }")
     wait(page, "remote.received.full === 2")
+
+
+def named_controls(page):
+    """The controls of a page that can be used, by what a screen reader says of them."""
+    session = page.page.context.new_cdp_session(page.page)
+    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
+    kinds = {"slider", "spinbutton", "combobox", "checkbox"}
+    seen = [node for node in nodes if not node["ignored"] and node["role"]["value"] in kinds]
+    return [(node["role"]["value"], node["name"]["value"]) for node in seen]
+
+
+def test_controls_have_names_and_a_range_that_is_none_is_said(page):
+    wait(page, "remote.received.coarse >= 1")
+    names = named_controls(page)
+    assert len(names) == len(set(names)) == 8
+    assert all(name and not name.replace(".", "").isdigit() for _, name in names)
+
+    line, inputs = page.page.locator("output"), page.page.locator("input[type=number]")
+    valid = "[...document.querySelectorAll('input[type=number]')].map((it) => it.validity.valid)"
+    page.evaluate("() => { remote.looks = []; remote.setLook = (look) => remote.looks.push(look) }")
+    inputs.nth(0).fill("200")
+    inputs.nth(1).fill("100")
+    inputs.nth(1).press("Tab")
+    assert page.evaluate(valid) == [False, False]
+    assert inputs.nth(0).get_attribute("aria-invalid") == "true"
+    assert "200 is not below 100" in line.inner_text()
+    # Nothing of it was told, and what else is chosen leaves the range as it was
+    clims = [[200, page.evaluate("remote.hello.range[1]")]]
+    assert page.evaluate("remote.looks.map(({ clim }) => clim)") == clims
+    page.page.get_by_label("Colours").select_option("hot")
+    assert page.evaluate("remote.looks.map(({ clim }) => clim)") == 2 * clims
+    inputs.nth(1).fill("250")
+    inputs.nth(1).press("Tab")
+    assert page.evaluate(valid) == [True, True]
+    assert "below" not in line.inner_text()
+    assert page.evaluate("remote.looks.at(-1).clim") == [200, 250]
+    for key, wrong in (("-", True), ("Backspace", False)):
+        inputs.nth(0).fill("")
+        inputs.nth(0).press(key)
+        inputs.nth(0).press("Tab")
+        assert ("two numbers" in line.inner_text()) == wrong
+
+
+def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
+    default_runtime, open_page
+):
+    def serve(token, port=0):
+        return web.serve([BALL], port=port, token=token, wait=False, announce=None, **LOOK)
+
+    line = "document.querySelector('output').textContent"
+    serving = serve("a")
+    viewport = {"width": SIZE[0], "height": SIZE[1] + 100}
+    refusals = "ERR_CONNECTION|WebSocket|403"
+    page = open_page(url=serving.url, viewport=viewport, expected=refusals)
+    wait(page, "remote.received.full === 1")
+    height = page.evaluate("viewer.clientHeight")
+    serving.close()
+    wait(page, f"{line}.includes('no connection to the server; trying again in')")
+    # All of it can be read, and the viewer is as large as before
+    hidden = "(({ scrollHeight, clientHeight }) => scrollHeight - clientHeight)"
+    assert page.evaluate(f"{hidden}(document.querySelector('output'))") == 0
+    assert page.evaluate("viewer.clientHeight") == height
+    serving = serve("a", serving.port)
+    wait(page, f"remote.received.full === 2 && !{line}.includes('trying')")
+    serving.close()
+    with serve("b", serving.port):
+        wait(page, f"{line}.includes('no longer valid')")
+        asked = len(page.urls)
+        page.page.wait_for_timeout(2500)
+        assert len(page.urls) == asked
+        assert "trying" not in page.evaluate(line)

@@ -309,6 +309,8 @@ FILES = ["/etc/passwd", "/../../etc/passwd", "/%2e%2e/x", "/viewer.js"]
 #: DNS rebinding: names of theirs that point here.
 HOSTS = ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "["]
 OUR_HOSTS = ["localhost", "localhost:80", "[::1]:80", "10.0.0.7", "mybox", "MYBOX:80"]
+#: Of requests that ask for no socket, or for one of a version that there is not.
+NO_SOCKETS = [{}, {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "7"}]
 ORIGINS = ["http://evil.example", "null", "http://127.0.0.1:1", "http://["]
 
 
@@ -320,6 +322,7 @@ ORIGINS = ["http://evil.example", "null", "http://127.0.0.1:1", "http://["]
         *(("/", None, {"Host": host}, {400, 403}) for host in HOSTS),
         *(("/nothing", None, {"Host": host}, {404}) for host in OUR_HOSTS),
         *(("/socket", None, {"Origin": origin}, {403}) for origin in ORIGINS),
+        *(("/socket", None, headers, {426}) for headers in NO_SOCKETS),
     ],
 )
 def test_who_is_let_in(path, query, headers, statuses, default_runtime, own_server):

@@ -154,7 +154,7 @@ class Painter:
         self._warnings.warn(
             "the scene is being exported without its VDI: trame's export_html, export_vtksz and "
             "views that are rendered in the browser (client-side) get an empty box in its place; "
-            "use plotter.export_html, screenshots, movies, or server-side rendering"
+            "use plotter.vdi.export_html, screenshots, movies, or server-side rendering"
         )
 
     def release(self) -> None:

@@ -1,73 +1,93 @@
-"""``plotter.export_html`` of a plotter with VDIs: one page that shows its scene."""
+"""``plotter.vdi.export_html``: one page that shows a plotter's scene."""
 
 from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.io.whole_file import whole_file
-from pyvista_vdi.web.page import View, assembled
+from pyvista_vdi.series.series import Called
+from pyvista_vdi.series.writer import KEY_EVERY, StepsWriter
+from pyvista_vdi.series.writer import write_all as write_series
+from pyvista_vdi.sets.files import write_all as write_set
+from pyvista_vdi.sets.vdi_set import VDISet
+from pyvista_vdi.web.page import View, assembled, in_parts
+from pyvista_vdi.web.placing import thinned
 from pyvista_vdi.web.scenes.scene import css, scene_of
 
 
 def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
-    """Write a page that shows a plotter's scene, as ``Plotter.export_html`` does.
+    """Write a page of a plotter's scene: see ``plotting.pages.PlotterVDIs.export_html``.
 
-    Parameters
-    ----------
-    plotter : pyvista.BasePlotter
-        All of its renderers are shown; it is drawn, and VDIs that are missing are made.
-    filename : path-like or None
-        Where the page is written; ``.html`` is put in the place of another suffix.
-
-    Returns
-    -------
-    io.StringIO or None
-        The page, if there is no file name.
-
-    Warns
-    -----
-    VDIWarning
-        Of what is not shown, by name.
-
-    Raises
-    ------
-    VDIFileError
-        If the file cannot be written.
+    All of its renderers are shown; it is drawn, and VDIs that are missing are made.
     """
     picture = drawn(plotter)
     left_out: list[str] = []
     views = []
     several = len(plotter.renderers) > 1
-    cameras = [renderer.GetActiveCamera() for renderer in plotter.renderers]
-    for renderer in plotter.renderers:
+    # Which they are, not how they look: cameras of PyVista that are alike are equal
+    cameras = [r.GetActiveCamera().GetAddressAsString("") for r in plotter.renderers]
+    for renderer, camera in zip(plotter.renderers, cameras, strict=True):
         scene = scene_of(renderer, renderer.actors, needs_vdi=False)
         left_out += scene.left_out
+        left_out += [f"all but one of {what}" for what in several_of(renderer, scene.actors[1:])]
+        series = [] if scene.actor is None else _series_of(scene.actor)
         view = View(
-            None if scene.vdi is None else scene.vdi.with_precision("8-byte"),
+            None if series or scene.vdi is None else scene.vdi.with_precision("8-byte"),
             scene.background,
             part_of(picture, renderer),
             renderer.GetSize(),
             scene.data,
+            series=series,
         )
         if several:
             view.attributes["style"] = _placed(renderer) + _border(plotter)
-            view.attributes["data-link"] = str(cameras.index(renderer.GetActiveCamera()))
+            view.attributes["data-link"] = str(cameras.index(camera))
         views.append(view)
     if left_out:
         words = ", ".join(dict.fromkeys(left_out))
         warn_external(f"the page shows the scene without {words}")
     target = None if filename is None else Path(filename).with_suffix(".html")
-    views.sort(key=lambda view: view.vdi is None)  # the first can be read again
+    # The first can be read again
+    views.sort(key=lambda view: view.vdi is None and not view.series)
     page = assembled(views, title=plotter.title if target is None else target.stem)
     if target is None:
         return io.StringIO(page.decode())
     with whole_file(target) as stream:
         stream.write(page)
     return None
+
+
+def several_of(renderer: Any, actors: Sequence[Any]) -> list[str]:
+    """Name the series and sets that actors show one VDI of."""
+    called = {actor: name for name, actor in renderer.actors.items() if "(Addr" not in name}
+    return [
+        f"the {len(shown)} {kind} ({called.get(actor, type(actor).__name__)})"
+        for actor in actors
+        for shown, kind in ((actor.series, "steps of a series"), (actor.vdi_set, "VDIs of a set"))
+        if shown is not None
+    ]
+
+
+def _series_of(actor: Any) -> list[bytes]:
+    """Return the series or the set that an actor shows as a page holds it; none of one VDI."""
+    series, stream = actor.series, io.BytesIO()
+    shown = actor.vdi_set if series is None else series
+    if shown is None:
+        return []
+    vdis = Called(lambda i: thinned(shown[i], actor.opacity_multiplier), range(len(shown)))
+    if series is None:
+        size, bounds = shown.window_size, shown.bounds
+        same = VDISet(vdis, shown.cameras, window_size=size, bounds=bounds, about=shown.about)
+        cut = write_set(stream, StepsWriter("8-byte", 0.0, 1, "zstd", None), same)
+    else:
+        writer = StepsWriter("8-byte", 0.0, KEY_EVERY, "zstd", None)
+        cut = write_series(stream, writer, vdis, series.times, None)
+    return in_parts(stream.getvalue(), cut)
 
 
 def drawn(plotter: Any) -> Any:

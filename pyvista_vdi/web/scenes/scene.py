@@ -57,8 +57,8 @@ class Scene:
     ----------
     vdi : VDI or None
         The first one, if there is one.
-    actor : VDIActor or None
-        Its actor.
+    actors : list of VDIActor
+        Those that show VDIs, the first one's first.
     state : tuple
         Of :func:`state_of`.
     data : bytes
@@ -70,11 +70,16 @@ class Scene:
     """
 
     vdi: VDI | None
-    actor: Any
+    actors: list[Any]
     state: Any
     data: bytes
     background: str
     left_out: list[str]
+
+    @property
+    def actor(self) -> Any:
+        """The first one's actor, or ``None``."""
+        return next(iter(self.actors), None)
 
 
 @dataclass
@@ -152,6 +157,11 @@ def scene_of(
         if not known:
             left_out.append(title)
         left_out += [f"{what} ({title})" for what in missing]
+    # The viewer plays the first one's series, and follows its set
+    several = [actor.series is not None or actor.vdi_set is not None for actor in actors]
+    if any(several):
+        for those in (bodies, actors):
+            those.insert(0, those.pop(several.index(True)))
     if not bodies and needs_vdi:
         raise UnsupportedError("the renderer shows no VDI, so there is nothing for the viewer")
     described = [{**more, "file": None} for _, more in bodies]
@@ -171,7 +181,7 @@ def scene_of(
     background = _background(renderer, left_out)
     return Scene(
         vdi=bodies[0][0] if bodies else None,
-        actor=actors[0] if actors else None,
+        actors=actors,
         state=state_of(renderer),
         data=packed.deflated(head),
         background=background,

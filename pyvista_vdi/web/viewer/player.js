@@ -242,7 +242,7 @@ export class Player {
  */
 export function playerControls(bar, playerOf, timesOf, does, signal) {
   const button = htmlElement("button", { type: "button" }), output = htmlElement("output");
-  const slider = htmlElement("input", { type: "range", min: 0, step: 1, ariaLabel: "Time" });
+  const slider = htmlElement("input", { type: "range", min: 0, step: 1, label: "Time" });
   bar.replaceChildren(button, slider, output);
   button.addEventListener("click", does.toggle, { signal });
   slider.addEventListener("input", () => does.seek(Number(slider.value)), { signal });

@@ -10,11 +10,16 @@ const VIEW_PERIOD = 50;
 const VIEW_RESTS = 150;
 /** Milliseconds until a lost connection is tried again: twice as long each time, up to the last. */
 const FIRST_RETRY = 500;
-const LAST_RETRY = 15000;
+const LAST_RETRY = 16000;
 /** The server's longest edge of a picture, pixels. */
 const LONGEST_EDGE = 8192;
 /** Why a server ends a connection for good: the client has said something wrong. */
 const REFUSED = 1008;
+/** Code of a connection that has ended, or was not made, without a word. */
+const UNSAID = 1006;
+/** Status of an ordinary request of the socket's address, and of one that is not let in. */
+const NO_SOCKET = 426;
+const FORBIDDEN = 403;
 
 /**
  * The VDIs of a server in a viewer.
@@ -85,12 +90,14 @@ export class RemoteVDI extends EventTarget {
       else if (this._picture !== null) this._takePicture(data);
       else this._take(new Uint8Array(data));
     };
-    socket.onclose = ({ code, reason }) => {
-      if (this._closed || socket !== this._socket) return;
-      const again = code !== REFUSED;
-      const why = reason || "no connection to the server";
-      this._status(null, again ? `${why}; trying again` : why);
-      if (!again) return;
+    socket.onclose = async (event) => {
+      const { why, forGood } = this._closed ? {} : await whyNot(event, this.url);
+      if (this._closed) return;
+      if (forGood) {
+        this._status(null, why);
+        return;
+      }
+      this._status(null, `${why}; trying again in ${Math.ceil(this._retry / 1000)} s`);
       this._retryTimer = setTimeout(() => this._connect(), this._retry);
       this._retry = Math.min(2 * this._retry, LAST_RETRY);
     };
@@ -100,13 +107,13 @@ export class RemoteVDI extends EventTarget {
     if (message.type === "hello") {
       const first = this.hello === null;
       this.hello = message;
-      this._retry = FIRST_RETRY;
       if (first) this.viewer.camera = message.camera;
       this._said.forEach((said) => this._send(said));
       this._sendView(false);
       this._status(null, "");
       this.dispatchEvent(new CustomEvent("hello", { detail: message }));
     } else if (message.type === "vdi") {
+      this._retry = FIRST_RETRY; // not at once: a server may fail whenever it is asked for one
       // One that has not come whole is given up by the server
       this._incoming = { ...message, file: new Uint8Array(message.bytes), filled: 0 };
     } else if (message.type === "picture") {
@@ -209,37 +216,73 @@ export class RemoteVDI extends EventTarget {
   }
 }
 
-/** Fill a panel with plain controls of what the server offers. */
-function fillPanel(panel, remote, hello) {
+// Why there is no connection, and whether there will be none. Of a socket that is refused a browser
+// says nothing; an ordinary request of its address is told.
+async function whyNot({ code, reason }, url) {
+  if (reason || code !== UNSAID) {
+    return { why: reason || "the connection was lost", forGood: code === REFUSED };
+  }
+  try {
+    const signal = AbortSignal.timeout(LAST_RETRY);
+    const answer = await fetch(url.replace(/^ws/, "http"), { cache: "no-store", signal });
+    if (answer.status === NO_SOCKET) return { why: "the connection was lost" };
+    return { why: (await answer.text()).trim(), forGood: answer.status === FORBIDDEN };
+  } catch {
+    return { why: "no connection to the server" };
+  }
+}
+
+/** Fill a panel with plain controls of what the server offers; `complain` is told what is wrong. */
+function fillPanel(panel, remote, hello, complain) {
   const labelled = (text, ...inputs) => htmlElement("label", {}, text, ...inputs);
-  const choice = (names, value) => {
-    const select = htmlElement("select", {}, ...names.map((name) => htmlElement("option", {}, name)));
+  const choice = (label, names, value) => {
+    const options = names.map((name) => htmlElement("option", {}, name));
+    const select = htmlElement("select", { label }, ...options);
     if (!names.includes(value)) select.prepend(htmlElement("option", { value: "" }, "as started"));
     select.value = names.includes(value) ? value : "";
     return select;
   };
   const controls = [];
   if (hello.cmaps.length > 0) {
-    const cmap = choice(hello.cmaps, hello.look.cmap);
-    const opacity = choice(hello.opacities, hello.look.opacity);
-    const [low, high] = hello.range.map((value) =>
-      htmlElement("input", { type: "number", step: "any", placeholder: String(value), size: 6 }),
-    );
-    const changed = () => {
-      const look = {};
-      if (cmap.value) look.cmap = cmap.value;
-      if (opacity.value) look.opacity = opacity.value;
-      const ends = [low, high].map((end, i) => (end.value ? Number(end.value) : hello.range[i]));
-      if ((low.value || high.value) && ends[0] < ends[1]) look.clim = ends;
-      remote.setLook(look);
+    const cmap = choice("Colours", hello.cmaps, hello.look.cmap);
+    const opacity = choice("Opacity", hello.opacities, hello.look.opacity);
+    const [low, high] = hello.range.map((value, k) => htmlElement("input", {
+      type: "number", step: "any", placeholder: String(value),
+      label: `${["Lowest", "Highest"][k]} value of the range`,
+    }));
+    let clim; // the last that was one
+    const takeRange = () => {
+      const ends = [low, high].map((end, k) => (end.value ? Number(end.value) : hello.range[k]));
+      const wrong = [low, high].some((end) => end.validity.badInput)
+        ? "the range is two numbers"
+        : ends[0] < ends[1] ? ""
+        : `the range is from the lower value to the higher: ${ends[0]} is not below ${ends[1]}`;
+      for (const end of [low, high]) {
+        end.setCustomValidity(wrong);
+        end.setAttribute("aria-invalid", wrong !== "");
+      }
+      complain(wrong);
+      if (!wrong) clim = low.value || high.value ? ends : undefined;
+      return !wrong;
     };
-    [cmap, opacity, low, high].forEach((input) => input.addEventListener("change", changed));
+    const tell = () => {
+      const look = { cmap: cmap.value, opacity: opacity.value, clim };
+      remote.setLook(Object.fromEntries(Object.entries(look).filter(([, value]) => value)));
+    };
+    [cmap, opacity].forEach((input) => input.addEventListener("change", tell));
+    for (const end of [low, high]) {
+      end.addEventListener("change", () => takeRange() && tell());
+      // What is wrong is right as soon as it is: of letters that are deleted there is no change
+      end.addEventListener("input", () => end.validity.valid || (takeRange() && tell()));
+    }
     controls.push(labelled("Colours", cmap), labelled("Opacity", opacity));
     controls.push(labelled("Range", low, high));
   }
-  const axis = choice(["no plane", "x", "y", "z"], "no plane");
-  const place = htmlElement("input", { type: "range", min: 0, max: 1, step: 0.01, value: 0.5 });
-  const flip = htmlElement("input", { type: "checkbox" });
+  const axis = choice("Clip", ["no plane", "x", "y", "z"], "no plane");
+  const place = htmlElement("input", {
+    type: "range", min: 0, max: 1, step: 0.01, value: 0.5, label: "Place of the clipping plane",
+  });
+  const flip = htmlElement("input", { type: "checkbox", label: "Clip the other side" });
   const clipped = () => {
     const k = ["x", "y", "z"].indexOf(axis.value);
     if (k < 0) return remote.setClippingPlanes([]);
@@ -253,7 +296,9 @@ function fillPanel(panel, remote, hello) {
   [axis, place, flip].forEach((input) => input.addEventListener("input", clipped));
   controls.push(labelled("Clip", axis, place), labelled("other side", flip));
   if (hello.steps > 1) {
-    const time = htmlElement("input", { type: "range", min: 0, max: hello.steps - 1, value: 0 });
+    const time = htmlElement("input", {
+      type: "range", min: 0, max: hello.steps - 1, value: 0, label: "Time step",
+    });
     time.addEventListener("input", () => remote.setStep(Number(time.value)));
     controls.push(labelled("Time", time));
   }
@@ -273,12 +318,21 @@ export function connectPage(viewer, panel, line) {
   url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
   url.search = location.search;
   const remote = new RemoteVDI(viewer, url.href);
-  remote.addEventListener("hello", ({ detail }) => fillPanel(panel, remote, detail), {
-    once: true,
+  const said = { wrong: "", going: "" };
+  const say = (what) => {
+    Object.assign(said, what);
+    line.textContent = [said.wrong, said.going].filter(Boolean).join("; ");
+  };
+  let offered = "";
+  remote.addEventListener("hello", ({ detail }) => {
+    const offer = JSON.stringify(detail);
+    if (offered && offer !== offered) location.reload(); // another volume is served there by now
+    else if (!offered) fillPanel(panel, remote, detail, (wrong) => say({ wrong }));
+    offered = offer;
   });
   const words = { picture: "drawing", estimate: "looking", vdi: "making a VDI of this view" };
   remote.addEventListener("status", ({ detail }) => {
-    line.textContent = detail.text || words[detail.doing] || "";
+    say({ going: detail.text || words[detail.doing] || "" });
   });
   return remote;
 }
