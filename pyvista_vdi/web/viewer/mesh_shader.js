@@ -6,7 +6,7 @@
 // EDGES        of polygons are seen; WIRES, LINES, POINTS, TUBES, SPHERES: what is drawn
 // LIT          lights are looked at; HEADLIGHT: there is one, where the eye is
 // BACK         back sides have a material of their own
-// CLIPPED      by six planes at most
+// CLIPPED      by six planes at most; NEARER: by VTK's offset of polygons
 // DEPTH        only view depth is written; LAYERS: translucent, for the sums of McGuire and Bavoil;
 // BLENDED      translucent, over what has been drawn before
 
@@ -121,7 +121,7 @@ uniform vec3 ambient[2], diffuse[2], specular[2];  // of the front and of the ba
 uniform vec2 strength[2];                          // ambient and diffuse: of colours
 uniform vec2 shine[2];                             // specular power, opacity
 uniform vec4 edgeColor;
-uniform float edgeWidth;
+uniform float edgeWidth, nearer;
 uniform int lights;
 uniform vec3 lightDirection[LIGHTS], lightColor[LIGHTS], lightPosition[LIGHTS];
 uniform vec4 lightShape[LIGHTS];                   // positional, cone, exponent
@@ -167,8 +167,14 @@ void main() {
   // The nearer surface: a radius is as wide there as on the screen
   float perPixel = 2.0 * lens.y / size.y * (parallel ? 1.0 : depth);
   depth -= normal.z * 0.5 * width * perPixel;
-  float w = parallel ? 1.0 : depth;
-  gl_FragDepth = 0.5 * (range.x * depth + range.y) / w + 0.5;
+#endif
+#if defined(SPHERES) || defined(TUBES) || defined(NEARER)
+  float z = (range.x * depth + range.y) / (parallel ? 1.0 : depth);
+#ifdef NEARER
+  z = max(z + nearer, -1.0);
+  depth = parallel ? (z - range.y) / range.x : range.y / (z - range.x);
+#endif
+  gl_FragDepth = 0.5 * z + 0.5;
 #endif
 #ifdef DEPTH
   seen = vec4(depth);

@@ -1,0 +1,198 @@
+"""What is drawn about a renderer's scene: by other renderers of its window, and flat on the screen.
+
+Each is a picture in a part of the window with a camera of its own: axes in a corner, which turn
+with the scene, an image behind it, and a logo or a slider, which stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtk_to_numpy,
+    vtkActor,
+    vtkImageActor,
+    vtkPolyData,
+    vtkPolyDataMapper2D,
+    vtkTextMapper,
+    vtkTexturedActor2D,
+)
+from pyvista_vdi.web.camera import viewer_camera
+from pyvista_vdi.web.scenes.annotations import annotations_of
+from pyvista_vdi.web.scenes.lighting import bounds_of, lights_of
+from pyvista_vdi.web.scenes.meshes import Keep, shapes_of
+from pyvista_vdi.web.scenes.props import array_of, collected, image_quad, parts_of, unlit
+from pyvista_vdi.web.scenes.texts import described_text
+
+#: The widget with balls on its axes: they face the viewer, however the view is turned.
+_BALLS = "vtkCameraOrientationRepresentation"
+
+#: Of the balls' points: 1/30 of a pixel where the widget is as large as VTK makes it.
+_FINENESS = 2.0**-11
+
+
+def others_of(
+    renderer: Any, keep: Keep, texts: list[dict[str, Any]], left_out: list[str]
+) -> Iterator[dict[str, Any]]:
+    """Describe what other renderers of a plotter's window draw within one's viewport.
+
+    Parameters
+    ----------
+    renderer : vtkRenderer
+        Which has been drawn. Only PyVista's have others.
+    keep : callable
+        Takes an array that is sent.
+    texts : list of dict
+        What is written in them is added here.
+    left_out : list of str
+        What cannot be drawn is said here.
+
+    Yields
+    ------
+    dict
+        ``place`` (parts of the viewport: left, bottom, right, top), ``camera``, ``bounds``,
+        ``lights``, ``shapes``; whether it ``turns`` with the scene, and is ``behind`` it.
+    """
+    low, high = np.reshape(renderer.GetViewport(), (2, 2))
+    for number, other in enumerate(around(renderer)):
+        missing: list[str] = []
+        shapes: list[dict[str, Any]] = []
+        for prop in other.GetViewProps():
+            if not prop.GetVisibility():
+                continue
+            for part, matrix in parts_of(prop):
+                if isinstance(part, vtkImageActor):
+                    part = image_quad(part)
+                facing = prop.IsA(_BALLS)
+                if facing:
+                    part, matrix = _unturned(part, array_of(prop.GetTransform().GetMatrix()))
+                if isinstance(part, vtkActor):
+                    described = shapes_of(part, matrix, keep, missing)
+                    shapes += (
+                        {**shape, "facing": facing and "texture" in shape} for shape in described
+                    )
+                else:
+                    found = annotations_of(part, other) if part is not None else None
+                    texts += [{**text, "renderer": number} for text in found or []]
+                    if found is None:
+                        left_out.append(type(prop).__name__)
+        left_out += [f"{what} (of what is around the scene)" for what in missing]
+        camera = other.GetActiveCamera()
+        yield {
+            "place": ((np.reshape(other.GetViewport(), (2, 2)) - low) / (high - low))
+            .ravel()
+            .tolist(),
+            "camera": {**viewer_camera(camera, other.GetSize()), "distance": camera.GetDistance()},
+            "bounds": bounds_of(other),
+            "lights": list(lights_of(other)),
+            "shapes": shapes,
+            "turns": not _is_image(other),
+            "behind": other.GetLayer() < renderer.GetLayer(),
+        }
+
+
+def around(renderer: Any) -> list[Any]:
+    """Return the other renderers of a plotter's window that draw within a renderer's viewport."""
+    own, window = (
+        getattr(getattr(renderer, "parent", None), "renderers", None),
+        renderer.GetRenderWindow(),
+    )
+    if own is None or window is None:
+        return []
+    known = {*own, own.border_overlay_renderer}
+    found, layers = [], window.GetRenderers()
+    low, high = np.reshape(renderer.GetViewport(), (2, 2))
+    for k in range(layers.GetNumberOfItems()):
+        other = layers.GetItemAsObject(k)
+        if other in known or not other.GetDraw() or not other.GetViewProps().GetNumberOfItems():
+            continue
+        start, end = np.reshape(other.GetViewport(), (2, 2))
+        if not _is_image(other):  # of one view; an image may be behind several
+            start = end = (start + end) / 2
+        if (start < high).all() and (end > low).all():
+            found.append(other)
+    return found
+
+
+def _is_image(renderer: Any) -> bool:
+    return all(isinstance(prop, vtkImageActor) for prop in renderer.GetViewProps())
+
+
+def _unturned(actor: Any, turn: Any) -> tuple[Any, Any]:
+    """Undo the view's turn of an actor of the widget with balls, which the viewer does anew."""
+    back = np.linalg.inv(turn)
+    if actor.GetTexture() is None:  # the axes
+        return actor, back
+    actor.GetMapper().Update()
+    ball = vtkPolyData()
+    ball.DeepCopy(actor.GetMapper().GetInput())
+    points = vtk_to_numpy(ball.GetPoints().GetData())
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    # About the origin, and no finer than can be seen: six balls that are nearly alike
+    for numbers, zero in ((points, middle), (vtk_to_numpy(ball.GetPointData().GetTCoords()), 0)):
+        numbers[:] = np.rint((numbers - zero) / _FINENESS) * _FINENESS
+    moved = np.eye(4)
+    moved[:3, 3] = back[:3, :3] @ middle
+    return unlit(ball, actor.GetProperty(), actor.GetTexture()), moved
+
+
+def flat_of(
+    prop: Any, renderer: Any, keep: Keep, missing: list[str]
+) -> tuple[dict[str, Any] | None, list[dict[str, Any]]] | None:
+    """Describe what is flat on the screen, as :func:`others_of` does, and its texts.
+
+    Returns ``None`` for what draws by means of its own.
+    """
+    width, height = renderer.GetSize()
+    actors, texts = [], []
+    for part in collected(prop.GetActors2D):
+        mapper = part.GetMapper()
+        if not part.GetVisibility():
+            continue
+        x, y = part.GetPositionCoordinate().GetComputedViewportValue(renderer)
+        if isinstance(mapper, vtkTextMapper):
+            text = mapper.GetInput() or ""
+            texts.append(described_text(text, (x, y), mapper.GetTextProperty(), renderer))
+        elif isinstance(mapper, vtkPolyDataMapper2D):
+            texture = part.GetTexture() if isinstance(part, vtkTexturedActor2D) else None
+            actors.append(unlit(_in_pixels(mapper, (x, y), renderer), part.GetProperty(), texture))
+    shapes = [shape for a in actors for shape in shapes_of(a, np.eye(4), keep, missing)]
+    if not shapes:
+        return (None, texts) if texts else None
+    bounds = np.array([actor.GetBounds() for actor in actors])
+    low = np.floor(bounds[:, (0, 2)].min(axis=0)) - 1  # whole pixels
+    high = np.ceil(bounds[:, (1, 3)].max(axis=0)) + 1
+    middle = ((low + high) / 2).tolist()
+    described = {
+        "place": [*(low / (width, height)), *(high / (width, height))],
+        "window": [width, height],
+        "camera": {
+            "position": [*middle, 1.0],
+            "focal_point": [*middle, 0.0],
+            "view_up": [0.0, 1.0, 0.0],
+            "parallel_scale": (high - low)[1] / 2,
+        },
+        "bounds": [low[0], high[0], low[1], high[1], 0.0, 0.0],
+        "lights": [],
+        "shapes": shapes,
+        "turns": False,
+        "behind": False,
+    }
+    return described, texts
+
+
+def _in_pixels(mapper: Any, position: tuple[int, int], renderer: Any) -> Any:
+    """Return what a mapper draws in two dimensions, in pixels of the viewport."""
+    mapper.GetInputAlgorithm().Update()
+    poly = vtkPolyData()
+    poly.DeepCopy(mapper.GetInput())
+    points, coordinate = vtk_to_numpy(poly.GetPoints().GetData()), mapper.GetTransformCoordinate()
+    for point in points if coordinate is not None else ():
+        coordinate.SetValue(*map(float, point))
+        point[:2] = coordinate.GetComputedDoubleViewportValue(renderer)
+    points[:, :2] += position
+    points[:, 2] = 0
+    return poly
