@@ -58,33 +58,26 @@ def others_of(
     """
     low, high = np.reshape(renderer.GetViewport(), (2, 2))
     for number, other in enumerate(around(renderer)):
+        method = "add_background_image" if _is_image(other) else "add_orientation_widget"
         missing: list[str] = []
         shapes: list[dict[str, Any]] = []
-        for prop in other.GetViewProps():
-            if not prop.GetVisibility():
-                continue
+        for prop in filter(_is_visible, other.GetViewProps()):
             for part, matrix in parts_of(prop):
-                if isinstance(part, vtkImageActor):
-                    part = image_quad(part)
-                facing = prop.IsA(_BALLS)
-                if facing:
-                    part, matrix = _unturned(part, array_of(prop.GetTransform().GetMatrix()))
-                if isinstance(part, vtkActor):
-                    described = shapes_of(part, matrix, keep, missing)
-                    shapes += (
-                        {**shape, "facing": facing and "texture" in shape} for shape in described
-                    )
+                if prop.IsA(_BALLS):
+                    shapes += _balls(part, prop, keep, missing)
+                elif (solid := image_quad(part) if _is_image(other) else part) is None:
+                    left_out.append(method)
+                elif isinstance(solid, vtkActor):
+                    shapes += shapes_of(solid, matrix, keep, missing)
+                elif (written := annotations_of(part, other)) is not None:
+                    texts += [{**text, "renderer": number} for text in written]
                 else:
-                    found = annotations_of(part, other) if part is not None else None
-                    texts += [{**text, "renderer": number} for text in found or []]
-                    if found is None:
-                        left_out.append(type(prop).__name__)
-        left_out += [f"{what} (of what is around the scene)" for what in missing]
+                    left_out.append(f"{method} ({type(prop).__name__})")
+        left_out += [f"{what} ({method})" for what in missing]
         camera = other.GetActiveCamera()
+        place = (np.reshape(other.GetViewport(), (2, 2)) - low) / (high - low)
         yield {
-            "place": ((np.reshape(other.GetViewport(), (2, 2)) - low) / (high - low))
-            .ravel()
-            .tolist(),
+            "place": place.ravel().tolist(),
             "camera": {**viewer_camera(camera, other.GetSize()), "distance": camera.GetDistance()},
             "bounds": bounds_of(other),
             "lights": list(lights_of(other)),
@@ -117,15 +110,20 @@ def around(renderer: Any) -> list[Any]:
     return found
 
 
+def _is_visible(prop: Any) -> bool:
+    return bool(prop.GetVisibility())
+
+
 def _is_image(renderer: Any) -> bool:
     return all(isinstance(prop, vtkImageActor) for prop in renderer.GetViewProps())
 
 
-def _unturned(actor: Any, turn: Any) -> tuple[Any, Any]:
-    """Undo the view's turn of an actor of the widget with balls, which the viewer does anew."""
-    back = np.linalg.inv(turn)
+def _balls(actor: Any, widget: Any, keep: Keep, missing: list[str]) -> Iterator[dict[str, Any]]:
+    """Describe an actor of the widget with balls without the view's turn, which the viewer does."""
+    back = np.linalg.inv(array_of(widget.GetTransform().GetMatrix()))
     if actor.GetTexture() is None:  # the axes
-        return actor, back
+        yield from shapes_of(actor, back, keep, missing)
+        return
     actor.GetMapper().Update()
     ball = vtkPolyData()
     ball.DeepCopy(actor.GetMapper().GetInput())
@@ -136,7 +134,8 @@ def _unturned(actor: Any, turn: Any) -> tuple[Any, Any]:
         numbers[:] = np.rint((numbers - zero) / _FINENESS) * _FINENESS
     moved = np.eye(4)
     moved[:3, 3] = back[:3, :3] @ middle
-    return unlit(ball, actor.GetProperty(), actor.GetTexture()), moved
+    disc = unlit(ball, actor.GetProperty(), actor.GetTexture())
+    yield from ({**shape, "facing": True} for shape in shapes_of(disc, moved, keep, missing))
 
 
 def flat_of(

@@ -168,7 +168,7 @@ def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
 
     if bar.GetDrawBackground():
         look = bar.GetBackgroundProperty()
-        yield box(np.zeros(2), frame, color=[*look.GetColor(), look.GetOpacity()])
+        yield box(np.zeros(2), frame - 0.5, color=[*look.GetColor(), look.GetOpacity()])
     if bar.GetDrawColorBar():
         if indexed:
             step = long / max(notes, 1)
@@ -188,7 +188,7 @@ def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
     if bar.GetDrawFrame():
         look = bar.GetFrameProperty()
         color = [*look.GetColor(), look.GetOpacity()]
-        yield box(np.zeros(2), frame, outline=color, line=look.GetLineWidth())
+        yield box(np.zeros(2), frame - 0.5, outline=color, line=look.GetLineWidth())
     if bar.GetDrawTickLabels():
         for anchor, text in labels:
             if not -1e-6 < anchor < 1 + 1e-6:
@@ -222,11 +222,10 @@ def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
         yield box(corner, size, color=color)
         place = np.array([at, at])
         place[t] = edge + sense * (gap + leader + row)
-        if upright:
-            ways: dict[str, Any] = {"across": "left" if precede else "right", "along": "middle"}
-        else:
-            ways = {"across": _towards(note, beside), "along": "bottom" if precede else "top"}
-        yield described_text(note.text, start + place, look, renderer, **ways)
+        # Whatever VTK justifies them by, they begin there
+        yield described_text(
+            note.text, start + place, look, renderer, across="left", along="bottom"
+        )
 
 
 def _look_of_notes(bar: Any, renderer: Any) -> Any:
@@ -264,25 +263,17 @@ def _stacked(
 
 
 def _lapped(measured: list[tuple[_Note, Pair]], gap: float) -> Iterator[tuple[_Note, float, float]]:
-    """Give where notes along a lying bar stand, and in which row: none over another."""
+    """Give where notes along a lying bar stand, and how far off: from the middle one outwards."""
     measured = sorted(measured, key=lambda each: each[0].at)
-    notes = [note for note, _ in measured]
-    taken: list[tuple[float, float, float]] = []  # left, right, the row's far side
-    for note, size in sorted(
-        measured, key=lambda each: abs(2 * notes.index(each[0]) - len(notes) + 1)
-    ):
-        begin = note.at - size[0] * {"left": 0, "center": 0.5, "right": 1}[_towards(note, notes)]
-        over = [far for left, right, far in taken if begin < right and left < begin + size[0]]
+    middle = (len(measured) - 1) / 2
+    taken: list[tuple[float, float, float]] = []  # left, right, far side
+    for k in sorted(range(len(measured)), key=lambda k: abs(k - middle)):
+        note, (wide, high) = measured[k]
+        begin = note.at - wide * (0.5 if k == middle else float(k > middle))
+        over = [far for left, right, far in taken if begin < right and left < begin + wide]
         row = max(over, default=0.0)
-        taken.append((begin, begin + size[0], row + size[1] + gap))
+        taken.append((begin, begin + wide, row + high + gap))
         yield note, note.at, row
-
-
-def _towards(note: _Note, notes: list[_Note]) -> str:
-    """Return on which side of its place a note along a lying bar ends: towards the middle."""
-    rank = sum(other.at < note.at for other in notes)
-    middle = (len(notes) - 1) / 2
-    return "center" if rank == middle else ("left" if rank < middle else "right")
 
 
 def _notes(bar: Any, table: Any, begin: float, long: float) -> Iterator[_Note]:
