@@ -21,6 +21,7 @@ _METHODS = {
     "vtkContextActor": "add_chart",
     "vtkCubeAxesActor": "show_bounds",
     "vtkScalarBarActor": "add_scalar_bar",
+    "vtkCamera3DRepresentation": "add_camera3d_widget",
     "vtkDistanceRepresentation": "add_measurement_widget",
     "vtkTexturedButtonRepresentation2D": "add_checkbox_button_widget",
     "vtkLightActor": "add_light(Light(show_actor=True))",
@@ -173,7 +174,6 @@ def widgets_of(renderer: Any) -> Iterator[str]:
         ("line_widgets", "add_line_widget"),
         ("sphere_widgets", "add_sphere_widget"),
         ("distance_widgets", "add_measurement_widget"),
-        ("camera3d_widgets", "add_camera3d_widget"),
     ):
         if used(kind):
             yield method

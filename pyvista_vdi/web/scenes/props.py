@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -38,12 +38,11 @@ def parts_of(prop: Any) -> Iterator[tuple[Any, Matrix]]:
     elif isinstance(prop, vtkAnnotatedCubeActor):
         yield from parts_of(prop.GetAssembly())
     elif isinstance(prop, vtkAxesActor):
-        yield from _visible(collected(prop.GetActors))
+        actors = [actor for actor in collected(prop.GetActors) if actor.GetVisibility()]
+        yield from ((actor, array_of(actor.GetMatrix())) for actor in actors)
         if prop.GetAxisLabels():
             captions = [getattr(prop, f"Get{axis}AxisCaptionActor2D")() for axis in "XYZ"]
             yield from ((caption, np.eye(4)) for caption in captions)
-    elif prop.IsA("vtkWidgetRepresentation") and (actors := collected(prop.GetActors)):
-        yield from _visible(actors)
     elif isinstance(prop, vtkProp3D) and prop.GetNumberOfPaths() > 1:
         yield from _paths(prop)
     else:
@@ -62,12 +61,6 @@ def array_of(matrix: Any) -> Matrix:
     if matrix is None:
         return np.eye(4)
     return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
-
-
-def _visible(actors: Sequence[Any]) -> Iterator[tuple[Any, Matrix]]:
-    for actor in actors:
-        if actor.GetVisibility():
-            yield actor, array_of(actor.GetMatrix())
 
 
 def _paths(prop: Any) -> Iterator[tuple[Any, Matrix]]:

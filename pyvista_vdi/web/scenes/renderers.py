@@ -62,10 +62,11 @@ def others_of(
         missing: list[str] = []
         shapes: list[dict[str, Any]] = []
         for prop in filter(_is_visible, other.GetViewProps()):
+            if prop.IsA(_BALLS):
+                shapes += _balls(prop, keep, missing)
+                continue
             for part, matrix in parts_of(prop):
-                if prop.IsA(_BALLS):
-                    shapes += _balls(part, prop, keep, missing)
-                elif (solid := image_quad(part) if _is_image(other) else part) is None:
+                if (solid := image_quad(part) if _is_image(other) else part) is None:
                     left_out.append(method)
                 elif isinstance(solid, vtkActor):
                     shapes += shapes_of(solid, matrix, keep, missing)
@@ -75,7 +76,8 @@ def others_of(
                     left_out.append(f"{method} ({type(prop).__name__})")
         left_out += [f"{what} ({method})" for what in missing]
         camera = other.GetActiveCamera()
-        place = (np.reshape(other.GetViewport(), (2, 2)) - low) / (high - low)
+        seen = np.clip(other.GetViewport(), 0, 1).reshape(2, 2)  # as VTK does
+        place = (seen - low) / (high - low)
         yield {
             "place": place.ravel().tolist(),
             "camera": {**viewer_camera(camera, other.GetSize()), "distance": camera.GetDistance()},
@@ -118,24 +120,27 @@ def _is_image(renderer: Any) -> bool:
     return all(isinstance(prop, vtkImageActor) for prop in renderer.GetViewProps())
 
 
-def _balls(actor: Any, widget: Any, keep: Keep, missing: list[str]) -> Iterator[dict[str, Any]]:
-    """Describe an actor of the widget with balls without the view's turn, which the viewer does."""
+def _balls(widget: Any, keep: Keep, missing: list[str]) -> Iterator[dict[str, Any]]:
+    """Describe the widget with balls, without the view's turn, which the viewer does."""
     back = np.linalg.inv(array_of(widget.GetTransform().GetMatrix()))
-    if actor.GetTexture() is None:  # the axes
-        yield from shapes_of(actor, back, keep, missing)
-        return
-    actor.GetMapper().Update()
-    ball = vtkPolyData()
-    ball.DeepCopy(actor.GetMapper().GetInput())
-    points = vtk_to_numpy(ball.GetPoints().GetData())
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    # About the origin, and no finer than can be seen: six balls that are nearly alike
-    for numbers, zero in ((points, middle), (vtk_to_numpy(ball.GetPointData().GetTCoords()), 0)):
-        numbers[:] = np.rint((numbers - zero) / _FINENESS) * _FINENESS
-    moved = np.eye(4)
-    moved[:3, 3] = back[:3, :3] @ middle
-    disc = unlit(ball, actor.GetProperty(), actor.GetTexture())
-    yield from ({**shape, "facing": True} for shape in shapes_of(disc, moved, keep, missing))
+    for actor in filter(_is_visible, collected(widget.GetActors)):
+        if actor.GetTexture() is None:  # the axes
+            yield from shapes_of(actor, back, keep, missing)
+            continue
+        actor.GetMapper().Update()
+        ball = vtkPolyData()
+        ball.DeepCopy(actor.GetMapper().GetInput())
+        points, places = ball.GetPoints().GetData(), ball.GetPointData().GetTCoords()
+        x0, x1, y0, y1, back_side, _ = actor.GetBounds()
+        middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2, back_side])
+        # About the origin, and no finer than can be seen: six balls that are nearly alike
+        for numbers, zero in ((vtk_to_numpy(points), middle), (vtk_to_numpy(places), 0)):
+            numbers[:] = np.rint((numbers - zero) / _FINENESS) * _FINENESS
+        points.Modified()
+        moved = np.eye(4)
+        moved[:3, 3] = back[:3, :3] @ middle
+        disc = unlit(ball, actor.GetProperty(), actor.GetTexture())
+        yield from ({**shape, "facing": True} for shape in shapes_of(disc, moved, keep, missing))
 
 
 def flat_of(

@@ -172,7 +172,8 @@ def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
     if bar.GetDrawColorBar():
         if indexed:
             step = long / max(notes, 1)
-            for k, color in enumerate(_indexed_colors(table)):
+            # VTK makes the boxes with their notes
+            for k, color in enumerate(_indexed_colors(table) if bar.GetDrawAnnotations() else ()):
                 begin = low[along] + (notes - 1 - k if upright else k) * step + gap
                 yield box(*across(begin, step - 2 * gap), color=color)
         else:
@@ -213,13 +214,12 @@ def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
     measured = [(note, size_of(note.text, look, renderer)) for note in beside]
     placed = _stacked(measured, low[1], long, gap) if upright else _lapped(measured, gap)
     for note, at, row in placed:
-        color = [*look.GetColor(), look.GetOpacity()] if indexed else [*note.color, 1.0]
         near, far = edge + sense * gap / 2, edge + sense * (gap / 2 + leader + row)
-        corner = np.array([note.at, note.at])
+        corner = np.array([note.at, note.at]) - 0.5
         corner[t] = min(near, far)
         size = np.ones(2)
         size[t] = abs(far - near)
-        yield box(corner, size, color=color)
+        yield box(corner, size, color=[*note.color, 1.0])
         place = np.array([at, at])
         place[t] = edge + sense * (gap + leader + row)
         # Whatever VTK justifies them by, they begin there

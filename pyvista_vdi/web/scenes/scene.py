@@ -169,6 +169,7 @@ def scene_of(
     head = {
         "camera": viewer_camera(renderer.GetActiveCamera(), renderer.GetSize()) if camera else None,
         "size": list(renderer.GetSize()),
+        "ground": _ground(renderer),
         "bounds": bounds_of(renderer),
         "lights": lights,
         "shapes": shapes,
@@ -268,18 +269,24 @@ def _environment(renderer: Any) -> list[str]:
 
 def _background(renderer: Any, left_out: list[str]) -> str:
     """Return a renderer's background as CSS."""
-    if any(other.GetLayer() < renderer.GetLayer() for other in around(renderer)):
-        return css((0, 0, 0))  # nothing clears the window but the lowest layer
     if renderer.GetTexturedBackground():
-        left_out.append("the background's texture")
-    color = css(renderer.GetBackground())
-    if not renderer.GetGradientBackground():
-        return color
+        left_out.append("the background's texture (set_environment_texture)")
+    low, high = map(css, _ground(renderer))
+    if low == high or not renderer.GetGradientBackground():
+        return low
     direction = _GRADIENTS.get(renderer.GetGradientMode())
     if direction is None:
-        left_out.append("the background's radial gradient")
-        return color
-    return f"linear-gradient({direction}, {color}, {css(renderer.GetBackground2())})"
+        left_out.append("the background's radial gradient (set_background)")
+        return low
+    return f"linear-gradient({direction}, {low}, {high})"
+
+
+def _ground(renderer: Any) -> list[list[float]]:
+    """Return the colours at both ends of a renderer's background."""
+    if any(other.GetLayer() < renderer.GetLayer() for other in around(renderer)):
+        return [[0.0, 0.0, 0.0]] * 2  # nothing clears the window but the lowest layer
+    low, high = list(renderer.GetBackground()), list(renderer.GetBackground2())
+    return [low, high if renderer.GetGradientBackground() else low]
 
 
 def css(color: Sequence[float]) -> str:

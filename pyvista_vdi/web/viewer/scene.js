@@ -4,7 +4,8 @@ import { annotate } from "./annotations.js";
 import { cornersOf, layersOf } from "./layers.js";
 import { load } from "./loader.js";
 import {
-  COPY_SHADER, LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, meshFragmentShader, meshVertexShader,
+  COPY_SHADER, LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, RESOLVED_SHADER, meshFragmentShader,
+  meshVertexShader,
 } from "./mesh_shader.js";
 import { Raycaster, linked } from "./raycast.js";
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
@@ -142,11 +143,15 @@ export class Scene {
         gl.enable(gl.SCISSOR_TEST);
         this.#drawn = view;
       }
-      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#buffers.color.framebuffer);
-      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target.framebuffer);
-      gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+      const { color, layers, depth } = this.#buffers;
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-      depthTexture = this.#buffers.depth.texture;
+      gl.viewport(0, 0, width, height);
+      gl.disable(gl.BLEND);
+      this.#cover(RESOLVED_SHADER, { picture: color.texture }, [0, 0], height);
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+      if (layers) this.#cover(LAYERS_SHADER, { layers: layers.texture, sums: layers.sums });
+      depthTexture = depth.texture;
     }
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE_MINUS_DST_ALPHA, gl.ONE);
@@ -166,7 +171,8 @@ export class Scene {
     for (const [other, k] of behind ? chosen.reverse() : chosen) {
       const [left, bottom, wide, high] = partOf(other, view);
       gl.viewport(left, bottom, wide, high);
-      this.#cover(COPY_SHADER, { picture: this.#buffers.others[k].picture.texture }, [left, bottom]);
+      this.#cover(isMixed(other) ? COPY_SHADER : RESOLVED_SHADER,
+        { picture: this.#buffers.others[k].picture.texture }, [left, bottom], view.height);
     }
   }
 
@@ -225,10 +231,6 @@ export class Scene {
       gl.depthMask(false);
       gl.blendFuncSeparate(gl.ONE, gl.ONE, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
       for (const shape of layers) this.#drawShape(shape, seen, ["LAYERS"]);
-      gl.bindFramebuffer(gl.FRAMEBUFFER, buffers.color.framebuffer);
-      gl.disable(gl.DEPTH_TEST);
-      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      this.#cover(LAYERS_SHADER, { layers: buffers.layers.texture, sums: buffers.layers.sums });
     }
     gl.disable(gl.BLEND);
     this.#others.forEach((other, k) => this.#drawOther(other, this.#buffers.others[k], view));
@@ -253,7 +255,8 @@ export class Scene {
     for (const layered of [false, true]) {
       if (layered) gl.enable(gl.BLEND);
       for (const shape of other.shapes) {
-        if (shape.translucent === layered) this.#drawShape(shape, seen, layered ? ["BLENDED"] : []);
+        const pass = layered ? ["BLENDED"] : isMixed(other) ? ["CODED"] : [];
+        if (shape.translucent === layered) this.#drawShape(shape, seen, pass);
       }
     }
     gl.disable(gl.BLEND);
@@ -358,11 +361,13 @@ export class Scene {
     gl.deleteTexture(picture);
   }
 
-  #cover(fragment, textures, corner = [0, 0]) {
+  #cover(fragment, textures, corner = [0, 0], height = 1) {
     const gl = this.#gl;
     const { program, uniforms } = this.#program(VERTEX_SHADER, fragment);
     gl.useProgram(program);
     gl.uniform2i(uniforms.corner, ...corner);
+    gl.uniform1f(uniforms.height ?? null, height);
+    gl.uniform3fv(uniforms.ground ?? null, this.head.ground.flat());
     Object.entries(textures).forEach(([name, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -420,8 +425,8 @@ export class Scene {
     gl.activeTexture(gl.TEXTURE0);
     const samples = Math.min(SAMPLES, gl.getParameter(gl.MAX_SAMPLES));
     const depths = renderbuffer("DEPTH_COMPONENT24", 0), far = texture("R32F");
-    const many = [renderbuffer("RGBA8", samples), renderbuffer("DEPTH_COMPONENT24", samples)];
-    const color = texture("RGBA8");
+    const many = [renderbuffer("SRGB8_ALPHA8", samples), renderbuffer("DEPTH_COMPONENT24", samples)];
+    const color = texture("SRGB8_ALPHA8");
     made.depth = { texture: far, renderbuffers: [depths], framebuffer: framebuffer(
       ["COLOR_ATTACHMENT0", "texture", far], ["DEPTH_ATTACHMENT", "buffer", depths]) };
     made.samples = { renderbuffers: many, framebuffer: framebuffer(
@@ -429,8 +434,9 @@ export class Scene {
     made.color = { texture: color, framebuffer: framebuffer(["COLOR_ATTACHMENT0", "texture", color]) };
     // Buffers of their own: ANGLE clears before it resolves what was drawn there earlier
     made.others = this.#others.map((other) => {
-      const size = partOf(other, made).slice(2), picture = texture("RGBA8", size);
-      const own = ["RGBA8", "DEPTH_COMPONENT24"].map((f) => renderbuffer(f, samples, size));
+      const size = partOf(other, made).slice(2), format = isMixed(other) ? "RGBA8" : "SRGB8_ALPHA8";
+      const picture = texture(format, size);
+      const own = [format, "DEPTH_COMPONENT24"].map((f) => renderbuffer(f, samples, size));
       return {
         samples: { renderbuffers: own, framebuffer: framebuffer(
           ["COLOR_ATTACHMENT0", "buffer", own[0]], ["DEPTH_ATTACHMENT", "buffer", own[1]]) },
@@ -653,6 +659,9 @@ function projected(point, camera, extent) {
   return w > 0 ? [(x / half[0] / w - cx + 1) / 2, (y / half[1] / w - cy + 1) / 2, z] : null;
 }
 
+// Whether colours are mixed in what another renderer draws, which they are as they are coded.
+const isMixed = ({ shapes }) => shapes.some(({ translucent }) => translucent);
+
 // The view of another renderer: turned as the scene's is, or as it was.
 function cameraOf({ turns, camera: { distance, ...own } }, camera) {
   if (!turns) return own;
@@ -677,18 +686,19 @@ function partOf({ place: [x0, y0, x1, y1], window: of }, { width, height }) {
 }
 
 // From a shape's points, which are about its origin, to view coordinates.
-function toView({ matrix, origin, planes, facing }, { axes, eye }) {
+function toView({ matrix, origin, planes, facing = false }, { axes, eye }) {
   const rotation = matrix.slice(0, 3).map((row) => row.slice(0, 3));
   const columns = [0, 1, 2].map((k) => rotation.map((row) => row[k]));
-  const placed = matrix.slice(0, 3).map((row) => dot(row, origin) + row[3]);
-  // What faces the viewer is not turned about its origin
+  const place = matrix.slice(0, 3).map((row) => row[3]);
+  const placed = facing ? place : place.map((x, k) => x + dot(rotation[k], origin));
+  // What faces the viewer is not turned about its place
   const linear = facing ? columns
     : axes.map((axis) => columns.map((column) => dot(axis, column)));
   const [a, b, c] = linear;
   const cofactors = [cross(b, c), cross(c, a), cross(a, b)];
   const sense = Math.sign(dot(a, cofactors[0])) || 1;
   return {
-    linear, offset: axes.map((axis) => dot(axis, subtract(placed, eye))),
+    linear, offset: axes.map((axis, k) => dot(axis, subtract(placed, eye)) + facing * origin[k]),
     normals: cofactors.map((row) => row.map((x) => sense * x)),
     planes: Array.from({ length: 6 }, (_, k) => {
       if (!planes[k]) return [0, 0, 0, 1];
