@@ -33,6 +33,8 @@ GRID = pv.ImageData(dimensions=(6, 6, 6), spacing=(0.2,) * 3, origin=(0.3, 0, 0)
 GRID["x"] = GRID.points[:, 0] + GRID.points[:, 1]
 POINTS = np.array([[-1.0, 0.5, 0.5], [1, 1, 1], [0, -1, 1]])
 SEGMENTS = np.array([[-1.0, -1, 1], [1, 1, 1], [0, 1, 1], [1, 0, -1]])
+LABELLED = pv.PolyData(POINTS[1:])
+LABELLED["x"] = [1.0, 2.0]
 PLAIN = {"show_scalar_bar": False, "scalars": "x"}
 
 
@@ -96,7 +98,7 @@ CALLS = {
     "add_plane_widget": lambda p: p.add_plane_widget(ignore, color="r"),
     "add_point_labels": lambda p: p.add_point_labels(POINTS, [*"abc"], always_visible=True),
     "add_point_scalar_labels": lambda p: p.add_point_scalar_labels(
-        pv.PolyData(POINTS), [*"abc"], always_visible=True
+        LABELLED, "x", font_size=6, always_visible=True
     ),
     "add_points": lambda p: p.add_points(POINTS, color="r", point_size=8),
     "add_radio_button_widget": lambda p: p.add_radio_button_widget(ignore, "group", size=20),
@@ -113,7 +115,9 @@ CALLS = {
     "add_vdi_clip_plane": lambda p: p.add_vdi_clip_plane(p.volume),
     "add_vdi": lambda p: p.add_vdi(BALL, show_scalar_bar=False),
     "add_volume": lambda p: p.add_volume(GRID, show_scalar_bar=False),
-    "add_volume_clip_plane": lambda p: p.add_volume_clip_plane(GRID, show_scalar_bar=False),
+    "add_volume_clip_plane": lambda p: p.add_volume_clip_plane(
+        GRID, origin=GRID.center, show_scalar_bar=False
+    ),
 }
 
 #: Those whose texts cannot be turned off.
@@ -166,6 +170,7 @@ def shown(page, plotter, renderer=None):
     """Show a renderer in a page; return what is left out, and both pictures."""
     renderer = renderer or plotter.renderer
     plotter.show(auto_close=False)
+    plotter.render()  # VTK lays scalar bars out by two frames
     scene = scene_of(renderer, renderer.actors)
     page.evaluate(
         """async ([scene, data]) => {

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
+from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 from pyvista_vdi.web.placing import planes_of
 from pyvista_vdi.web.scenes.meshes import offset_of
 
@@ -96,8 +97,11 @@ def method_of(prop: Any) -> str | None:
 
 def is_silhouette(prop: Any) -> bool:
     """Whether what a prop draws is made for one view."""
-    mapper = prop.GetMapper() if prop.IsA("vtkActor") else None
-    source = None if mapper is None else mapper.GetInputAlgorithm()
+    # Of PyVista's actors alone: a source of VTK's own that is asked for before its module is
+    # imported is of a base class for Python, and so are then all others of its class, for good
+    if not prop.IsA("vtkActor") or type(prop).__module__.startswith(BACKEND):
+        return False
+    source = None if prop.GetMapper() is None else prop.GetMapper().GetInputAlgorithm()
     return source is not None and bool(source.IsA("vtkPolyDataSilhouette"))
 
 

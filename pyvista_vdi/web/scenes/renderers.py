@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
@@ -63,7 +64,8 @@ def others_of(
         shapes: list[dict[str, Any]] = []
         for prop in filter(_is_visible, other.GetViewProps()):
             if prop.IsA(_BALLS):
-                shapes += _balls(prop, keep, missing)
+                view = array_of(renderer.GetActiveCamera().GetViewTransformMatrix())
+                shapes += _balls(prop, view, keep, missing)
                 continue
             for part, matrix in parts_of(prop):
                 if (solid := image_quad(part) if _is_image(other) else part) is None:
@@ -120,9 +122,12 @@ def _is_image(renderer: Any) -> bool:
     return all(isinstance(prop, vtkImageActor) for prop in renderer.GetViewProps())
 
 
-def _balls(widget: Any, keep: Keep, missing: list[str]) -> Iterator[dict[str, Any]]:
+def _balls(
+    widget: Any, view: NDArray[np.float64], keep: Keep, missing: list[str]
+) -> Iterator[dict[str, Any]]:
     """Describe the widget with balls, without the view's turn, which the viewer does."""
-    back = np.linalg.inv(array_of(widget.GetTransform().GetMatrix()))
+    back = np.eye(4)
+    back[:3, :3] = view[:3, :3].T
     for actor in filter(_is_visible, collected(widget.GetActors)):
         if actor.GetTexture() is None:  # the axes
             yield from shapes_of(actor, back, keep, missing)
@@ -190,7 +195,7 @@ def flat_of(
 
 def _in_pixels(mapper: Any, position: tuple[int, int], renderer: Any) -> Any:
     """Return what a mapper draws in two dimensions, in pixels of the viewport."""
-    mapper.GetInputAlgorithm().Update()
+    mapper.Update()
     poly = vtkPolyData()
     poly.DeepCopy(mapper.GetInput())
     points, coordinate = vtk_to_numpy(poly.GetPoints().GetData()), mapper.GetTransformCoordinate()

@@ -213,7 +213,7 @@ def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
     sense, leader = (1 if precede else -1), bar.GetAnnotationLeaderPadding()
     measured = [(note, size_of(note.text, look, renderer)) for note in beside]
     placed = _stacked(measured, low[1], long, gap) if upright else _lapped(measured, gap)
-    for note, at, row in placed:
+    for note, at, row, ends in placed:
         near, far = edge + sense * gap / 2, edge + sense * (gap / 2 + leader + row)
         corner = np.array([note.at, note.at]) - 0.5
         corner[t] = min(near, far)
@@ -222,10 +222,11 @@ def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
         yield box(corner, size, color=[*note.color, 1.0])
         place = np.array([at, at])
         place[t] = edge + sense * (gap + leader + row)
-        # Whatever VTK justifies them by, they begin there
-        yield described_text(
-            note.text, start + place, look, renderer, across="left", along="bottom"
-        )
+        # As from the second frame on: in its first, VTK does not heed it
+        sideways = ends if not upright else ("left" if precede else "right")
+        vertical = "middle" if upright else ("bottom" if precede else "top")
+        place = start + place
+        yield described_text(note.text, place, look, renderer, across=sideways, along=vertical)
 
 
 def _look_of_notes(bar: Any, renderer: Any) -> Any:
@@ -243,7 +244,7 @@ def _look_of_notes(bar: Any, renderer: Any) -> Any:
 
 def _stacked(
     measured: list[tuple[_Note, Pair]], low: float, long: float, gap: float
-) -> Iterator[tuple[_Note, float, float]]:
+) -> Iterator[tuple[_Note, float, float, str]]:
     """Give where notes beside an upright bar stand: from the middle one on, none over another."""
     measured = sorted(measured, key=lambda each: each[0].at)
     middle = len(measured) // 2
@@ -259,21 +260,24 @@ def _stacked(
         elif sense > 0 and at - half < upwards:
             at = upwards + half
         upwards, downwards = max(upwards, at + half), min(downwards, at - half)
-        yield note, at, 0.0
+        yield note, at, 0.0, ""
 
 
-def _lapped(measured: list[tuple[_Note, Pair]], gap: float) -> Iterator[tuple[_Note, float, float]]:
+def _lapped(
+    measured: list[tuple[_Note, Pair]], gap: float
+) -> Iterator[tuple[_Note, float, float, str]]:
     """Give where notes along a lying bar stand, and how far off: from the middle one outwards."""
     measured = sorted(measured, key=lambda each: each[0].at)
     middle = (len(measured) - 1) / 2
     taken: list[tuple[float, float, float]] = []  # left, right, far side
     for k in sorted(range(len(measured)), key=lambda k: abs(k - middle)):
         note, (wide, high) = measured[k]
-        begin = note.at - wide * (0.5 if k == middle else float(k > middle))
+        across = "center" if k == middle else "right" if k > middle else "left"
+        begin = note.at - wide * {"left": 0.0, "center": 0.5, "right": 1.0}[across]
         over = [far for left, right, far in taken if begin < right and left < begin + wide]
         row = max(over, default=0.0)
         taken.append((begin, begin + wide, row + high + gap))
-        yield note, note.at, row
+        yield note, note.at, row, across
 
 
 def _notes(bar: Any, table: Any, begin: float, long: float) -> Iterator[_Note]:
