@@ -18,7 +18,7 @@ from pyvista_vdi.web.scenes.scene import scene_of
 slow = pytest.mark.slow
 pytestmark = pytest.mark.gl
 
-SIZE = (160, 90)
+SIZE = (240, 135)
 
 #: Of 255, without texts: the issue's.
 MEAN = 0.5
@@ -29,7 +29,7 @@ WRITTEN = 4.0
 BALL = soft_ball(12)
 SPHERE = pv.Sphere(radius=0.4, center=(0.9, 0.5, 0.5))
 SPHERE["z"] = SPHERE.points[:, 2]
-GRID = pv.ImageData(dimensions=(6, 6, 6), spacing=(0.2,) * 3, origin=(0.3, 0, 0))
+GRID = pv.ImageData(dimensions=(6, 6, 6), spacing=(0.14,) * 3, origin=(0.9, -0.9, 0.3))
 GRID["x"] = GRID.points[:, 0] + GRID.points[:, 1]
 POINTS = np.array([[-1.0, 0.5, 0.5], [1, 1, 1], [0, -1, 1]])
 SEGMENTS = np.array([[-1.0, -1, 1], [1, 1, 1], [0, 1, 1], [1, 0, -1]])
@@ -73,7 +73,9 @@ CALLS = {
     "add_camera_orientation_widget": lambda p: p.add_camera_orientation_widget(),
     "add_chart": lambda p: p.add_chart(pv.Chart2D()),
     "add_checkbox_button_widget": lambda p: p.add_checkbox_button_widget(ignore, size=20),
-    "add_composite": lambda p: p.add_composite(pv.MultiBlock([SPHERE, GRID]), color="w"),
+    "add_composite": lambda p: p.add_composite(
+        pv.MultiBlock([pv.Cone(center=(-1, 0, 1)), GRID]), color="w"
+    ),
     "add_cursor": lambda p: p.add_cursor((0.7, 1.5, 0, 0.7, 0, 1), (1, 0.5, 0.5), "r"),
     "add_floor": lambda p: p.add_floor(color="g", show_edges=True),
     "add_key_event": lambda p: p.add_key_event("x", lambda: None),
