@@ -99,7 +99,7 @@ def around(renderer: Any) -> list[Any]:
     )
     if own is None or window is None:
         return []
-    known = {*own, own.border_overlay_renderer}
+    known = {*own, getattr(own, "border_overlay_renderer", None)}
     found, layers = [], window.GetRenderers()
     low, high = np.reshape(renderer.GetViewport(), (2, 2))
     for k in range(layers.GetNumberOfItems()):
