@@ -68,8 +68,7 @@ _NAMES = {
     "vtkInteractionStyle": "vtkInteractorStyleTrackballCamera",
     "vtkParallelCore": "vtkMultiProcessController",
     "vtkRenderingAnnotation": (
-        "vtkAnnotatedCubeActor vtkAxesActor vtkCaptionActor2D vtkCornerAnnotation "
-        "vtkScalarBarActor"
+        "vtkAnnotatedCubeActor vtkAxesActor vtkCaptionActor2D vtkCornerAnnotation vtkScalarBarActor"
     ),
     "vtkRenderingCore": (
         "vtkActor vtkActor2D vtkAssembly vtkBillboardTextActor3D vtkCamera "
