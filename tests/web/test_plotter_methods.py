@@ -325,6 +325,12 @@ def test_a_background_image_stays_behind_all(options, plotter, page):
     assert far(*both(page, plotter, scene_of(plotter.renderer))) <= MEAN
 
 
+def test_lines_are_as_thin_before_an_image(plotter, page):
+    plotter.add_background_image("image.png")
+    plotter.add_bounding_box(color="k", line_width=2)
+    assert far(*shown(page, plotter)[1:]) <= MEAN
+
+
 @pytest.mark.parametrize("as_global", [False, pytest.param(True, marks=slow)])
 def test_background_images_of_subplots(as_global, vdi, page):
     plotter = pv.Plotter(off_screen=True, window_size=SIZE, shape=(1, 2), border=False)

@@ -297,11 +297,12 @@ uniform ivec2 corner;
 out vec4 seen;
 void main() { seen = texelFetch(picture, ivec2(gl_FragCoord.xy) - corner, 0); }`;
 
-/** Takes over a picture of mean light, as seen before a ground, in which it may be translucent. */
+/** Takes over a picture of mean light as it is seen before a ground, or another such picture. */
 export const RESOLVED_SHADER = `#version 300 es
 precision highp float;
-uniform sampler2D picture;
-uniform ivec2 corner;
+uniform sampler2D picture, behind;
+uniform ivec2 corner, cornerBehind;
+uniform bool pictured;  // whether there is one behind
 uniform vec3 ground[2]; // at the bottom and at the top
 uniform float height;
 out vec4 seen;
@@ -312,6 +313,7 @@ vec3 coded(vec3 c) {
 void main() {
   vec4 mean = texelFetch(picture, ivec2(gl_FragCoord.xy) - corner, 0);
   vec3 under = mix(ground[0], ground[1], clamp(gl_FragCoord.y / height, 0.0, 1.0));
+  if (pictured) under = coded(texelFetch(behind, ivec2(gl_FragCoord.xy) - cornerBehind, 0).rgb);
   vec3 over = coded(mean.rgb + (1.0 - mean.a) * decoded(under));
   vec3 least = max((over - under) / max(1.0 - under, 1e-6), 1.0 - over / max(under, 1e-6));
   float opacity = min(1.0, max(max(mean.a, least.r), max(least.g, least.b)));

@@ -147,7 +147,7 @@ export class Scene {
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
       gl.viewport(0, 0, width, height);
       gl.disable(gl.BLEND);
-      this.#cover(RESOLVED_SHADER, { picture: color.texture }, [0, 0], height);
+      this.#resolve(color.texture, view);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       if (layers) this.#cover(LAYERS_SHADER, { layers: layers.texture, sums: layers.sums });
@@ -171,9 +171,20 @@ export class Scene {
     for (const [other, k] of behind ? chosen.reverse() : chosen) {
       const [left, bottom, wide, high] = partOf(other, view);
       gl.viewport(left, bottom, wide, high);
-      this.#cover(isMixed(other) ? COPY_SHADER : RESOLVED_SHADER,
-        { picture: this.#buffers.others[k].picture.texture }, [left, bottom], view.height);
+      const picture = this.#buffers.others[k].picture.texture;
+      if (isMixed(other)) this.#cover(COPY_SHADER, { picture }, { corner: [left, bottom] });
+      else this.#resolve(picture, view, [left, bottom]);
     }
+  }
+
+  // Take over a picture whose samples are averaged, as seen before what is behind all.
+  #resolve(picture, view, corner = [0, 0]) {
+    const k = this.#others.findIndex((other) => other.behind && !other.turns && !isMixed(other));
+    const pictured = k >= 0 && this.#buffers.others[k].picture.texture !== picture;
+    const behind = pictured ? this.#buffers.others[k].picture.texture : picture;
+    const cornerBehind = pictured ? partOf(this.#others[k], view).slice(0, 2) : corner;
+    this.#cover(RESOLVED_SHADER, { picture, behind },
+      { corner, cornerBehind, pictured, height: view.height });
   }
 
   #drawVDIs(raycaster, { camera, width, height, moving, few, clippingPlanes }, depthTexture) {
@@ -361,11 +372,14 @@ export class Scene {
     gl.deleteTexture(picture);
   }
 
-  #cover(fragment, textures, corner = [0, 0], height = 1) {
+  #cover(fragment, textures, more = {}) {
+    const { corner = [0, 0], cornerBehind = corner, pictured = false, height = 1 } = more;
     const gl = this.#gl;
     const { program, uniforms } = this.#program(VERTEX_SHADER, fragment);
     gl.useProgram(program);
     gl.uniform2i(uniforms.corner, ...corner);
+    gl.uniform2i(uniforms.cornerBehind ?? null, ...cornerBehind);
+    gl.uniform1i(uniforms.pictured ?? null, pictured);
     gl.uniform1f(uniforms.height ?? null, height);
     gl.uniform3fv(uniforms.ground ?? null, this.head.ground.flat());
     Object.entries(textures).forEach(([name, texture], unit) => {
