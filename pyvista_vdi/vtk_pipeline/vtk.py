@@ -50,7 +50,7 @@ _NAMES = {
     "vtkFiltersGeneral": "vtkMultiBlockDataGroupFilter",
     "vtkFiltersGeometry": "vtkDataSetSurfaceFilter",
     "vtkFiltersHybrid": "vtkImplicitModeller vtkTemporalInterpolator",
-    "vtkFiltersSources": "vtkSphereSource",
+    "vtkFiltersSources": "vtkPlaneSource vtkSphereSource",
     "vtkIOImage": (
         "vtkDICOMImageReader vtkMetaImageReader vtkMetaImageWriter vtkNIFTIImageReader "
         "vtkNIFTIImageWriter vtkNrrdReader vtkPNGWriter"
@@ -68,15 +68,16 @@ _NAMES = {
     "vtkInteractionStyle": "vtkInteractorStyleTrackballCamera",
     "vtkParallelCore": "vtkMultiProcessController",
     "vtkRenderingAnnotation": (
-        "vtkAnnotatedCubeActor vtkAxesActor vtkCornerAnnotation vtkScalarBarActor"
+        "vtkAnnotatedCubeActor vtkAxesActor vtkCaptionActor2D vtkCornerAnnotation vtkScalarBarActor"
     ),
     "vtkRenderingCore": (
         "vtkActor vtkActor2D vtkAssembly vtkBillboardTextActor3D vtkCamera "
         "vtkColorTransferFunction vtkFollower vtkHardwarePicker vtkHardwareSelector vtkImageActor "
-        "vtkImageSlice vtkLight vtkLightKit vtkMapper vtkPolyDataMapper vtkProp3D vtkPropAssembly "
-        "vtkPropCollection vtkPropPicker vtkRenderWindow vtkRenderWindowInteractor vtkRenderer "
-        "vtkSelectVisiblePoints vtkTextActor vtkTextMapper vtkTextProperty vtkVolume "
-        "vtkVolumeProperty vtkWindowToImageFilter"
+        "vtkImageSlice vtkLight vtkLightKit vtkMapper vtkPolyDataMapper vtkPolyDataMapper2D "
+        "vtkProp3D vtkPropAssembly vtkPropCollection vtkPropPicker vtkRenderWindow "
+        "vtkRenderWindowInteractor vtkRenderer vtkSelectVisiblePoints vtkTextActor vtkTextMapper "
+        "vtkTextProperty vtkTexture vtkTexturedActor2D vtkVolume vtkVolumeProperty "
+        "vtkWindowToImageFilter"
     ),
     "vtkRenderingImage": "vtkImageResliceMapper",
     "vtkRenderingLOD": "vtkLODActor",

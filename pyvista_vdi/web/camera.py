@@ -9,6 +9,9 @@ from typing import Any
 from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model.camera import Camera
 
+#: Planes that the viewer clips a VDI to (MOST_CLIPPING_PLANES of viewer/shader.js).
+MOST_PLANES = 24
+
 _ENTRIES = (
     "position", "focal_point", "view_up", "view_angle", "parallel_scale", "window_center",
 )  # fmt: skip

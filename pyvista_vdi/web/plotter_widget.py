@@ -11,7 +11,7 @@ import numpy as np
 
 from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.web.bundle import viewer_script
-from pyvista_vdi.web.camera import viewer_camera
+from pyvista_vdi.web.camera import MOST_PLANES, viewer_camera
 from pyvista_vdi.web.placing import as_shown, look_of, planes_of
 from pyvista_vdi.web.still import png
 from pyvista_vdi.web.widget import RENDER, VDIWidget
@@ -52,7 +52,7 @@ class PlotterWidget(VDIWidget):
         self._look = look_of(actor)
         shown = as_shown(actor)
         super().__init__(shown, camera=renderer.camera, background=renderer.background_color)
-        self.clipping_planes = planes_of(actor)
+        self.clipping_planes = planes_of(actor)[:MOST_PLANES]
         self._take(scene)
         self._picture_size = list(renderer.GetSize())
         self.observe(self._turn, "camera")
@@ -121,7 +121,7 @@ class PlotterWidget(VDIWidget):
             self.camera = camera
         self.background = renderer.background_color
         self._take_if_new(renderer)
-        self.clipping_planes = planes_of(self._actor)
+        self.clipping_planes = planes_of(self._actor)[:MOST_PLANES]
         if self._actor.vdi is not None and look_of(self._actor) != self._look:
             self._look = look_of(self._actor)
             self.vdi = as_shown(self._actor)

@@ -20,7 +20,7 @@ from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import checked_planes
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.web.bundle import viewer_script
-from pyvista_vdi.web.camera import viewer_camera
+from pyvista_vdi.web.camera import MOST_PLANES, viewer_camera
 from pyvista_vdi.web.still import picture, stand_in, still
 
 try:
@@ -118,7 +118,13 @@ class _PlanesTrait(traitlets.TraitType[list[list[float]], Any]):
     """Clipping planes as lists of six numbers."""
 
     def validate(self, obj: Any, value: Any) -> list[list[float]]:
-        return [list(plane) for plane in checked_planes(value)]
+        planes = [list(plane) for plane in checked_planes(value)]
+        if len(planes) > MOST_PLANES:
+            raise InvalidArgumentError(
+                f"clipping_planes: the viewer clips a VDI to {MOST_PLANES} planes at most; "
+                f"got {len(planes)}"
+            )
+        return planes
 
 
 class VDIWidget(anywidget.AnyWidget):

@@ -292,7 +292,7 @@ def test_what_the_viewer_leaves_out_is_named(plotter):
     actor.mapper.SetCroppingRegionPlanes(0, 1, 0, 1, 0, 1)
     actor.mapper.SetCroppingRegionFlagsToCross()
     plotter.show_grid()
-    with pytest.warns(UserWarning, match=r"without cropping \(\w+\), CubeAxes.*: see all by"):
+    with pytest.warns(UserWarning, match=r"without cropping \(add_vdi\), show_grid: see all by"):
         show_plotter(plotter)
 
 

@@ -488,7 +488,7 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
         plotter.vdi.export_html(None)
     assert len(warned) == 1
     words = str(warned[0].message)
-    for what in ("cropping", "physically based shading (ball)", "CubeAxes"):
+    for what in ("cropping", "physically based shading (ball)", "show_grid"):
         assert what in words
 
 

@@ -8,6 +8,7 @@ here, so that pictures agree.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -37,6 +38,12 @@ _COMPOSITE = "vtkCompositePolyDataMapper"
 
 #: Clipping planes of a mapper, as in VTK.
 _MOST_PLANES = 6
+
+#: The part of the range of depths, -1 to 1, that a unit of VTK's offsets of polygons is.
+_OFFSET_UNIT = 2 * 0.000016
+
+#: The longest edge of a WebP picture.
+_MOST_WEBP = 16383
 
 
 class Cells(NamedTuple):
@@ -129,7 +136,8 @@ def shapes_of(
     mapper = actor.GetMapper()
     name = None if mapper is None else mapper.GetClassName()
     if name not in _MAPPERS and name != _COMPOSITE:
-        left_out.append(f"what {name or 'no mapper'} draws")
+        gaussian = mapper is not None and mapper.IsA("vtkPointGaussianMapper")
+        left_out.append('style="points_gaussian"' if gaussian else f"what {name} draws")
         return
     mapper.Update()
     if name == _COMPOSITE:
@@ -139,6 +147,10 @@ def shapes_of(
     look = actor.GetProperty()
     if look.GetInterpolation() == _PBR:
         left_out.append("physically based shading")
+    planes = planes_of(actor)
+    if len(planes) > _MOST_PLANES:
+        left_out.append(f"{len(planes) - _MOST_PLANES} of its clipping planes")
+    nearer = offset_of(mapper)
     for data, changes in blocks:
         poly = _surface(data)
         if poly is None or poly.GetNumberOfPoints() == 0:
@@ -148,10 +160,21 @@ def shapes_of(
             continue
         shape["matrix"] = matrix.tolist()
         shape["material"].update(changes)
+        if nearer:
+            shape["nearer"] = nearer
         shape["translucent"] = bool(
             actor.HasTranslucentPolygonalGeometry() or changes.get("opacity", 1) < 1
         )
         yield shape
+
+
+def offset_of(mapper: Any) -> float:
+    """Return by how much a mapper draws its polygons nearer, of the range of depths."""
+    if mapper.GetResolveCoincidentTopology() != 1:  # by offsets
+        return 0.0
+    factor, units = mutable(0.0), mutable(0.0)
+    mapper.GetRelativeCoincidentTopologyPolygonOffsetParameters(factor, units)
+    return float(units) * _OFFSET_UNIT
 
 
 def _blocks(mapper: Any) -> Iterator[tuple[Any, dict[str, Any]]]:
@@ -228,7 +251,7 @@ def _shape(actor: Any, poly: Any, keep: Keep, left_out: list[str]) -> dict[str, 
         shape["back"] = _material(back)
     normals = poly.GetPointData().GetNormals()
     smooth = normals is not None and look.GetInterpolation() != _FLAT
-    if smooth:
+    if smooth and look.GetLighting():
         unit = vtk_to_numpy(normals)[used].astype(np.float64)
         unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-30)
         shape["normals"] = keep(np.rint(np.nan_to_num(unit) * 32767).astype(np.int16))
@@ -333,10 +356,23 @@ def _texture(
     shape["places"] = keep(vtk_to_numpy(places)[used, :2].astype(np.float32))
     shape["texture"] = {
         "size": [width, height],
-        "texels": keep(_rgba(texels)),
+        "picture": keep(_packed(_rgba(texels).reshape(height, width, 4))),
         "repeat": bool(texture.GetRepeat()),
         "smooth": bool(texture.GetInterpolate()),
     }
+
+
+def _packed(pixels: Array) -> Array:
+    """Return the bytes of an image file of RGBA, which loses nothing."""
+    from PIL import Image
+
+    shown = pixels[..., :3] if (pixels[..., 3] == 255).all() else pixels
+    image, stream = Image.fromarray(np.ascontiguousarray(shown)), io.BytesIO()
+    if max(image.size) <= _MOST_WEBP:
+        image.save(stream, format="webp", lossless=True, exact=True)
+    else:
+        image.save(stream, format="png")
+    return np.frombuffer(stream.getvalue(), np.uint8)
 
 
 def _rgba(colors: Array) -> Array:

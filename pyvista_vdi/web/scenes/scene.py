@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,19 +15,16 @@ from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
-from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkActor,
-    vtkAnnotatedCubeActor,
-    vtkAxesActor,
-    vtkProp3D,
-    vtkPropAssembly,
-    vtkPropCollection,
-)
-from pyvista_vdi.web.camera import viewer_camera
+from pyvista_vdi.vtk_pipeline.vtk import vtkActor, vtkImageActor
+from pyvista_vdi.web.camera import MOST_PLANES, viewer_camera
 from pyvista_vdi.web.encode import encoded
 from pyvista_vdi.web.placing import look_of, planes_of, thinned
-from pyvista_vdi.web.scenes.annotations import annotations_of, described_text
+from pyvista_vdi.web.scenes.annotations import annotations_of
+from pyvista_vdi.web.scenes.lighting import MOST_LIGHTS, bounds_of, lights_of
 from pyvista_vdi.web.scenes.meshes import shapes_of
+from pyvista_vdi.web.scenes.names import Names, is_silhouette, passes_of, widgets_of
+from pyvista_vdi.web.scenes.props import image_quad, parts_of
+from pyvista_vdi.web.scenes.renderers import around, flat_of, others_of
 
 #: The numbers of a scene's arrays in JavaScript: their names there, by NumPy's.
 _KINDS = {
@@ -36,12 +33,6 @@ _KINDS = {
     "uint8": "Uint8Array",
     "uint32": "Uint32Array",
 }
-
-#: Planes that the viewer clips a VDI to; two more bound a slab of it.
-_MOST_PLANES = 6
-
-#: vtkLight's types.
-_LIGHTS = {1: "head", 2: "camera", 3: "scene"}
 
 #: Actors that turn or scale with the view, which the viewer's matrices do not.
 _NOT_PLAIN = ("vtkFollower", "vtkProp3DFollower", "vtkAxisFollower")
@@ -87,11 +78,16 @@ class _Packed:
     """Arrays one behind the other."""
 
     arrays: list[NDArray[Any]] = field(default_factory=list)
+    numbers: dict[tuple[str, bytes], int] = field(default_factory=dict)
 
     def keep(self, array: NDArray[Any]) -> int:
         """Take an array, and return its number."""
-        self.arrays.append(np.ascontiguousarray(array))
-        return len(self.arrays) - 1
+        array = np.ascontiguousarray(array)
+        key = (array.dtype.name, array.tobytes())
+        if key not in self.numbers:  # of parts that are alike once
+            self.numbers[key] = len(self.arrays)
+            self.arrays.append(array)
+        return self.numbers[key]
 
     def deflated(self, head: dict[str, Any]) -> bytes:
         """Return the scene: the length of a JSON text, the text, and the arrays; deflated."""
@@ -133,30 +129,36 @@ def scene_of(
     UnsupportedError
         If it shows no VDI and needs one.
     """
-    called = {prop: name for name, prop in (names or {}).items() if "(Addr" not in name}
-    packed, left_out = _Packed(), _environment(renderer)
+    called, packed, left_out = Names(names or {}, renderer), _Packed(), _environment(renderer)
     shapes: list[dict[str, Any]] = []
     texts: list[dict[str, Any]] = []
     bodies: list[tuple[VDI, dict[str, Any]]] = []
     actors: list[Any] = []
-    for prop, matrix in _props(renderer):
-        missing: list[str] = []
+    others = list(others_of(renderer, packed.keep, texts, left_out))
+    for prop in renderer.GetViewProps():
+        # A scalar bar that can be moved is a prop of its own
+        if not prop.GetVisibility() or prop.IsA("vtkScalarBarRepresentation"):
+            continue
+        missing = ["the outlines of other views than the first"] * is_silhouette(prop)
         known = True
-        if isinstance(prop, VDIActorMethods):
-            if prop.vdi is not None:  # type: ignore[attr-defined]
-                bodies.append(_body(prop, matrix, missing))
-                actors.append(prop)
-        elif isinstance(prop, vtkActor) and _is_plain(prop):
-            shapes += shapes_of(prop, matrix, packed.keep, missing)
-        else:
-            described = annotations_of(prop, renderer, missing)
-            known = described is not None
-            group = len(texts)
-            texts += [{**t, "alone": group + 1} if "alone" in t else t for t in described or []]
-        title = called.get(prop, type(prop).__name__)
+        for part, matrix in parts_of(prop):
+            if isinstance(part, VDIActorMethods):
+                if part.vdi is not None:  # type: ignore[attr-defined]
+                    bodies.append(_body(part, matrix, missing))
+                    actors.append(part)
+            elif (solid := _solid(part)) is not None:
+                shapes += shapes_of(solid, matrix, packed.keep, missing)
+            elif (written := annotations_of(part, renderer)) is not None:
+                group = len(texts) + 1
+                texts += [{**text, "alone": group} if "alone" in text else text for text in written]
+            elif (flat := flat_of(part, renderer, packed.keep, missing)) is not None:
+                others += [flat[0]] if flat[0] else []
+                texts += flat[1]
+            else:
+                known = False
         if not known:
-            left_out.append(title)
-        left_out += [f"{what} ({title})" for what in missing]
+            left_out.append(called.of_missing(prop))
+        left_out += [f"{what} ({called.of(prop)})" for what in missing]
     # The viewer plays the first one's series, and follows its set
     several = [actor.series is not None or actor.vdi_set is not None for actor in actors]
     if any(several):
@@ -164,27 +166,30 @@ def scene_of(
             those.insert(0, those.pop(several.index(True)))
     if not bodies and needs_vdi:
         raise UnsupportedError("the renderer shows no VDI, so there is nothing for the viewer")
+    left_out += [f"the interaction of {method}" for method in widgets_of(renderer)]
     described = [{**more, "file": None} for _, more in bodies]
     for (vdi, _), entry in zip(bodies[1:], described[1:], strict=True):
         entry["file"] = packed.keep(np.frombuffer(encoded(vdi, coarse=True), np.uint8))
-    marker = _marker(renderer, packed.keep, texts, left_out)
+    lights = list(lights_of(renderer))
+    if len(lights) > MOST_LIGHTS:
+        left_out.append(f"{len(lights) - MOST_LIGHTS} of its lights (add_light)")
     head = {
-        "camera": _camera(renderer) if camera else None,
+        "camera": viewer_camera(renderer.GetActiveCamera(), renderer.GetSize()) if camera else None,
         "size": list(renderer.GetSize()),
-        "bounds": _bounds(renderer),
-        "lights": list(_lights(renderer)),
+        "ground": _ground(renderer),
+        "bounds": bounds_of(renderer),
+        "lights": lights,
         "shapes": shapes,
-        "marker": marker,
+        "renderers": others,
         "texts": texts,
         "vdis": described,
     }
-    background = _background(renderer, left_out)
     return Scene(
         vdi=bodies[0][0] if bodies else None,
         actors=actors,
         state=state_of(renderer),
         data=packed.deflated(head),
-        background=background,
+        background=_background(renderer, left_out),
         left_out=list(dict.fromkeys(left_out)),
     )
 
@@ -201,89 +206,20 @@ def state_of(renderer: Any) -> tuple[Any, ...]:
         else:
             state.append(prop.GetRedrawMTime())
         states.append(tuple(state))
-    lights = json.dumps(list(_lights(renderer)))
-    return tuple(states), tuple(renderer.GetSize()), lights, _background(renderer, [])
-
-
-def _props(renderer: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
-    """Give what is visible, the parts of assemblies by themselves, and where it is."""
-    for prop in renderer.GetViewProps():
-        if prop.GetVisibility():
-            yield from _paths(prop)
-
-
-def _paths(prop: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
-    """Give a prop, or the visible parts of an assembly, and where it is."""
-    if not isinstance(prop, vtkProp3D) or prop.GetNumberOfPaths() <= 1:
-        yield prop, _array(prop.GetMatrix() if hasattr(prop, "GetMatrix") else None)
-        return
-    paths = []
-    prop.InitPathTraversal()
-    while (path := prop.GetNextPath()) is not None:
-        nodes = [path.GetItemAsObject(k) for k in range(path.GetNumberOfItems())]
-        paths.append(([node.GetViewProp() for node in nodes], nodes[-1].GetMatrix()))
-    for parts, matrix in paths:
-        if all(part.GetVisibility() for part in parts):
-            yield parts[-1], _array(matrix)
-
-
-def _marker(
-    renderer: Any, keep: Any, texts: list[dict[str, Any]], left_out: list[str]
-) -> dict[str, Any] | None:
-    """Describe the axes in a corner, which PyVista's renderers have, and add their letters."""
-    widget = getattr(renderer, "axes_widget", None)
-    if widget is None or not widget.GetEnabled() or renderer.GetRenderWindow() is None:
-        return None
-    marker = widget.GetOrientationMarker()
-    layers = renderer.GetRenderWindow().GetRenderers()
-    layers = [layers.GetItemAsObject(i) for i in range(layers.GetNumberOfItems())]
-    own = next((layer for layer in layers if layer.HasViewProp(marker)), None)
-    if own is None:
-        return None
-    missing: list[str] = []
-    shapes = [
-        shape
-        for actor, matrix in _parts_of_marker(marker)
-        if actor.GetVisibility() and isinstance(actor, vtkActor)
-        for shape in shapes_of(actor, matrix, keep, missing)
+    others = [
+        (other.GetAddressAsString(""), other.GetViewport(), *other.GetViewProps())
+        for other in around(renderer)
     ]
-    left_out += [f"{what} (the axes widget)" for what in missing]
-    if isinstance(marker, vtkAxesActor) and marker.GetAxisLabels():
-        for axis in "XYZ":
-            caption = getattr(marker, f"Get{axis}AxisCaptionActor2D")()
-            look = caption.GetTextActor().GetScaledTextProperty()
-            text = described_text(caption.GetCaption(), (0, 0), look, own)
-            place = {"at": list(caption.GetAttachmentPoint()), "shift": [caption.GetPadding(), 2]}
-            texts.append({**text, **place, "marker": True, "across": "left", "along": "bottom"})
-    camera, low, high = own.GetActiveCamera(), *np.reshape(renderer.GetViewport(), (2, 2))
-    place = (np.reshape(own.GetViewport(), (2, 2)) - low) / (high - low)
-    return {
-        "place": place.ravel().tolist(),
-        "camera": {**viewer_camera(camera, own.GetSize()), "distance": camera.GetDistance()},
-        "bounds": _bounds(own),
-        "lights": list(_lights(own)),
-        "shapes": shapes,
-    }
+    lights = json.dumps(list(lights_of(renderer)))
+    background = _background(renderer, [])
+    return tuple(states), tuple(renderer.GetSize()), lights, background, tuple(others)
 
 
-def _parts_of_marker(marker: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
-    if isinstance(marker, vtkPropAssembly):
-        for part in marker.GetParts():
-            yield from _parts_of_marker(part)
-    elif isinstance(marker, vtkAxesActor):
-        actors = vtkPropCollection()
-        marker.GetActors(actors)
-        for actor in actors:
-            yield actor, _array(actor.GetMatrix())
-    else:
-        whole = marker.GetAssembly() if isinstance(marker, vtkAnnotatedCubeActor) else marker
-        yield from _paths(whole)
-
-
-def _array(matrix: Any) -> NDArray[np.float64]:
-    if matrix is None:
-        return np.eye(4)
-    return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+def _solid(part: Any) -> Any:
+    """Return the actor by which a part of a scene is drawn in space; ``None`` if by none."""
+    if isinstance(part, vtkImageActor):
+        return image_quad(part)
+    return part if isinstance(part, vtkActor) and _is_plain(part) else None
 
 
 def _is_plain(prop: Any) -> bool:
@@ -299,14 +235,14 @@ def _body(actor: Any, matrix: Any, missing: list[str]) -> tuple[VDI, dict[str, A
     cropping = Cropping.from_any(actor.GetMapper())
     if cropping is not None:
         sides = _sides(cropping, actor.vdi.bounds, matrix)
-        if sides is None or len(planes) + len(sides) > _MOST_PLANES:
+        if sides is None or len(planes) + len(sides) > MOST_PLANES:
             missing.append("cropping")
         else:
             planes += sides
-    if len(planes) > _MOST_PLANES:
-        missing.append(f"{len(planes) - _MOST_PLANES} of its clipping planes")
+    if len(planes) > MOST_PLANES:
+        missing.append(f"{len(planes) - MOST_PLANES} of its clipping planes")
     vdi = thinned(actor.vdi, actor.opacity_multiplier)
-    return vdi, {"planes": planes[:_MOST_PLANES], "matrix": matrix.tolist()}
+    return vdi, {"planes": planes[:MOST_PLANES], "matrix": matrix.tolist()}
 
 
 def _sides(
@@ -328,58 +264,36 @@ def _sides(
     return sides
 
 
-def _camera(renderer: Any) -> dict[str, Any]:
-    return viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
-
-
-def _bounds(renderer: Any) -> list[float] | None:
-    """Return the box by which VTK sets its clipping range, which translucent layers depend on."""
-    bounds = renderer.ComputeVisiblePropBounds()
-    return list(bounds) if bounds[0] <= bounds[1] else None
-
-
-def _lights(renderer: Any) -> Iterator[dict[str, Any]]:
-    for light in renderer.GetLights():
-        if not light.GetSwitch():
-            continue
-        kind = _LIGHTS[light.GetLightType()]
-        # Lights of the camera are given where it stands at (0, 0, 1) and looks at the origin
-        yield {
-            "kind": kind,
-            "color": [channel * light.GetIntensity() for channel in light.GetDiffuseColor()],
-            "position": list(light.GetPosition()) if kind != "head" else [0, 0, 1],
-            "focalPoint": list(light.GetFocalPoint()) if kind != "head" else [0, 0, 0],
-            "positional": bool(light.GetPositional()),
-            "cone": light.GetConeAngle(),
-            "exponent": light.GetExponent(),
-            "attenuation": list(light.GetAttenuationValues()),
-        }
-
-
 def _environment(renderer: Any) -> list[str]:
     """Name what is drawn around a renderer's props, and cannot be shown."""
-    left_out = []
-    if renderer.GetPass() is not None:
-        left_out.append(f"its render pass ({renderer.GetPass().GetClassName()})")
+    left_out = list(passes_of(renderer))
     if renderer.GetUseHiddenLineRemoval():
-        left_out.append("hidden line removal")
+        left_out.append("enable_hidden_line_removal")
     if renderer.GetUseShadows():
-        left_out.append("shadows")
+        left_out.append("enable_shadows")
     return left_out
 
 
 def _background(renderer: Any, left_out: list[str]) -> str:
     """Return a renderer's background as CSS."""
     if renderer.GetTexturedBackground():
-        left_out.append("the background's texture")
-    color = css(renderer.GetBackground())
-    if not renderer.GetGradientBackground():
-        return color
+        left_out.append("the background's texture (set_environment_texture)")
+    low, high = map(css, _ground(renderer))
+    if low == high or not renderer.GetGradientBackground():
+        return low
     direction = _GRADIENTS.get(renderer.GetGradientMode())
     if direction is None:
-        left_out.append("the background's radial gradient")
-        return color
-    return f"linear-gradient({direction}, {color}, {css(renderer.GetBackground2())})"
+        left_out.append("the background's radial gradient (set_background)")
+        return low
+    return f"linear-gradient({direction}, {low}, {high})"
+
+
+def _ground(renderer: Any) -> list[list[float]]:
+    """Return the colours at both ends of a renderer's background."""
+    if any(other.GetLayer() < renderer.GetLayer() for other in around(renderer)):
+        return [[0.0, 0.0, 0.0]] * 2  # nothing clears the window but the lowest layer
+    low, high = list(renderer.GetBackground()), list(renderer.GetBackground2())
+    return [low, high if renderer.GetGradientBackground() else low]
 
 
 def css(color: Sequence[float]) -> str:

@@ -6,9 +6,9 @@
 // EDGES        of polygons are seen; WIRES, LINES, POINTS, TUBES, SPHERES: what is drawn
 // LIT          lights are looked at; HEADLIGHT: there is one, where the eye is
 // BACK         back sides have a material of their own
-// CLIPPED      by six planes at most
+// CLIPPED      by six planes at most; NEARER: by VTK's offset of polygons
 // DEPTH        only view depth is written; LAYERS: translucent, for the sums of McGuire and Bavoil;
-// BLENDED      translucent, over what has been drawn before
+// BLENDED      translucent, over what has been drawn before; CODED: without sRGB's curve, else with
 
 /** Lights that are looked at. */
 export const MOST_LIGHTS = 8;
@@ -107,7 +107,13 @@ ${DECLARED}
 ${FRAGMENT}`;
 }
 
+// Of sRGB, which VTK's windows take the mean of a pixel's samples by (nearly: a power of 2.2).
+const DECODED = `vec3 decoded(vec3 c) {
+  return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
+}`;
+
 const FRAGMENT = `
+${DECODED}
 in vec3 seenFrom, seenNormal;
 in vec4 tint;
 in vec2 inTable, inTexture;
@@ -121,7 +127,7 @@ uniform vec3 ambient[2], diffuse[2], specular[2];  // of the front and of the ba
 uniform vec2 strength[2];                          // ambient and diffuse: of colours
 uniform vec2 shine[2];                             // specular power, opacity
 uniform vec4 edgeColor;
-uniform float edgeWidth;
+uniform float edgeWidth, nearer;
 uniform int lights;
 uniform vec3 lightDirection[LIGHTS], lightColor[LIGHTS], lightPosition[LIGHTS];
 uniform vec4 lightShape[LIGHTS];                   // positional, cone, exponent
@@ -167,8 +173,14 @@ void main() {
   // The nearer surface: a radius is as wide there as on the screen
   float perPixel = 2.0 * lens.y / size.y * (parallel ? 1.0 : depth);
   depth -= normal.z * 0.5 * width * perPixel;
-  float w = parallel ? 1.0 : depth;
-  gl_FragDepth = 0.5 * (range.x * depth + range.y) / w + 0.5;
+#endif
+#if defined(SPHERES) || defined(TUBES) || defined(NEARER)
+  float z = (range.x * depth + range.y) / (parallel ? 1.0 : depth);
+#ifdef NEARER
+  z = max(z + nearer, -1.0);
+  depth = parallel ? (z - range.y) / range.x : range.y / (z - range.x);
+#endif
+  gl_FragDepth = 0.5 * z + 0.5;
 #endif
 #ifdef DEPTH
   seen = vec4(depth);
@@ -248,6 +260,9 @@ void main() {
   seen.rgb *= seen.a;
 #else
   seen.a = 1.0;
+#ifndef CODED
+  seen.rgb = decoded(clamp(seen.rgb, 0.0, 1.0));
+#endif
 #endif
 #endif
 }
@@ -281,3 +296,26 @@ uniform sampler2D picture;
 uniform ivec2 corner;
 out vec4 seen;
 void main() { seen = texelFetch(picture, ivec2(gl_FragCoord.xy) - corner, 0); }`;
+
+/** Takes over a picture of mean light as it is seen before a ground, or another such picture. */
+export const RESOLVED_SHADER = `#version 300 es
+precision highp float;
+uniform sampler2D picture, behind;
+uniform ivec2 corner, cornerBehind;
+uniform bool pictured;  // whether there is one behind
+uniform vec3 ground[2]; // at the bottom and at the top
+uniform float height;
+out vec4 seen;
+${DECODED}
+vec3 coded(vec3 c) {
+  return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
+}
+void main() {
+  vec4 mean = texelFetch(picture, ivec2(gl_FragCoord.xy) - corner, 0);
+  vec3 under = mix(ground[0], ground[1], clamp(gl_FragCoord.y / height, 0.0, 1.0));
+  if (pictured) under = coded(texelFetch(behind, ivec2(gl_FragCoord.xy) - cornerBehind, 0).rgb);
+  vec3 over = coded(mean.rgb + (1.0 - mean.a) * decoded(under));
+  vec3 least = max((over - under) / max(1.0 - under, 1e-6), 1.0 - over / max(under, 1e-6));
+  float opacity = min(1.0, max(max(mean.a, least.r), max(least.g, least.b)));
+  seen = mean.a > 0.0 ? vec4(over - (1.0 - opacity) * under, opacity) : vec4(0.0);
+}`;

@@ -4,7 +4,8 @@ import { annotate } from "./annotations.js";
 import { cornersOf, layersOf } from "./layers.js";
 import { load } from "./loader.js";
 import {
-  COPY_SHADER, LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, meshFragmentShader, meshVertexShader,
+  COPY_SHADER, LAYERS_SHADER, MOST_LIGHTS, PICTURE_SHADER, RESOLVED_SHADER, meshFragmentShader,
+  meshVertexShader,
 } from "./mesh_shader.js";
 import { Raycaster, linked, programsOf } from "./raycast.js";
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
@@ -23,7 +24,7 @@ export class Scene {
   #gl = null;
   #programs = null;
   #buffers = null;
-  #marker = null; // axes in a corner
+  #others = []; // what other renderers draw in parts of the window: axes, a picture behind all
   #drawn = null; // the view whose meshes they hold
   #shapes = [];
   #bodies = []; // VDIs; the first is the viewer's own
@@ -53,18 +54,21 @@ export class Scene {
   // Returns promises of the VDIs that are in it.
   async #load(bytes) {
     const { head, arrays } = await unpackedScene(bytes);
+    const ready = (shape) => ({ ...shape, parts: partsOf(shape, arrays) });
+    const shapes = head.shapes.map(ready);
+    const others = head.renderers.map((other) => ({ ...other, shapes: other.shapes.map(ready) }));
+    for (const { table, texture } of [shapes, ...others.map((other) => other.shapes)].flat()) {
+      if (table) table.data = arrays[table.texels];
+      if (texture) texture.data = await createImageBitmap(new Blob([arrays[texture.picture]]),
+        { premultiplyAlpha: "none", colorSpaceConversion: "none" });
+    }
+    [this.#shapes, this.#others] = [shapes, others];
     this.head = head;
     this.camera = head.camera;
     this.#bodies = head.vdis.map(({ planes, matrix }) => ({
       planes: planes.map((p) => ({ origin: p.slice(0, 3), normal: p.slice(3) })), matrix,
       prepared: null, raycaster: null,
     }));
-    const ready = (shape) => ({ ...shape, parts: partsOf(shape, arrays) });
-    this.#shapes = head.shapes.map(ready);
-    this.#marker = head.marker && { ...head.marker, shapes: head.marker.shapes.map(ready) };
-    for (const shape of this.#all()) {
-      for (const map of [shape.table, shape.texture]) if (map) map.data = arrays[map.texels];
-    }
     if (this.#gl) this.restore(this.#gl);
     this.changed();
     return head.vdis.map(({ file }, k) => file === null ? null
@@ -72,7 +76,7 @@ export class Scene {
   }
 
   #all() {
-    return [...this.#shapes, ...(this.#marker?.shapes ?? [])];
+    return [this.#shapes, ...this.#others.map(({ shapes }) => shapes)].flat();
   }
 
   #take(k, prepared) {
@@ -142,21 +146,48 @@ export class Scene {
         gl.enable(gl.SCISSOR_TEST);
         this.#drawn = view;
       }
-      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#buffers.color.framebuffer);
-      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target.framebuffer);
-      gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+      const { color, layers, depth } = this.#buffers;
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-      depthTexture = this.#buffers.depth.texture;
+      gl.viewport(0, 0, width, height);
+      gl.disable(gl.BLEND);
+      this.#resolve(color.texture, view);
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+      if (layers) this.#cover(LAYERS_SHADER, { layers: layers.texture, sums: layers.sums });
+      depthTexture = depth.texture;
     }
     gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE_MINUS_DST_ALPHA, gl.ONE);
+    this.#coverOthers(view, true);
+    gl.viewport(0, 0, width, height);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     this.#drawVDIs(raycaster, view, depthTexture);
-    if (this.#marker?.shapes.length) { // others have but letters
-      const [left, bottom, wide, high] = partOf(this.#marker.place, view);
-      gl.viewport(left, bottom, wide, high);
-      this.#cover(COPY_SHADER, { picture: this.#buffers.marker.texture }, [left, bottom]);
-    }
+    this.#coverOthers(view, false);
     gl.disable(gl.BLEND);
+  }
+
+  // Lay the pictures of other renderers over what is there, or under it.
+  #coverOthers(view, behind) {
+    const gl = this.#gl;
+    const chosen = this.#others.map((other, k) => [other, k]).filter(([other]) =>
+      other.behind === behind && other.shapes.length); // others have but letters
+    for (const [other, k] of behind ? chosen.reverse() : chosen) {
+      const [left, bottom, wide, high] = partOf(other, view);
+      gl.viewport(left, bottom, wide, high);
+      const picture = this.#buffers.others[k].picture.texture;
+      if (isMixed(other)) this.#cover(COPY_SHADER, { picture }, { corner: [left, bottom] });
+      else this.#resolve(picture, view, [left, bottom]);
+    }
+  }
+
+  // Take over a picture whose samples are averaged, as seen before what is behind all.
+  #resolve(picture, view, corner = [0, 0]) {
+    const k = this.#others.findIndex((other) => other.behind && !other.turns && !isMixed(other));
+    const pictured = k >= 0 && this.#buffers.others[k].picture.texture !== picture;
+    const behind = pictured ? this.#buffers.others[k].picture.texture : picture;
+    const cornerBehind = pictured ? partOf(this.#others[k], view).slice(0, 2) : corner;
+    this.#cover(RESOLVED_SHADER, { picture, behind },
+      { corner, cornerBehind, pictured, height: view.height });
   }
 
   #drawVDIs(raycaster, { camera, width, height, moving, few, clippingPlanes }, depthTexture) {
@@ -214,26 +245,21 @@ export class Scene {
       gl.depthMask(false);
       gl.blendFuncSeparate(gl.ONE, gl.ONE, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
       for (const shape of layers) this.#drawShape(shape, seen, ["LAYERS"]);
-      gl.bindFramebuffer(gl.FRAMEBUFFER, buffers.color.framebuffer);
-      gl.disable(gl.DEPTH_TEST);
-      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      this.#cover(LAYERS_SHADER, { layers: buffers.layers.texture, sums: buffers.layers.sums });
     }
     gl.disable(gl.BLEND);
-    if (this.#marker) this.#drawMarker(view);
+    this.#others.forEach((other, k) => this.#drawOther(other, this.#buffers.others[k], view));
     gl.disable(gl.DEPTH_TEST);
     gl.disable(gl.CULL_FACE);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
   }
 
-  // The axes in a corner, before all else, into a picture of their own.
-  #drawMarker(view) {
-    const gl = this.#gl, { markerSamples, marker } = this.#buffers;
-    const [, , width, height] = partOf(this.#marker.place, view);
-    const camera = markerCamera(this.#marker.camera, view.camera);
-    const seen = viewOf({ ...view, width, height, camera }, this.#marker);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, markerSamples.framebuffer);
+  // What another renderer draws, before all else, into a picture of its own.
+  #drawOther(other, { samples, picture }, view) {
+    const gl = this.#gl;
+    const [, , width, height] = partOf(other, view);
+    const seen = viewOf({ ...view, width, height, camera: cameraOf(other, view.camera) }, other);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, samples.framebuffer);
     gl.enable(gl.DEPTH_TEST);
     gl.depthMask(true);
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
@@ -242,13 +268,14 @@ export class Scene {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     for (const layered of [false, true]) {
       if (layered) gl.enable(gl.BLEND);
-      for (const shape of this.#marker.shapes) {
-        if (shape.translucent === layered) this.#drawShape(shape, seen, layered ? ["BLENDED"] : []);
+      for (const shape of other.shapes) {
+        const pass = layered ? ["BLENDED"] : isMixed(other) ? ["CODED"] : [];
+        if (shape.translucent === layered) this.#drawShape(shape, seen, pass);
       }
     }
     gl.disable(gl.BLEND);
-    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, markerSamples.framebuffer);
-    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, marker.framebuffer);
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, samples.framebuffer);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, picture.framebuffer);
     gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
   }
 
@@ -256,19 +283,19 @@ export class Scene {
     const gl = this.#gl, { material, back = material } = shape;
     const near = toView(shape, seen);
     const [front, behind] = shape.culling;
-    if (front || behind) {
-      gl.enable(gl.CULL_FACE);
-      gl.cullFace(front && behind ? gl.FRONT_AND_BACK : front ? gl.FRONT : gl.BACK);
-    } else gl.disable(gl.CULL_FACE);
+    gl.cullFace(front && behind ? gl.FRONT_AND_BACK : front ? gl.FRONT : gl.BACK);
     for (const part of shape.parts) {
       const { kind } = part, stripes = kind === "lines" || kind === "wires";
+      // Lines have no sides, although stripes have
+      if ((front || behind) && kind === "faces") gl.enable(gl.CULL_FACE);
+      else gl.disable(gl.CULL_FACE);
       const defines = [...pass, shape.planes.length && "CLIPPED", shape.back && "BACK",
         shape.normals !== undefined && "NORMALS", part.lit && seen.lights.length && "LIT",
         seen.headlight && "HEADLIGHT", part.has.color && "COLORS",
         !part.has.color && part.has.coordinate && "COORDINATES",
         kind === "faces" && part.has.place && "PLACES", part.has.edges && "EDGES",
         { faces: 0, lines: "LINES", wires: "WIRES", points: "POINTS" }[kind],
-        stripes && material.tubes && "TUBES",
+        stripes && material.tubes && "TUBES", shape.nearer && kind === "faces" && "NEARER",
         kind === "points" && material.spheres && "SPHERES"].filter(Boolean);
       const { program, uniforms: u } = this.#program(
         meshVertexShader(defines), meshFragmentShader(defines));
@@ -282,6 +309,7 @@ export class Scene {
       gl.uniform1i(u.parallel, seen.parallel);
       const width = (kind === "points" ? material.pointSize : material.lineWidth) * seen.density;
       gl.uniform1f(u.width, Math.max(width, 1));
+      gl.uniform1f(u.nearer ?? null, shape.nearer ?? 0);
       if (shape.planes.length) gl.uniform4fv(u.planes, near.planes);
       if (!pass.includes("DEPTH")) {
         const sides = [material, back];
@@ -317,11 +345,11 @@ export class Scene {
     if (this.#annotated.get(canvas) === key) return;
     this.#annotated.set(canvas, key);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = extent;
-    annotate(canvas.getContext("2d"), texts, size, ({ at, marker }) => {
-      if (!marker) return projected(at, camera, extent);
-      const { place: [x0, y0, x1, y1], camera: own } = this.#marker;
-      const [x, y] = projected(at, markerCamera(own, camera),
-        [(x1 - x0) * width, (y1 - y0) * height]);
+    annotate(canvas.getContext("2d"), texts, size, ({ at, renderer }) => {
+      const other = this.#others[renderer];
+      if (!other) return projected(at, camera, extent);
+      const [x0, y0, x1, y1] = other.place;
+      const [x, y] = projected(at, cameraOf(other, camera), [(x1 - x0) * width, (y1 - y0) * height]);
       return [x0 + x * (x1 - x0), y0 + y * (y1 - y0)];
     });
   }
@@ -347,11 +375,16 @@ export class Scene {
     gl.deleteTexture(picture);
   }
 
-  #cover(fragment, textures, corner = [0, 0]) {
+  #cover(fragment, textures, more = {}) {
+    const { corner = [0, 0], cornerBehind = corner, pictured = false, height = 1 } = more;
     const gl = this.#gl;
     const { program, uniforms } = this.#program(VERTEX_SHADER, fragment);
     gl.useProgram(program);
     gl.uniform2i(uniforms.corner, ...corner);
+    gl.uniform2i(uniforms.cornerBehind ?? null, ...cornerBehind);
+    gl.uniform1i(uniforms.pictured ?? null, pictured);
+    gl.uniform1f(uniforms.height ?? null, height);
+    gl.uniform3fv(uniforms.ground ?? null, this.head.ground.flat());
     Object.entries(textures).forEach(([name, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -409,22 +442,25 @@ export class Scene {
     gl.activeTexture(gl.TEXTURE0);
     const samples = Math.min(SAMPLES, gl.getParameter(gl.MAX_SAMPLES));
     const depths = renderbuffer("DEPTH_COMPONENT24", 0), far = texture("R32F");
-    const many = [renderbuffer("RGBA8", samples), renderbuffer("DEPTH_COMPONENT24", samples)];
-    const color = texture("RGBA8");
+    const many = [renderbuffer("SRGB8_ALPHA8", samples), renderbuffer("DEPTH_COMPONENT24", samples)];
+    const color = texture("SRGB8_ALPHA8");
     made.depth = { texture: far, renderbuffers: [depths], framebuffer: framebuffer(
       ["COLOR_ATTACHMENT0", "texture", far], ["DEPTH_ATTACHMENT", "buffer", depths]) };
     made.samples = { renderbuffers: many, framebuffer: framebuffer(
       ["COLOR_ATTACHMENT0", "buffer", many[0]], ["DEPTH_ATTACHMENT", "buffer", many[1]]) };
     made.color = { texture: color, framebuffer: framebuffer(["COLOR_ATTACHMENT0", "texture", color]) };
-    if (this.#marker) {
-      // Buffers of their own: ANGLE clears before it resolves what was drawn there earlier
-      const size = partOf(this.#marker.place, made).slice(2), picture = texture("RGBA8", size);
-      const own = ["RGBA8", "DEPTH_COMPONENT24"].map((f) => renderbuffer(f, samples, size));
-      made.markerSamples = { renderbuffers: own, framebuffer: framebuffer(
-        ["COLOR_ATTACHMENT0", "buffer", own[0]], ["DEPTH_ATTACHMENT", "buffer", own[1]]) };
-      made.marker = { texture: picture,
-        framebuffer: framebuffer(["COLOR_ATTACHMENT0", "texture", picture]) };
-    }
+    // Buffers of their own: ANGLE clears before it resolves what was drawn there earlier
+    made.others = this.#others.map((other) => {
+      const size = partOf(other, made).slice(2), format = isMixed(other) ? "RGBA8" : "SRGB8_ALPHA8";
+      const picture = texture(format, size);
+      const own = [format, "DEPTH_COMPONENT24"].map((f) => renderbuffer(f, samples, size));
+      return {
+        samples: { renderbuffers: own, framebuffer: framebuffer(
+          ["COLOR_ATTACHMENT0", "buffer", own[0]], ["DEPTH_ATTACHMENT", "buffer", own[1]]) },
+        picture: { texture: picture,
+          framebuffer: framebuffer(["COLOR_ATTACHMENT0", "texture", picture]) },
+      };
+    });
     if (withLayers) {
       const sums = texture("R16F"), layers = texture("RGBA16F");
       made.layers = { texture: layers, sums, framebuffer: framebuffer(
@@ -437,8 +473,9 @@ export class Scene {
 
   #free() {
     const gl = this.#gl;
-    for (const part of ["depth", "samples", "color", "layers", "markerSamples", "marker"]) {
-      const { framebuffer, texture, sums, renderbuffers = [] } = this.#buffers?.[part] ?? {};
+    const { others = [], ...rest } = this.#buffers ?? {};
+    for (const part of [rest, ...others].flatMap(Object.values)) {
+      const { framebuffer, texture, sums, renderbuffers = [] } = part; // a width has none of them
       gl.deleteFramebuffer(framebuffer ?? null);
       gl.deleteTexture(texture ?? null);
       gl.deleteTexture(sums ?? null);
@@ -635,31 +672,46 @@ function projected(point, camera, extent) {
   return w > 0 ? [(x / half[0] / w - cx + 1) / 2, (y / half[1] / w - cy + 1) / 2, z] : null;
 }
 
-// The view of the axes in a corner: turned as the scene's is.
-function markerCamera({ distance, ...own }, camera) {
+// Whether colours are mixed in what another renderer draws, which they are as they are coded.
+const isMixed = ({ shapes }) => shapes.some(({ translucent }) => translucent);
+
+// The view of another renderer: turned as the scene's is, or as it was.
+function cameraOf({ turns, camera: { distance, ...own } }, camera) {
+  if (!turns) return own;
   const [, up, forward] = cameraAxes(camera);
   const position = own.focal_point.map((x, k) => x - distance * forward[k]);
   return { ...own, position, view_up: up };
 }
 
-// A part of a picture in pixels: left, bottom, width, height.
-function partOf([x0, y0, x1, y1], { width, height }) {
+// Where another renderer draws in a picture: left, bottom, width, height. What is of so many pixels
+// of its window grows with the picture, about its middle.
+function partOf({ place: [x0, y0, x1, y1], window: of }, { width, height }) {
+  if (of) {
+    const scale = Math.min(width / of[0], height / of[1]);
+    const end = (low, high, n, from, side) =>
+      (low + high) / 2 + (side * (high - low) * from * scale) / 2 / n;
+    [x0, x1] = [-1, 1].map((side) => end(x0, x1, width, of[0], side));
+    [y0, y1] = [-1, 1].map((side) => end(y0, y1, height, of[1], side));
+  }
   const [left, bottom] = [Math.round(x0 * width), Math.round(y0 * height)];
   return [left, bottom, Math.max(1, Math.round(x1 * width) - left),
     Math.max(1, Math.round(y1 * height) - bottom)];
 }
 
 // From a shape's points, which are about its origin, to view coordinates.
-function toView({ matrix, origin, planes }, { axes, eye }) {
+function toView({ matrix, origin, planes, facing = false }, { axes, eye }) {
   const rotation = matrix.slice(0, 3).map((row) => row.slice(0, 3));
   const columns = [0, 1, 2].map((k) => rotation.map((row) => row[k]));
-  const placed = matrix.slice(0, 3).map((row) => dot(row, origin) + row[3]);
-  const linear = axes.map((axis) => columns.map((column) => dot(axis, column)));
+  const place = matrix.slice(0, 3).map((row) => row[3]);
+  const placed = facing ? place : place.map((x, k) => x + dot(rotation[k], origin));
+  // What faces the viewer is not turned about its place
+  const linear = facing ? columns
+    : axes.map((axis) => columns.map((column) => dot(axis, column)));
   const [a, b, c] = linear;
   const cofactors = [cross(b, c), cross(c, a), cross(a, b)];
   const sense = Math.sign(dot(a, cofactors[0])) || 1;
   return {
-    linear, offset: axes.map((axis) => dot(axis, subtract(placed, eye))),
+    linear, offset: axes.map((axis, k) => dot(axis, subtract(placed, eye)) + facing * origin[k]),
     normals: cofactors.map((row) => row.map((x) => sense * x)),
     planes: Array.from({ length: 6 }, (_, k) => {
       if (!planes[k]) return [0, 0, 0, 1];
