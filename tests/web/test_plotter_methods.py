@@ -1,5 +1,6 @@
 """Every ``Plotter.add_*`` in a page, one by one: as docs/web.md says, and as PyVista draws it."""
 
+import io
 import re
 from pathlib import Path
 
@@ -323,6 +324,22 @@ def test_a_background_image_stays_behind_all(options, plotter, page):
     assert far(*shown(page, plotter)[1:]) <= MEAN
     turned(page, plotter)
     assert far(*both(page, plotter, scene_of(plotter.renderer))) <= MEAN
+
+
+SIDES = ["side", *(pytest.param(side, marks=slow) for side in ("corner", "right", "top"))]
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_page_has_the_plotters_background(side, plotter, open_page, tmp_path):
+    plotter.set_background("y", **{side: "b"})
+    plotter.export_html(tmp_path / "scene.html")
+    viewport = {"width": SIZE[0], "height": SIZE[1]}
+    page = open_page(url=(tmp_path / "scene.html").as_uri(), viewport=viewport, offline=True)
+    page.ready()
+    page.evaluate("new Promise(requestAnimationFrame).then(() => true)")
+    got = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
+    want = plotter.screenshot(return_img=True)[..., :3].astype(float)
+    assert far(np.asarray(got, float), want) <= MEAN
 
 
 def test_lines_are_as_thin_before_an_image(plotter, page):
