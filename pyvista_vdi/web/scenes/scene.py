@@ -169,6 +169,8 @@ def scene_of(
     described = [{**more, "file": None} for _, more in bodies]
     for (vdi, _), entry in zip(bodies[1:], described[1:], strict=True):
         entry["file"] = packed.keep(np.frombuffer(encoded(vdi, coarse=True), np.uint8))
+    if renderer.GetUseDepthPeeling() and any(shape["translucent"] for shape in shapes):
+        left_out.append("enable_depth_peeling")
     lights, ground = list(lights_of(renderer)), _ground(renderer)
     if len(lights) > MOST_LIGHTS:
         left_out.append(f"{len(lights) - MOST_LIGHTS} of its lights (add_light)")
@@ -268,6 +270,9 @@ def _environment(renderer: Any) -> list[str]:
     left_out = list(passes_of(renderer))
     if renderer.GetUseHiddenLineRemoval():
         left_out.append("enable_hidden_line_removal")
+    window = renderer.GetRenderWindow()
+    if window is not None and window.GetStereoRender():
+        left_out.append("enable_stereo_render")
     if renderer.GetUseShadows():
         left_out.append("enable_shadows")
     return left_out
