@@ -1,5 +1,6 @@
 """Every ``Plotter.add_*`` in a page, one by one: as docs/web.md says, and as PyVista draws it."""
 
+import io
 import re
 from pathlib import Path
 
@@ -20,11 +21,12 @@ pytestmark = pytest.mark.gl
 
 SIZE = (240, 135)
 
-#: Of 255, without texts: the issue's.
+#: Of 255, without texts: the issue's. Measured: 0.1 to 0.45, by lines within the VDI, whose depths
+#: VTK has by samples.
 MEAN = 0.5
 
-#: With texts, whose fonts are the browser's: measured, 0.6 to 2.8 by how much is written.
-WRITTEN = 4.0
+#: With texts, whose fonts are the browser's: measured, 0.4 to 1.4 by how much is written.
+WRITTEN = 2.0
 
 BALL = soft_ball(12)
 SPHERE = pv.Sphere(radius=0.4, center=(0.9, 0.5, 0.5))
@@ -323,6 +325,22 @@ def test_a_background_image_stays_behind_all(options, plotter, page):
     assert far(*shown(page, plotter)[1:]) <= MEAN
     turned(page, plotter)
     assert far(*both(page, plotter, scene_of(plotter.renderer))) <= MEAN
+
+
+SIDES = ["side", *(pytest.param(side, marks=slow) for side in ("corner", "right", "top"))]
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_page_has_the_plotters_background(side, plotter, open_page, tmp_path):
+    plotter.set_background("y", **{side: "b"})
+    plotter.export_html(tmp_path / "scene.html")
+    viewport = {"width": SIZE[0], "height": SIZE[1]}
+    page = open_page(url=(tmp_path / "scene.html").as_uri(), viewport=viewport, offline=True)
+    page.ready()
+    page.evaluate("new Promise(requestAnimationFrame).then(() => true)")
+    got = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
+    want = plotter.screenshot(return_img=True)[..., :3].astype(float)
+    assert far(np.asarray(got, float), want) <= MEAN
 
 
 def test_lines_are_as_thin_before_an_image(plotter, page):

@@ -91,7 +91,10 @@ def _labels_of_points(mapper: Any, renderer: Any) -> Iterator[dict[str, Any]]:
     look, more = hierarchy.GetTextProperty(), {}
     if mapper.GetShape() != vtkLabelPlacementMapper.NONE:
         more["round"] = mapper.GetShape() == vtkLabelPlacementMapper.ROUNDED_RECT
-        more["background"] = [*mapper.GetBackgroundColor(), mapper.GetBackgroundOpacity()]
+        if mapper.GetStyle() == vtkLabelPlacementMapper.FILLED:
+            more["background"] = [*mapper.GetBackgroundColor(), mapper.GetBackgroundOpacity()]
+        else:
+            more["frame"] = [*mapper.GetBackgroundColor(), 1]
     for k in range(0 if texts is None else texts.GetNumberOfValues()):
         text = texts.GetVariantValue(k).ToString()
         at = {"at": list(points.GetPoint(k)), "alone": True, "margin": mapper.GetMargin()}

@@ -74,7 +74,8 @@ class Names:
 
     def of_missing(self, prop: Any) -> str:
         """Return the method, with the user's name for what it has made."""
-        method = method_of(prop) or f"add_actor({type(prop).__name__})"
+        kind = type(prop).__name__
+        method = method_of(prop) or ("add_mesh" if kind == "Actor" else f"add_actor({kind})")
         if prop in self._radio:
             method = "add_radio_button_widget"
         if method == "add_volume" and self._clips and planes_of(prop):
@@ -188,7 +189,10 @@ def widgets_of(renderer: Any) -> Iterator[str]:
         yield "add_camera_orientation_widget"
     axes_widget = getattr(renderer, "axes_widget", None)
     if axes_widget is not None and axes_widget.GetEnabled() and axes_widget.GetInteractive():
-        yield "add_axes(interactive=True)"
+        marker = axes_widget.GetOrientationMarker()
+        kinds = {"vtkAxesActor": "add_axes", "vtkPropAssembly": "add_box_axes"}
+        names = [name for kind, name in kinds.items() if marker.IsA(kind)]
+        yield f"{(*names, 'add_orientation_widget')[0]}(interactive=True)"
     if any(prop.IsA("vtkScalarBarRepresentation") for prop in renderer.GetViewProps()):
         yield "add_scalar_bar(interactive=True)"
 

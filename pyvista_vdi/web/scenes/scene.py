@@ -37,7 +37,13 @@ _KINDS = {
 #: Actors that turn or scale with the view, which the viewer's matrices do not.
 _NOT_PLAIN = ("vtkFollower", "vtkProp3DFollower", "vtkAxisFollower")
 
-_GRADIENTS = {0: "to top", 1: "to right"}  # vtkViewport's vertical and horizontal
+#: How gradients begin in CSS, by vtkViewport's modes.
+_GRADIENTS = (
+    "linear-gradient(to top",
+    "linear-gradient(to right",
+    "radial-gradient(farthest-side",
+    "radial-gradient(farthest-corner",
+)
 
 
 @dataclass
@@ -170,13 +176,15 @@ def scene_of(
     described = [{**more, "file": None} for _, more in bodies]
     for (vdi, _), entry in zip(bodies[1:], described[1:], strict=True):
         entry["file"] = packed.keep(np.frombuffer(encoded(vdi, coarse=True), np.uint8))
-    lights = list(lights_of(renderer))
+    if renderer.GetUseDepthPeeling() and any(shape["translucent"] for shape in shapes):
+        left_out.append("enable_depth_peeling")
+    lights, ground = list(lights_of(renderer)), _ground(renderer)
     if len(lights) > MOST_LIGHTS:
         left_out.append(f"{len(lights) - MOST_LIGHTS} of its lights (add_light)")
     head = {
         "camera": viewer_camera(renderer.GetActiveCamera(), renderer.GetSize()) if camera else None,
         "size": list(renderer.GetSize()),
-        "ground": _ground(renderer),
+        "ground": ground if renderer.GetGradientMode() == 0 else [np.mean(ground, 0).tolist()] * 2,
         "bounds": bounds_of(renderer),
         "lights": lights,
         "shapes": shapes,
@@ -269,6 +277,9 @@ def _environment(renderer: Any) -> list[str]:
     left_out = list(passes_of(renderer))
     if renderer.GetUseHiddenLineRemoval():
         left_out.append("enable_hidden_line_removal")
+    window = renderer.GetRenderWindow()
+    if window is not None and window.GetStereoRender():
+        left_out.append("enable_stereo_render")
     if renderer.GetUseShadows():
         left_out.append("enable_shadows")
     return left_out
@@ -279,17 +290,11 @@ def _background(renderer: Any, left_out: list[str]) -> str:
     if renderer.GetTexturedBackground():
         left_out.append("the background's texture (set_environment_texture)")
     low, high = map(css, _ground(renderer))
-    if low == high or not renderer.GetGradientBackground():
-        return low
-    direction = _GRADIENTS.get(renderer.GetGradientMode())
-    if direction is None:
-        left_out.append("the background's radial gradient (set_background)")
-        return low
-    return f"linear-gradient({direction}, {low}, {high})"
+    return low if low == high else f"{_GRADIENTS[renderer.GetGradientMode()]}, {low}, {high})"
 
 
 def _ground(renderer: Any) -> list[list[float]]:
-    """Return the colours at both ends of a renderer's background."""
+    """Return the colours at both ends of a renderer's background, the lower or inner one first."""
     if any(other.GetLayer() < renderer.GetLayer() for other in around(renderer)):
         return [[0.0, 0.0, 0.0]] * 2  # nothing clears the window but the lowest layer
     low, high = list(renderer.GetBackground()), list(renderer.GetBackground2())
