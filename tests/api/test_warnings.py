@@ -64,7 +64,7 @@ def drawn_by_a_renderer(plotter, tmp_path):
 
 def a_page_without_all(plotter, tmp_path):
     plotter.add_vdi(VALUES, show_scalar_bar=False)
-    plotter.add_axes_at_origin()
+    plotter.show_grid()
     plotter.vdi.export_html(tmp_path / "page.html")
 
 

@@ -167,7 +167,9 @@ def same(script, judge, way, drawn, what):
     if overlap(judge) or not fine:
         return
     ssim = compare_images(ours / 255, theirs / 255).ssim
-    assert ssim >= LEAST_SSIM, f"SSIM {ssim:.4f} after {what}"
+    means = [f"{picture.mean():.3f}" for picture in (ours, theirs)]
+    seen = [str(actor.status) for actor in script.actors]
+    assert ssim >= LEAST_SSIM, f"SSIM {ssim:.4f} after {what}; means {means}; {seen}"
     own, wanted = contrast(ours), contrast(theirs)
     if wanted > 2 * LEAST_CONTRAST:  # from inside, VTK's steps are seen as grain of less
         assert abs(own / wanted - 1) <= CONTRAST, f"contrast {own:.2f} for {wanted:.2f} at {what}"

@@ -91,6 +91,7 @@ def chosen(monkeypatch):
 def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, chosen):
     chosen.way = "vdi"
     actor = watched(plotter, draw="auto", interpolation="linear", max_supersegments=64)
+    frames_until(plotter, lambda: actor.mapper.GetVDI() is not None)  # made behind the frames
     by_vdi = frame(plotter)
     assert actor.status.drawn == "vdi"
     chosen.way = "volume"

@@ -317,7 +317,7 @@ def test_a_scene_that_is_damaged_is_made_up_for_by_the_next(vdi, data, open_page
             f"""async () => {{
               const packed = async (blob) => new Uint8Array(await new Response(
                 blob.stream().pipeThrough(new CompressionStream("deflate"))).arrayBuffer());
-              const head = {{ camera: null, size: [1, 1], lights: [], shapes: [], marker: null,
+              const head = {{ camera: null, size: [1, 1], lights: [], shapes: [], renderers: [],
                 texts: [], bounds: null, arrays: [],
                 vdis: [{{ file: null, planes: [],
                   matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] }}] }};

@@ -333,7 +333,7 @@ SIDES = ["side", *(pytest.param(side, marks=slow) for side in ("corner", "right"
 @pytest.mark.parametrize("side", SIDES)
 def test_a_page_has_the_plotters_background(side, plotter, open_page, tmp_path):
     plotter.set_background("y", **{side: "b"})
-    plotter.export_html(tmp_path / "scene.html")
+    plotter.vdi.export_html(tmp_path / "scene.html")
     viewport = {"width": SIZE[0], "height": SIZE[1]}
     page = open_page(url=(tmp_path / "scene.html").as_uri(), viewport=viewport, offline=True)
     page.ready()

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import (
     InvalidVolumeError,
-    MissingDependencyError,
     UnsupportedError,
     VDIError,
 )
@@ -49,23 +48,29 @@ _LEAST_POINTS = 4
 Box = tuple[tuple[int, int], ...]
 
 
+def are_several() -> bool:
+    """Whether VTK's program has several ranks."""
+    try:
+        from pyvista_vdi.vtk_pipeline.vtk import vtkMultiProcessController
+    except ImportError:  # a VTK without its parallel modules
+        return False
+    controller = vtkMultiProcessController.GetGlobalController()
+    return controller is not None and bool(controller.GetNumberOfProcesses() > 1)
+
+
 @functools.cache
 def communicator() -> Any:
     """Return a communicator of the ranks of VTK's parallel program; ``None`` where there is one.
+
+    To be called first where all ranks are: it waits for all.
 
     Raises
     ------
     MissingDependencyError
         If there are several ranks and mpi4py is missing.
     """
-    try:
-        from pyvista_vdi.vtk_pipeline.vtk import vtkMultiProcessController
-    except ImportError:  # a VTK without its parallel modules
-        return None
-    controller = vtkMultiProcessController.GetGlobalController()
-    if controller is None or controller.GetNumberOfProcesses() < 2:
-        return None
-    return mpi().COMM_WORLD.Dup()  # VTK's own messages do not meet ours
+    # A copy: VTK's own messages do not meet ours
+    return mpi().COMM_WORLD.Dup() if are_several() else None
 
 
 def is_first_rank() -> bool:
@@ -118,9 +123,8 @@ class RanksVDISource(VDISource):
     def FillInputPortInformation(self, port: int, information: Any) -> int:
         """Take nothing as well, of several ranks: one without an input is to tell the others."""
         super().FillInputPortInformation(port, information)
-        with suppress(MissingDependencyError):  # RequestData says it
-            if communicator() is not None:
-                information.Set(self.INPUT_IS_OPTIONAL(), 1)
+        if are_several():
+            information.Set(self.INPUT_IS_OPTIONAL(), 1)
         return 1
 
     def SetInputDataObject(self, *args: Any) -> None:
@@ -140,7 +144,7 @@ class RanksVDISource(VDISource):
         try:
             yield
         except VDIError as error:
-            if communicator() is None:
+            if not are_several():
                 raise
             self._refused = error
             self.Modified()
@@ -195,7 +199,7 @@ class RanksVDISource(VDISource):
         super()._execute(inputs, outputs)
 
     def _check_input(self) -> None:
-        if communicator() is None:  # ranks keep what they have read for one execution
+        if not are_several():  # ranks keep what they have read for one execution
             super()._check_input()
 
     def _scalar_range(self, image: Any) -> tuple[float, float]:
@@ -211,7 +215,7 @@ class RanksVDISource(VDISource):
         return getattr(volume, "grid", volume).default_unit_distance  # type: ignore[no-any-return]
 
     def _holds_all(self, data: vtkImageData) -> bool:
-        return communicator() is None
+        return not are_several()
 
     def _view(
         self, grid: vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool
