@@ -161,7 +161,8 @@ def pipeline(folder):
         vtkVolumeProperty,
     )
 
-    ranks.communicator = lambda: COMM  # VTK's own controller is not of MPI in every build
+    # VTK's own controller is not of MPI in every build
+    ranks.communicator, ranks.are_several = lambda: COMM, lambda: True
     camera = VIEWS["all of it"](volume_of("uint8"))
     last = COMM.size - 1
 
