@@ -72,6 +72,7 @@ export class VDIViewer extends HTMLElement {
   #asked = false;
   #wake = () => {};
   #seen = true;
+  #size = [1, 1]; // of the picture at rest, pixels
   #shownBefore = null; // bounds, until another address has given something
   #shots = 0; // pictures that are being made
   #retiring = 0; // a timer, as the next
@@ -225,7 +226,7 @@ export class VDIViewer extends HTMLElement {
    * @param {{width: number, height: number}} size Pixels.
    * @returns {Promise<{width: number, height: number, data: Uint8ClampedArray}>}
    */
-  async screenshot({ width = this.#parts.canvas.width, height = this.#parts.canvas.height } = {}) {
+  async screenshot({ width = this.#size[0], height = this.#size[1] } = {}) {
     await this.ready;
     if (this.isConnected) this.#begin();
     const gl = this.#gl, pacer = this.#pacer, scene = this.#scene, camera = this.#camera;
@@ -665,10 +666,10 @@ export class VDIViewer extends HTMLElement {
   }
 
   #resize() {
-    const { canvas } = this.#parts, density = window.devicePixelRatio || 1;
+    const density = window.devicePixelRatio || 1;
     const size = [this.clientWidth, this.clientHeight].map((edge) => Math.max(1, Math.round(edge * density)));
-    if (canvas.width === size[0] && canvas.height === size[1]) return;
-    [canvas.width, canvas.height] = size;
+    if (this.#size.every((edge, k) => edge === size[k])) return;
+    this.#size = size;
     this.showStill(null);
     this.#moved = performance.now(); // the first picture of a new size is a quick one
     this.invalidate(false);
@@ -695,7 +696,7 @@ export class VDIViewer extends HTMLElement {
   async #frames() {
     try {
       while (this.#raycaster && this.isConnected) {
-        const pacer = this.#pacer, { width, height } = this.#parts.canvas;
+        const pacer = this.#pacer, [width, height] = this.#size;
         this.#takeStep();
         const moving = performance.now() - this.#moved < REST;
         this.#asked = false;
@@ -732,7 +733,7 @@ export class VDIViewer extends HTMLElement {
 
   // Have the program compiled while the first lists are still being decoded.
   #warmUp(vdi) {
-    const { width, height } = this.#parts.canvas;
+    const [width, height] = this.#size;
     if (!this.#raycaster || this.#prepared) return;
     this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, this.#pacer.screen(width, height).framebuffer);
     this.#gl.enable(this.#gl.BLEND);

@@ -35,22 +35,22 @@ export function leaveGraphics(viewer) {
 }
 
 /**
- * Bring a picture to a viewer's canvas, made as large as that is.
+ * Bring a picture to a viewer's canvas, which becomes as large as it is: a moving view has few pixels,
+ * and the page makes a canvas as large as its element.
  *
  * @param {WebGLFramebuffer} framebuffer Its lower left part is the picture.
  * @param {number[]} size Width and height of that part, pixels.
  * @param {CanvasRenderingContext2D} to Of the viewer's canvas.
  */
 export function showPicture(framebuffer, [width, height], to) {
-  const { width: wide, height: high } = to.canvas;
-  // It grows only: to make it anew takes longer than a frame
-  if (canvas.width < wide) canvas.width = wide;
-  if (canvas.height < high) canvas.height = high;
+  for (const each of [canvas, to.canvas]) {
+    if (each.width !== width) each.width = width;
+    if (each.height !== height) each.height = height;
+  }
   gl.bindFramebuffer(gl.READ_FRAMEBUFFER, framebuffer);
   gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
-  gl.blitFramebuffer(0, 0, width, height, 0, 0, wide, high, gl.COLOR_BUFFER_BIT,
-    width === wide ? gl.NEAREST : gl.LINEAR);
+  gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   to.globalCompositeOperation = "copy";
-  to.drawImage(canvas, 0, canvas.height - high, wide, high, 0, 0, wide, high);
+  to.drawImage(canvas, 0, 0);
 }
