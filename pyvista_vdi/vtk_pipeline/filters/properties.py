@@ -227,7 +227,7 @@ class _Function:
             return self._interpolated(scalars)
         if self._logarithmic:
             return np.clip(self._colors_of_logarithms(scalars), 0, 1)
-        return np.clip(self._table(self._function, scalars), 0, 1)
+        return np.clip(self._table(self._function, scalars, self.x[0]), 0, 1)
 
     def exact(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values on a grid that holds all nodes, or else all whole numbers."""
@@ -277,27 +277,41 @@ class _Function:
     def _interpolated(self, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([np.interp(scalars, self.x, v) for v in self.values.T], axis=1)
 
-    def _table(self, function: Any, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return VTK's table, by the one call, of which the scalars are."""
+    def _table(
+        self, function: Any, scalars: NDArray[np.float64], begin: float
+    ) -> NDArray[np.float64]:
+        """Return VTK's table at scalars, by one call; the first node is at ``begin``."""
         table = np.empty((len(scalars), self.values.shape[1]))
         function.GetTable(scalars[0], scalars[-1], len(scalars), table.reshape(-1))
         # Colours are 0 in VTK 9.7.2 where the first node is a sample, but not the first one
-        first = np.abs(scalars - self.x[0]) <= 1e-14 * np.abs(scalars).max()
+        first = np.abs(scalars - begin) <= 1e-14 * np.abs(scalars).max()
         table[first] = self.values[0]
         return table
 
     def _colors_of_logarithms(self, scalars: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what ``GetColor`` has: on a logarithmic scale ``GetTable``'s steps are so, too."""
+        """Return what ``GetColor`` has: the same function of logarithms, on a linear scale.
+
+        What ``GetTable`` has of a logarithmic scale differs between versions of VTK.
+        """
         function, first, last = self._function, self.x[0], self.x[-1]
         within = vtkColorTransferFunction()
         within.DeepCopy(function)
+        within.SetScaleToLinear()
+        within.RemoveAllPoints()
+        node = [0.0] * 6
+        for k in range(function.GetSize()):
+            function.GetNodeValue(k, node)
+            within.AddRGBPoint(np.log(node[0]), *node[1:])
         within.SetUseBelowRangeColor(False)  # which a rounded end would have
         within.SetUseAboveRangeColor(False)
         within.SetClamping(True)
         logarithms = np.log(np.clip(scalars, first, last))
         places = np.linspace(logarithms[0], logarithms[-1], 4 * len(scalars))
-        table = self._table(within, np.exp(places))
-        colors = np.stack([np.interp(logarithms, places, v) for v in table.T], axis=1)
+        if places[0] == places[-1]:  # one node, or none within: of no length VTK has no table
+            colors = np.tile(within.GetColor(places[0]), (len(scalars), 1))
+        else:
+            table = self._table(within, places, np.log(first))
+            colors = np.stack([np.interp(logarithms, places, v) for v in table.T], axis=1)
         below, above = scalars < first, scalars > last
         if not function.GetClamping():
             colors[below | above] = 0
