@@ -44,6 +44,9 @@ _FAR = 1e30
 #: functions are the first component's.
 RGBA_OPACITY = 3
 
+#: vtkColorTransferFunction's logarithmic scale, VTK_CTF_LOG10.
+_LOG10 = 1
+
 #: VTK's interpolation types that a VDI can be made with (VTK_NEAREST_..., VTK_LINEAR_...).
 _INTERPOLATION = {0: "nearest", 1: "linear"}
 
@@ -201,7 +204,8 @@ class _Function:
         straight = not colored and not function.GetUseLogScale()
         if colored:
             self.ends |= function.GetUseBelowRangeColor() or function.GetUseAboveRangeColor()
-            self._logarithmic = function.UsingLogScale()
+            # UsingLogScale is always false in VTK 9.4
+            self._logarithmic = bool(function.GetScale() == _LOG10 and self.x[0] > 0)
             straight = function.GetColorSpace() == 0 and not self._logarithmic  # VTK_CTF_RGB
         self.linear = bool(
             straight
