@@ -273,6 +273,18 @@ class Page:
         return picture(self.page, size)
 
 
+def show_scene(page, scene):
+    """Show a scene of web/scenes/scene.py, and its VDI, in a page's viewer."""
+    page.evaluate(
+        """async ([scene, data]) => {
+          const { Scene } = await import("./scene.js");
+          viewer.scene = new Scene(bytesOf(scene));
+          await viewer.load(bytesOf(data));
+        }""",
+        [in_base64(part) for part in (scene.data, file_of(scene.vdi))],
+    )
+
+
 @pytest.fixture(scope="module")
 def shared_pages(chromium):
     """Pages that the tests of a file share, by their scripts."""

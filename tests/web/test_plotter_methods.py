@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import file_of, in_base64, picture
+from browsers import picture, show_scene
 from PIL import Image
 from plugin_scenes import soft_ball
 
@@ -176,14 +176,7 @@ def shown(page, plotter, renderer=None):
     plotter.show(auto_close=False)
     plotter.render()  # VTK lays scalar bars out by two frames
     scene = scene_of(renderer, renderer.actors)
-    page.evaluate(
-        """async ([scene, data]) => {
-          const { Scene } = await import("./scene.js");
-          viewer.scene = new Scene(bytesOf(scene));
-          await viewer.load(bytesOf(data));
-        }""",
-        [in_base64(part) for part in (scene.data, file_of(scene.vdi))],
-    )
+    show_scene(page, scene)
     return scene.left_out, *both(page, plotter, scene, renderer)
 
 

@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import CONTEXTS, COUNTING, file_of, in_base64, picture
+from browsers import CONTEXTS, COUNTING, in_base64, picture, show_scene
 from plugin_scenes import soft_ball
 from scipy import ndimage
 from skimage.metrics import structural_similarity
@@ -63,14 +63,7 @@ def give(page, plotter):
     plotter.show(auto_close=False)
     scene = scene_of(plotter.renderer)
     assert scene.left_out == []
-    page.evaluate(
-        """async ([scene, data]) => {
-          const { Scene } = await import("./scene.js");
-          viewer.scene = new Scene(bytesOf(scene));
-          await viewer.load(bytesOf(data));
-        }""",
-        [in_base64(part) for part in (scene.data, file_of(scene.vdi))],
-    )
+    show_scene(page, scene)
     return scene
 
 
