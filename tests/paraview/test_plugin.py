@@ -81,7 +81,7 @@ def paraview():
 
     with virtual_screen() as display:
 
-        def run(case, folder, *more, script=inside, program="pvpython", bears=()):
+        def run(case, folder, *more, script=inside, program="pvpython", bears=(), times=1):
             arguments = ["--force-offscreen-rendering", script, case, folder, *more]
             done = subprocess.run(
                 ["sh", "-c", line, "sh", *arguments],
@@ -94,7 +94,8 @@ def paraview():
             )
             said = done.stdout + done.stderr
             assert done.returncode == 0, said
-            assert done.stdout.endswith("all well\n"), said
+            # Ranks that write at once share lines
+            assert done.stdout.count("all well") == times, said
             lines = [line for line in said.splitlines() if not any(text in line for text in bears)]
             for trouble in ("Traceback", "ERR|", "WARN|"):
                 assert not any(trouble in line for line in lines), said
@@ -297,7 +298,8 @@ def test_ranks_make_one_vdi_together(by_one_process, paraview, tmp_path, mode, d
     mpirun = "mpirun --oversubscribe --allow-run-as-root -n 3"
     # The client that each symmetric rank has finds no picture on any but the first
     no_range = "Could not determine array range"
-    paraview("ranks", tmp_path, program=f"{mpirun} pvbatch{mode}", bears=[no_range])
+    times = 3 if mode else 1  # symmetric ranks run the script each
+    paraview("ranks", tmp_path, program=f"{mpirun} pvbatch{mode}", bears=[no_range], times=times)
     for name in ("points.vdi", "cells.vdi", "wavelet.vdi", "steps.vdis"):
         found, one = (pvdi.read(folder / name) for folder in (tmp_path, by_one_process))
         for ours, expected in zip(found, one, strict=True) if "vdis" in name else [(found, one)]:
