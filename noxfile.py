@@ -72,7 +72,7 @@ def docs(session: nox.Session) -> None:
     session.install("-e", ".[dev]")
     site = Path(os.environ.get("PYVISTA_VDI_SITE") or CHECKOUT / "docs" / "_build")
     session.run("sphinx-build", "-W", "--keep-going", "-q", "-b", "html", "docs", str(site))
-    live = ("-n", "0", "-m", "slow or not slow", "tests/web/test_live_docs.py")
+    live = ("-n", "0", "-m", "slow or not slow", "tests/extensions/web/test_live_docs.py")
     session.run("pytest", "-q", *live, env={"PYVISTA_VDI_SITE": str(site)})
 
 
@@ -88,7 +88,7 @@ def snippets(session: nox.Session) -> None:
     with session.chdir(folder):
         session.run("pytest", "-q", "docs")
     # ParaView's plugin can be imported only in ParaView
-    plugin = "--ignore-glob=/*/pyvista_vdi/paraview/*"
+    plugin = "--ignore-glob=/*/pyvista_vdi/extensions/paraview/*"
     session.run("pytest", "-q", "--doctest-modules", plugin, "--pyargs", "pyvista_vdi")
 
 

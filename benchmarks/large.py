@@ -18,8 +18,8 @@ from typing import Any
 from shared import benches, execute, load, marked, parser_of  # beside this file
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.large.generate import generate_chunked
-from pyvista_vdi.large.on_dask import generate_on_dask
+from pyvista_vdi.extensions.large.generate import generate_chunked
+from pyvista_vdi.extensions.large.on_dask import generate_on_dask
 from pyvista_vdi.measure.harness import Case, accuracy
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.results import Results
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return on_cluster(options)
             return in_blocks(bench_of(case.volume, case.look, "linear"), case.chosen["blocks"])
 
-        rooms = ("generation", "raycasting", "volume", "large")
+        rooms = ("generation", "raycasting", "volume", "extensions/large")
         key = lambda case: case.what  # noqa: E731
         execute("large", options, cases, measure, report, count=10, key=key, rooms=rooms)
     return 0

@@ -22,11 +22,11 @@ from shared import execute, marked, parser_of, table_of  # beside this file
 import pyvista_vdi as pvdi
 from pyvista_vdi import Volume, examples
 from pyvista_vdi.device import get_runtime
+from pyvista_vdi.extensions.series import reader
 from pyvista_vdi.measure.harness import Bench, Case
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.raycasting.prepared import prepared_vdi
-from pyvista_vdi.series import reader
 from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 
 TOLERANCES, ANGLES = (0.01, 0.02, 0.03), (0.0, 5.0, 20.0)
@@ -117,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return measured([step(i) for i in few], looks, Path(folder), options)
 
     cases = [Case("series", options=(("series", name),)) for name in options.series]
-    rooms = ("generation", "raycasting", "volume", "series", "io")
+    rooms = ("generation", "raycasting", "volume", "extensions/series", "io")
     execute("series", options, cases, measure, report, count=len(cases), rooms=rooms)
     return 0
 

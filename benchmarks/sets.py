@@ -15,12 +15,12 @@ import numpy as np
 from shared import benches, execute, marked, parser_of  # beside this file
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.extensions.sets.sphere import orbit
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.harness import Bench, Case
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.sets.sphere import orbit
 
 VOLUMES = ("brain", "visible_female_head", "rayleigh_taylor")
 
@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     with benches(options, vtk=True) as bench_of:
         cases = [Case(name, "soft", tuple(options.size)) for name in options.volumes]
-        rooms = ("generation", "raycasting", "volume", "quality", "sets")
+        rooms = ("generation", "raycasting", "volume", "quality", "extensions/sets")
         execute(
             "sets",
             options,

@@ -32,7 +32,7 @@ from slow_line import SlowLine
 from web_client import WebClient
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import web
+from pyvista_vdi.extensions import web
 from pyvista_vdi.measure.harness import Bench, Case
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.results import Results
@@ -86,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             report,
             count=4,
             key=lambda case: case.what,
-            rooms=("generation", "raycasting", "volume", "web"),
+            rooms=("generation", "raycasting", "volume", "extensions/web"),
         )
     return 0
 

@@ -20,7 +20,7 @@ import numpy as np
 from mpi4py import MPI
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.insitu import InSitu
+from pyvista_vdi.extensions.insitu import InSitu
 from pyvista_vdi.io.png import to_bytes, write_png
 
 COMM = MPI.COMM_WORLD

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi import web
+from pyvista_vdi.extensions import web
 
 
 class Swelling(Sequence):

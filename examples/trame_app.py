@@ -14,9 +14,9 @@ from trame.app import get_server
 from trame.ui.html import DivLayout
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.extensions.web.trame import VDIView
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
-from pyvista_vdi.web.trame import VDIView
 
 LISTS = (480, 270)
 LOOK = TRANSFER_FUNCTIONS["soft"]

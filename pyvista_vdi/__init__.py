@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from pyvista_vdi.device import describe_devices, list_devices
     from pyvista_vdi.device.report import Report
     from pyvista_vdi.errors import *
+    from pyvista_vdi.extensions.series.generate import generate_series
+    from pyvista_vdi.extensions.series.series import VDISeries
+    from pyvista_vdi.extensions.series.writer import SeriesWriter
+    from pyvista_vdi.extensions.sets.generate import generate_set
+    from pyvista_vdi.extensions.sets.vdi_set import VDISet
     from pyvista_vdi.generation.estimate import Estimate
     from pyvista_vdi.io.stores import open_volume
     from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
@@ -34,11 +39,6 @@ if TYPE_CHECKING:
     from pyvista_vdi.model.volume import Volume
     from pyvista_vdi.plotting.plotter import Plotter
     from pyvista_vdi.raycasting.picking import Pick
-    from pyvista_vdi.series.generate import generate_series
-    from pyvista_vdi.series.series import VDISeries
-    from pyvista_vdi.series.writer import SeriesWriter
-    from pyvista_vdi.sets.generate import generate_set
-    from pyvista_vdi.sets.vdi_set import VDISet
     from pyvista_vdi.vtk_pipeline import VDIActor, VDIMapper, VDISource
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
@@ -52,22 +52,22 @@ _HOMES = {
     "Pick": "raycasting.picking",
     "Plotter": "plotting.plotter",
     "Report": "device.report",
-    "SeriesWriter": "series.writer",
+    "SeriesWriter": "extensions.series.writer",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",
     "VDIActor": "vtk_pipeline",
     "VDIMapper": "vtk_pipeline",
-    "VDISeries": "series.series",
-    "VDISet": "sets.vdi_set",
+    "VDISeries": "extensions.series.series",
+    "VDISet": "extensions.sets.vdi_set",
     "VDISource": "vtk_pipeline",
     "Volume": "model.volume",
     "compare_images": "model.metrics",
     "describe_devices": "device",
     "estimate": "api",
     "generate": "api",
-    "generate_series": "series.generate",
-    "generate_set": "sets.generate",
+    "generate_series": "extensions.series.generate",
+    "generate_set": "extensions.sets.generate",
     "list_devices": "device",
     "open_volume": "io.stores",
     "pick": "api",
@@ -86,16 +86,17 @@ registration.install()
 # The composition root: what lower rooms need of upper ones, by name and loaded when asked for
 providers.provide(
     by_absolute_path="pyvista_vdi.io.store_identity:by_absolute_path",
-    html_files="pyvista_vdi.web.page",
+    exr_files="pyvista_vdi.extensions.deep_exr.files",
+    html_files="pyvista_vdi.extensions.web.page",
     image_with_scalars="pyvista_vdi.plotting.volumes:as_image",
     range_keeper="pyvista_vdi.io.ranges:keeper_of",
-    notebook_bundle="pyvista_vdi.web.notebook:mime_bundle",
-    notebook_html="pyvista_vdi.web.notebook:html_of",
+    notebook_bundle="pyvista_vdi.extensions.web.notebook:mime_bundle",
+    notebook_html="pyvista_vdi.extensions.web.notebook:html_of",
     plot="pyvista_vdi.plotting.accessor:plot",
     read_by_pyvista="pyvista_vdi.plotting.imports:read_volume",
     read_nrrd="pyvista_vdi.examples:read_nrrd",
     store_identity="pyvista_vdi.io.store_identity:identity_of",
-    scene_pages="pyvista_vdi.web.scenes.export:export_html",
+    scene_pages="pyvista_vdi.extensions.web.scenes.export:export_html",
     temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:steps_and_times",
     thinned="pyvista_vdi.model.thinned:thinned",
     transfer_function_from_arguments="pyvista_vdi.plotting.classify:transfer_function_from_arguments",
@@ -103,9 +104,9 @@ providers.provide(
     vdi_from_image="pyvista_vdi.vtk_pipeline:vdi_from_image",
     volume_from_vtk="pyvista_vdi.vtk_pipeline:volume_from_vtk",
     vti_files="pyvista_vdi.vtk_pipeline.filters.vti",
-    write_cinema="pyvista_vdi.sets.cinema:write",
-    write_series="pyvista_vdi.series.writer:write",
-    write_set="pyvista_vdi.sets.files:write",
+    write_cinema="pyvista_vdi.extensions.sets.cinema:write",
+    write_series="pyvista_vdi.extensions.series.writer:write",
+    write_set="pyvista_vdi.extensions.sets.files:write",
     write_vdi="pyvista_vdi.io:write",
 )
 

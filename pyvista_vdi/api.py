@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, check_callback
 from pyvista_vdi.model.classification import BLENDINGS, DEFAULTS, IN_PLACE, Classification
@@ -26,7 +27,6 @@ from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest,
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, warn_missed
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
-from pyvista_vdi.sets.vdi_set import VDISet
 
 if TYPE_CHECKING:
     from pyvista_vdi.generation.estimate import Estimate
@@ -202,7 +202,7 @@ def generate(
     )
     volume = as_volume(volume, looks.scalars, looks.preference)
     metadata = {"classification": looks.describe(), "scalars": volume.name}
-    from pyvista_vdi.series.generate import generate_anywhere
+    from pyvista_vdi.extensions.series.generate import generate_anywhere
 
     vdi = generate_anywhere(
         volume,
@@ -328,7 +328,7 @@ def render(
         TRANSMITTANCE_CUTOFF if transmittance_cutoff is None else transmittance_cutoff,
     )
     if isinstance(vdi, VDISet):
-        from pyvista_vdi.sets.render import render_set
+        from pyvista_vdi.extensions.sets.render import render_set
 
         return render_set(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
     vdi = as_vdi(vdi)
@@ -577,9 +577,9 @@ def read(path: str | os.PathLike[str], **options: Any) -> Any:
     VDIWarning
         If an ``.exr`` file of ours was changed by another program, or has colours outside 0 to 1.
     """
+    from pyvista_vdi.extensions.series import reader
+    from pyvista_vdi.extensions.sets import files as sets
     from pyvista_vdi.io import read as read_file
-    from pyvista_vdi.series import reader
-    from pyvista_vdi.sets import files as sets
 
     if sets.is_set_file(path):
         return sets.read(path, **options)

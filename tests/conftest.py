@@ -110,10 +110,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 LENGTHY = {
     "api": "api engine_errors",
     "cli": "cli wrong_values",
+    "deep_exr": "deep_exr",
     "extremes": "entries media scenes vdis views volumes",
     "faults": "device_faults",
     "generation": "generation_oracle march_blocks records",
-    "io": "deep_exr vdi_files",
+    "io": "vdi_files",
     "large": "blocks",
     "measure": "benchmark_scripts baselines",
     "model": "packing",

@@ -11,8 +11,8 @@ ROOMS = {
     "volume": ("volume", "generation"),
     "raycasting": ("raycasting", "model"),
     "multi_vdi": ("raycasting",),
-    "series": ("series",),
-    "large": ("large",),
+    "series": ("extensions/series",),
+    "large": ("extensions/large",),
 }
 
 
@@ -43,7 +43,7 @@ CRITERIA = "opencl/generation/criteria.cl"
 LISTS, RAYS = "opencl/raycasting/lists.cl", "opencl/raycasting/list_rays.cl"
 DECODE = "opencl/series/decode.cl"
 LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
-    ("large",),
+    ("extensions/large",),
     "opencl/large/optical_depths.cl",
     "opencl/large/runs.cl",
 )
@@ -400,9 +400,12 @@ PICTURES = "pyvista_vdi/quality/pictures.py"
 PACKING = "pyvista_vdi/model/packing.py"
 REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
 WHEN, WAYS = "pyvista_vdi/quality/when_anew.py", "pyvista_vdi/quality/ways.py"
-SET, SHOWER = "pyvista_vdi/sets/vdi_set.py", "pyvista_vdi/sets/shower.py"
-VIEWER = "pyvista_vdi/web/viewer/"
-PLAYER, SERIES = "pyvista_vdi/series/player.py", "pyvista_vdi/series/series.py"
+SET, SHOWER = "pyvista_vdi/extensions/sets/vdi_set.py", "pyvista_vdi/extensions/sets/shower.py"
+VIEWER = "pyvista_vdi/extensions/web/viewer/"
+PLAYER, SERIES = (
+    "pyvista_vdi/extensions/series/player.py",
+    "pyvista_vdi/extensions/series/series.py",
+)
 
 PYTHON_MUTANTS = (
     _m(
@@ -606,42 +609,42 @@ PYTHON_MUTANTS = (
         SET,
         "reach = min(self._blend, beyond[-1]) if len(order) > MOST_BLENDED else self._blend",
         "reach = self._blend",
-        ("sets",),
+        ("extensions/sets",),
     ),
     _m(
         "view selection: the view before stays the nearest",
         SHOWER,
         "self._weights = self.vdi_set.weights(camera)",
         "pass",
-        ("sets", "vtk_pipeline", "plotting"),
+        ("extensions/sets", "vtk_pipeline", "plotting"),
     ),
     _m(
         "series: steps that were left out are not counted",
         PLAYER,
         "self.dropped += place - self._place - 1",
         "self.dropped += 0",
-        ("series",),
+        ("extensions/series",),
     ),
     _m(
         "series: what was played to its end does not begin anew",
         PLAYER,
         "if not loop and self._place == n - 1:",
         "if False:",
-        ("series",),
+        ("extensions/series",),
     ),
     _m(
         "series: the nearest time is the one after",
         SERIES,
         "return min(candidates, key=lambda i: abs(self.times[i] - time))",
         "return candidates[-1]",
-        ("series",),
+        ("extensions/series",),
     ),
     _m(
         "series: optical depths that are told apart are rounded down",
-        "pyvista_vdi/series/codes.py",
+        "pyvista_vdi/extensions/series/codes.py",
         "(bits + 0x8000 >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
         "(bits >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
-        ("series",),
+        ("extensions/series",),
     ),
     _m(
         "pictures: a VDI of which the view shows more than it has",
@@ -690,42 +693,42 @@ PYTHON_MUTANTS = (
         VIEWER + "camera.js",
         "from, 1 / factor)",
         "from, factor)",
-        ("web",),
+        ("extensions/web",),
     ),
     _m(
         "viewer: pinching apart takes one away",
         VIEWER + "interaction.js",
         "nearer(rolled(camera, turn), pinch)",
         "nearer(rolled(camera, turn), 1 / pinch)",
-        ("web",),
+        ("extensions/web",),
     ),
     _m(
         "viewer: the step farthest in time is shown",
         VIEWER + "series.js",
         "if (Math.abs(frame.time - time) < Math",
         "if (Math.abs(frame.time - time) > Math",
-        ("web",),
+        ("extensions/web",),
     ),
     _m(
         "viewer: what was played to its end does not begin anew",
         VIEWER + "player.js",
         "if (!loop && this.#place === n - 1) this.#moveTo(0);",
         "",
-        ("web",),
+        ("extensions/web",),
     ),
     _m(
         "viewer: a served picture waits for its drawing for ever",
         VIEWER + "remote.js",
         "await Promise.race([this.viewer.showBytes(file), drawn])",
         "await this.viewer.showBytes(file)",
-        ("web",),
+        ("extensions/web",),
     ),
     _m(
         "viewer: damaged bytes are shown",
         VIEWER + "decode.js",
         "if (crc32(bytes) !== crc) damaged",
         "if (false) damaged",
-        ("web",),
+        ("extensions/web",),
     ),
 )
 

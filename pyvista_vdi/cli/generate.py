@@ -18,10 +18,10 @@ from pyvista_vdi.cli.inputs import (
     say_vdi,
 )
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.extensions.large.entrance import connected
 from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
-from pyvista_vdi.large.entrance import connected
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera

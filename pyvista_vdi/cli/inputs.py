@@ -128,14 +128,14 @@ def _loaded(volume: StoredVolume) -> Volume:
 
 def is_series(options: argparse.Namespace) -> bool:
     """Whether FILE names a series of VDIs."""
-    from pyvista_vdi.series.reader import is_series_file
+    from pyvista_vdi.extensions.series.reader import is_series_file
 
     return options.file is not None and is_series_file(options.file)
 
 
 def is_set(options: argparse.Namespace) -> bool:
     """Whether FILE names a set of VDIs."""
-    from pyvista_vdi.sets.files import is_set_file
+    from pyvista_vdi.extensions.sets.files import is_set_file
 
     return options.file is not None and is_set_file(options.file)
 

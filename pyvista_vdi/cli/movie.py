@@ -29,11 +29,11 @@ from pyvista_vdi.cli.inputs import (
 from pyvista_vdi.cli.steps import in_order
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError, VDIFileError
+from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.series.series import VDISeries
 
 Frame = NDArray[np.uint8]
 #: Names of moving pictures, and of single ones with a place for the number.

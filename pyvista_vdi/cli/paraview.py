@@ -13,7 +13,7 @@ from pyvista_vdi.errors import MissingDependencyError, NoDeviceError, Unsupporte
 
 #: The package, and the plugin in it.
 _PACKAGE = Path(__file__).resolve().parents[1]
-PLUGIN = _PACKAGE / "paraview" / "vdi_plugin.py"
+PLUGIN = _PACKAGE / "extensions" / "paraview" / "vdi_plugin.py"
 
 #: What ParaView's Python is asked: status 3 says that the plugin is there, and no device.
 _QUESTIONS = """

@@ -22,6 +22,10 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.extensions.series.player import RATE
+from pyvista_vdi.extensions.series.reader import is_series_file
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
@@ -29,10 +33,6 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
-from pyvista_vdi.series.player import RATE
-from pyvista_vdi.series.reader import is_series_file
-from pyvista_vdi.series.series import VDISeries
-from pyvista_vdi.sets.vdi_set import VDISet
 
 #: What has times.
 _SERIES = "series, .vdis"

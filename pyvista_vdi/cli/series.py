@@ -23,16 +23,16 @@ from pyvista_vdi.cli.inputs import (
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_vdis, steps_of_volumes, timed
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.errors import InvalidArgumentError, naming
+from pyvista_vdi.extensions.large.entrance import connected
+from pyvista_vdi.extensions.series import reader
+from pyvista_vdi.extensions.series.layout import SUFFIX
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.io import check_write_options, checked_target
 from pyvista_vdi.io.files import HTML_SUFFIX
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
-from pyvista_vdi.large.entrance import connected
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.series import reader
-from pyvista_vdi.series.layout import SUFFIX
-from pyvista_vdi.series.series import VDISeries
-from pyvista_vdi.series.writer import SeriesWriter
 
 #: Options of ``convert`` that are for deep images of other programs, and for those that it writes.
 OF_READ_IMAGES = ("camera_json", "thickness", "from_linear")

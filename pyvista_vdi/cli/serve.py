@@ -33,7 +33,7 @@ class _Steps(Sequence[Volume]):
 
 def serve(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    from pyvista_vdi.web.server import serve as serve_volumes  # needs aiohttp
+    from pyvista_vdi.extensions.web.server import serve as serve_volumes  # needs aiohttp
 
     arguments = classification(options)
     Classification(arguments, "serve")  # refused before the volume is read

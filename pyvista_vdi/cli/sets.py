@@ -21,10 +21,10 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.cli.series import OF_READ_IMAGES, OF_WRITTEN_IMAGES, write_each
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
+from pyvista_vdi.extensions.sets import cinema, files
+from pyvista_vdi.extensions.sets.generate import generate_set
 from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.sets import cinema, files
-from pyvista_vdi.sets.generate import generate_set
 
 #: Options that are arguments of ``generate_set`` of the same name, given only if the user did.
 _GOAL = ("target_ssim", "max_bytes", "max_views", "lists", "max_supersegments")

@@ -15,6 +15,7 @@ from typing import Any
 from pyvista_vdi.cli.inputs import laid_out, open_store, quietly, read_volume
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.extensions.series import reader
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.io import read_info
 from pyvista_vdi.io.stores import is_store
@@ -22,7 +23,6 @@ from pyvista_vdi.io.time_steps import in_step_order, listed_steps, lists_steps
 from pyvista_vdi.io.volumes import needs_pyvista
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.series import reader
 
 
 @dataclass(frozen=True)

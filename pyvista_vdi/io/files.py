@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIFileError
-from pyvista_vdi.io.deep_exr import files as exr
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import layout, reader, writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
@@ -20,9 +19,10 @@ from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 
 #: What the name of a file may end in; the first is our own format.
+EXR_SUFFIX = ".exr"
 VTI_SUFFIX = ".vti"
 HTML_SUFFIX = ".html"
-SUFFIXES = (layout.SUFFIX, exr.SUFFIX, VTI_SUFFIX, HTML_SUFFIX)
+SUFFIXES = (layout.SUFFIX, EXR_SUFFIX, VTI_SUFFIX, HTML_SUFFIX)
 
 _VTI_COMPRESSIONS = ("lz4", "zlib", "lzma", "none")
 
@@ -51,8 +51,10 @@ def write(
     **options
         ``compression`` and ``level`` for all; ``precision`` for ``.vdi`` and ``.html``, there
         ``title`` and ``background`` as well; ``exact`` and ``linear`` for ``.exr``. See
-        :func:`pyvista_vdi.io.vdi_file.writer.write`, :func:`pyvista_vdi.io.deep_exr.files.write`,
-        :func:`pyvista_vdi.vtk_pipeline.filters.vti.write` and :func:`pyvista_vdi.web.page.page`.
+        :func:`pyvista_vdi.io.vdi_file.writer.write`,
+        :func:`pyvista_vdi.extensions.deep_exr.files.write`,
+        :func:`pyvista_vdi.vtk_pipeline.filters.vti.write` and
+        :func:`pyvista_vdi.extensions.web.page.page`.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def write(
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
     if _is_exr(target):
-        return exr.write(vdi, target, progress=progress, **options)
+        return provider("exr_files").write(vdi, target, progress=progress, **options)  # type: ignore[no-any-return]
     if _is_vti(target):
         written: Path = _vti().write(vdi, target, **options)
         Pieces(progress, 1)()
@@ -101,7 +103,7 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
         As for :func:`write`.
     **options
         ``camera``, ``thickness`` and ``linear`` for ``.exr``: see
-        :func:`pyvista_vdi.io.deep_exr.files.read`.
+        :func:`pyvista_vdi.extensions.deep_exr.files.read`.
 
     Returns
     -------
@@ -122,7 +124,7 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     """
     if _is_exr(path):
         _check_names("read", path, options, ("camera", "thickness", "linear"))
-        return exr.read(path, progress=progress, **options)
+        return provider("exr_files").read(path, progress=progress, **options)  # type: ignore[no-any-return]
     _check_names("read", path, options, ())
     if _is_vti(path):
         vdi: VDI = _vti().read(path)
@@ -155,7 +157,9 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
         return _vti().read_info(path)  # type: ignore[no-any-return]
     if _is_html(path):
         return provider("html_files").read_info(path)  # type: ignore[no-any-return]
-    return exr.read_info(path) if _is_exr(path) else reader.read_info(path)
+    if _is_exr(path):
+        return provider("exr_files").read_info(path)  # type: ignore[no-any-return]
+    return reader.read_info(path)
 
 
 def is_vdi_file(path: str | os.PathLike[str]) -> bool:
@@ -213,7 +217,7 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     names: tuple[str, ...] = ("compression", "level")
     compressions: tuple[str, ...] = (*CODECS, "none")
     if _is_exr(path):
-        names, compressions = (*names, "exact", "linear"), exr.COMPRESSIONS
+        names, compressions = (*names, "exact", "linear"), provider("exr_files").COMPRESSIONS
     elif _is_vti(path):
         compressions = _VTI_COMPRESSIONS
     elif _is_html(path):
@@ -233,7 +237,7 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
 
 
 def _is_exr(path: Any) -> bool:
-    return str(path).lower().endswith(exr.SUFFIX)
+    return str(path).lower().endswith(EXR_SUFFIX)
 
 
 def _is_vti(path: Any) -> bool:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.classification import (
     DEFAULTS,
     Classification,
@@ -31,8 +33,6 @@ from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
 from pyvista_vdi.quality.ways import checked_draw
 from pyvista_vdi.quality.when_anew import REGENERATE_BELOW, checked_bound
-from pyvista_vdi.series.series import VDISeries
-from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array

@@ -47,7 +47,7 @@ FIRST_USES = {
         "all(getattr(pvdi, name) is not None for name in pvdi.__all__)",
     ),
     "names of rooms": (
-        "from pyvista_vdi import vtk_pipeline, web",
+        "from pyvista_vdi import vtk_pipeline\nfrom pyvista_vdi.extensions import web",
         "[getattr(room, name) for room in (vtk_pipeline, web) for name in room.__all__]",
     ),
     "importing all": ("", "__import__('pyvista_vdi').generate is not None"),

@@ -20,11 +20,11 @@ import pytest
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.insitu import InSitu
-from pyvista_vdi.large.on_mpi import generate_on_mpi
+from pyvista_vdi.extensions.insitu import InSitu
+from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi
+from pyvista_vdi.extensions.sets import cinema
 from pyvista_vdi.model.classification import DEFAULTS
 from pyvista_vdi.model.grid import Grid
-from pyvista_vdi.sets import cinema
 
 PACKAGE = Path(pvdi.__file__).parent
 ARRAY = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)
@@ -236,7 +236,7 @@ def test_only_errors_of_the_package_come_out(entry, vdi, tmp_path):
     named = inspect.signature(function).parameters.values() if more is None else ()
     names = [p.name for p in named if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
     escaped = []
-    # A wrong communicator would begin MPI in this process: tests/insitu gives ranks one
+    # A wrong communicator would begin MPI in this process: tests/extensions/insitu gives ranks one
     for name in dict.fromkeys(n for n in [*right, *names, *(more or ())] if n != "comm"):
         for value in wrong_values(vdi):
             try:

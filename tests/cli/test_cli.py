@@ -587,7 +587,10 @@ def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
         check=True,
     )
     site = plain_installation.parent
-    assert shown.stdout.splitlines() == [f"{site}:/before", f"{site}/pyvista_vdi/paraview"]
+    assert shown.stdout.splitlines() == [
+        f"{site}:/before",
+        f"{site}/pyvista_vdi/extensions/paraview",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -608,7 +611,7 @@ def test_paraview_is_asked_whether_it_finds_a_device(
     pvpython.chmod(0o755)
     if message is None:
         site = plain_installation.parent
-        expected = f"{site}:/before:{site}/pyvista_vdi/paraview\n"
+        expected = f"{site}:/before:{site}/pyvista_vdi/extensions/paraview\n"
         assert run(capfd, "paraview", "--check", pvpython) == (0, expected, "")
     else:
         assert message in complaint(capfd, "paraview", "--check", pvpython)

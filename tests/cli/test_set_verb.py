@@ -11,7 +11,7 @@ from command_line import run
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.sets import generate
+from pyvista_vdi.extensions.sets import generate
 
 SIZE = (32, 24)
 

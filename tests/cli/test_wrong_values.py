@@ -254,7 +254,7 @@ def test_wrong_values_are_named_and_nothing_is_written(
 ):
     monkeypatch.delenv(cli.DEBUG_VARIABLE, raising=False)
     if verb == "serve":
-        server = pytest.importorskip("pyvista_vdi.web.server", exc_type=ImportError)
+        server = pytest.importorskip("pyvista_vdi.extensions.web.server", exc_type=ImportError)
         monkeypatch.setattr(server.Server, "wait", lambda server: server.close())  # accepted
     monkeypatch.chdir(folder)
     before, found = contents(folder), []

@@ -37,14 +37,14 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume, cli, io
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
+from pyvista_vdi.extensions.series import layout
+from pyvista_vdi.extensions.series import reader as series_reader
+from pyvista_vdi.extensions.sets import files as set_files
+from pyvista_vdi.extensions.web import messages
+from pyvista_vdi.extensions.web.page import DATA_TYPE
+from pyvista_vdi.extensions.web.page import page as page_of
 from pyvista_vdi.model import host_memory
 from pyvista_vdi.model.view import View
-from pyvista_vdi.series import layout
-from pyvista_vdi.series import reader as series_reader
-from pyvista_vdi.sets import files as set_files
-from pyvista_vdi.web import messages
-from pyvista_vdi.web.page import DATA_TYPE
-from pyvista_vdi.web.page import page as page_of
 
 #: Bytes that a byte of a file may become (docs/robustness.md): a block of 128 KiB from 4 bytes is
 #: Zstandard's best, and an array is held twice while it is decoded, a third time as the VDI's.

@@ -9,7 +9,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, UnsupportedError, Volume
-from pyvista_vdi.large.generate import generate_chunked
+from pyvista_vdi.extensions.large.generate import generate_chunked
 from pyvista_vdi.model.chunked import ChunkedArray
 
 VALUES = np.random.default_rng(4).integers(0, 200, (30, 21, 26), np.uint8)

@@ -204,7 +204,7 @@ def test_the_page_of_the_command_line_has_its_verbs_and_options(verbs):
 TABLES = {
     "guide_plotting.md": ("| argument | default | meaning |", "plotting.component:AddVDI"),
     "dial.md": ("| argument | asks for |", "api:generate"),
-    "sets.md": ("| argument | |", "sets.generate:generate_set"),
+    "sets.md": ("| argument | |", "extensions.sets.generate:generate_set"),
 }
 
 
@@ -249,7 +249,9 @@ def test_formats_on_the_page_of_files_are_written_and_read(tmp_path):
 
 
 def test_properties_on_the_page_of_paraview_are_the_plugin_s():
-    plugin = (CHECKOUT / "pyvista_vdi/paraview/vdi_plugin.py").read_text(encoding="utf-8")
+    plugin = (CHECKOUT / "pyvista_vdi/extensions/paraview/vdi_plugin.py").read_text(
+        encoding="utf-8"
+    )
     text = (DOCS / "guide_paraview.md").read_text(encoding="utf-8")
     table = text.partition("| property | meaning |")[2].partition("\n\n")[0]
     named = [n for row in table.splitlines()[2:] for n in _named(row) if n.isidentifier()]

@@ -49,9 +49,9 @@ ARGUMENTS = {
     "web_scene.py": ["scene.html"],
 }
 
-#: Those that serve, which write no picture: tests/web/test_served_examples.py runs them.
+#: Those that serve, which write no picture: tests/extensions/web/test_served_examples.py runs them.
 SERVING = ["serve.py", "trame_app.py"]
-#: Those for several processes: tests/insitu/test_mpi.py runs them.
+#: Those for several processes: tests/extensions/insitu/test_mpi.py runs them.
 PARALLEL = ["insitu.py"]
 
 
@@ -173,7 +173,7 @@ def test_tradeoff_example_draws_its_three_fronts(tmp_path):
     ],
 )
 def test_a_page_is_written(name, said, written, tmp_path):
-    """It opens again in there; tests/web look at such pages in a browser."""
+    """It opens again in there; tests/extensions/web look at such pages in a browser."""
     printed, target = run_example(name, tmp_path)
     assert said in printed
     assert written in target.read_bytes()

@@ -230,7 +230,7 @@ class Page:
             where = f"bytes {begin}-{begin + len(sent) - 1}/{len(content)}"
             route.fulfill(status=206, body=sent, headers={"Content-Range": where})
             return
-        module = resources.files("pyvista_vdi.web") / "viewer" / name
+        module = resources.files("pyvista_vdi.extensions.web") / "viewer" / name
         if content is None and name.endswith(".js") and module.is_file():
             content = module.read_text(encoding="utf-8")
         if content is None:

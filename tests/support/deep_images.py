@@ -6,9 +6,9 @@ import struct
 
 import numpy as np
 
-from pyvista_vdi.io.deep_exr import layout
-from pyvista_vdi.io.deep_exr.record import ATTRIBUTE
-from pyvista_vdi.io.deep_exr.view import view_matrices
+from pyvista_vdi.extensions.deep_exr import layout
+from pyvista_vdi.extensions.deep_exr.record import ATTRIBUTE
+from pyvista_vdi.extensions.deep_exr.view import view_matrices
 
 MATRICES = ("worldToCamera", "worldToNDC")
 

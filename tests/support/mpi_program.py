@@ -1,4 +1,4 @@
-"""What ``tests/insitu/test_mpi.py`` runs on several ranks, by the names of cases and a folder."""
+"""What ``tests/extensions/insitu/test_mpi.py`` runs on ranks: names of cases, and a folder."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from pyvista_vdi.errors import (
     VDIError,
     VDIFileError,
 )
-from pyvista_vdi.insitu import InSitu
-from pyvista_vdi.large.on_mpi import generate_on_mpi
+from pyvista_vdi.extensions.insitu import InSitu
+from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi
 from pyvista_vdi.model.grid import Grid
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.series import layout
+from pyvista_vdi.extensions.series import layout
 
 SIZE = (24, 14)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pyvista_vdi.series.layout import HEADER_BYTES, STEP, FrameHeader
+from pyvista_vdi.extensions.series.layout import HEADER_BYTES, STEP, FrameHeader
 
 
 def frames_of(data):

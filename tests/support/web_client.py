@@ -1,4 +1,4 @@
-"""A client of ``pyvista_vdi.web.serve`` that is no browser."""
+"""A client of ``pyvista_vdi.extensions.web.serve`` that is no browser."""
 
 from __future__ import annotations
 

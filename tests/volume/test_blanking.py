@@ -9,8 +9,8 @@ from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
 from pyvista_vdi import AmbientOcclusion, InvalidVolumeError, Volume, reference, render_volume
 from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.extensions.large.generate import generate_chunked
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.large.generate import generate_chunked
 from pyvista_vdi.model.chunked import ChunkedArray
 
 

@@ -12,7 +12,7 @@ from watched_windows import MOVING, finish, frame, frames_until, picture_of, thr
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.sets import generate, shower
+from pyvista_vdi.extensions.sets import generate, shower
 
 GROWTH = "set's growth"
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, warn_external
+from pyvista_vdi.extensions.series.player import Player
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
-from pyvista_vdi.series.player import Player
-from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.series.player import RATE, Player
-from pyvista_vdi.series.series import VDISeries
+from pyvista_vdi.extensions.series.player import RATE, Player
+from pyvista_vdi.extensions.series.series import VDISeries
 
 
 class PlayingMethods:
-    """Mixed into what shows a VDI; see :class:`pyvista_vdi.series.player.Player`."""
+    """Mixed into what shows a VDI; see :class:`pyvista_vdi.extensions.series.player.Player`."""
 
     @property
     def series(self: Any) -> VDISeries | None:

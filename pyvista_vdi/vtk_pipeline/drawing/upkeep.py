@@ -12,6 +12,8 @@ from typing import Any, Literal
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
+from pyvista_vdi.extensions.series.player import Player
+from pyvista_vdi.extensions.sets.shower import SetShower
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import TRIAL_SIZE
@@ -25,8 +27,6 @@ from pyvista_vdi.quality.view_error import (
 )
 from pyvista_vdi.quality.ways import Ways
 from pyvista_vdi.quality.worker import Job, Worker
-from pyvista_vdi.series.player import Player
-from pyvista_vdi.sets.shower import SetShower
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SeriesInput, SetInput, SourceInput

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
+from pyvista_vdi.extensions.series.reader import StepsReader, is_series_file
+from pyvista_vdi.extensions.series.reader import read as read_series
+from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import picture_size
-from pyvista_vdi.series.reader import StepsReader, is_series_file
-from pyvista_vdi.series.reader import read as read_series
-from pyvista_vdi.series.series import VDISeries
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     Algorithm,
     accessors,

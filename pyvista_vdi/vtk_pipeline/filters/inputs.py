@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.extensions.series.player import Player
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.sets.shower import SetShower
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.series.player import Player
-from pyvista_vdi.series.series import VDISeries
-from pyvista_vdi.sets.shower import SetShower
-from pyvista_vdi.sets.vdi_set import VDISet
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource

@@ -1,7 +1,8 @@
 """``VDISource`` in a VTK program of several MPI ranks, each of which has a part of the volume.
 
 Every rank asks for a block of its own, takes it from whoever has its points, and the ranks make the
-VDI together by :func:`pyvista_vdi.large.on_mpi.generate_on_mpi`. A VDI is small: all get it.
+VDI together by :func:`pyvista_vdi.extensions.large.on_mpi.generate_on_mpi`. A VDI is small: all
+get it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIError,
 )
-from pyvista_vdi.large.on_mpi import generate_on_mpi, mpi, require_same, together
+from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi, mpi, require_same, together
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.vdi import VDI

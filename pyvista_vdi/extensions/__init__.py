@@ -1,0 +1,1 @@
+"""What is built on the core: each folder can be deleted, and the core goes on."""

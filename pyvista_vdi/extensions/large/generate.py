@@ -1,0 +1,186 @@
+"""A chunked volume to a VDI on the local device, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, Indices
+from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.extensions.large.reading import Plan
+from pyvista_vdi.generation.generate import Progress, made_from, report
+from pyvista_vdi.generation.list_arrays import require_room
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.chunked import ChunkedArray, Ranges
+from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+
+#: Blocks that would fit into a limit of memory: beside one there are lists, and its halo.
+_BLOCKS_IN_LIMIT = 4
+#: Where a block is of which V_O sees nothing.
+NOWHERE = Rectangle(0, 0, 0, 0)
+
+
+def task_of(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    options: GenerationOptions,
+    chunks: Sequence[int],
+    block_bytes: int | None = None,
+) -> Task:
+    """Return a VDI's task."""
+    width, height = check_window_size(window_size)
+    require_room(0, (width, height))
+    if volume.blanked is not None:
+        raise UnsupportedError(
+            f"the volume {volume.name!r} has blank points or cells, which volumes in blocks "
+            "cannot have: write NaN there, or leave client out"
+        )
+    point_bytes = volume.array.dtype.itemsize * (4 if volume.rgba else 1)
+    most = block_bytes or BLOCK_BYTES
+    if options.memory_limit is not None:
+        most = min(most, options.memory_limit // _BLOCKS_IN_LIMIT)
+    blocks = Blocks.of(volume, chunks, point_bytes, most)
+    gradients = transfer_function.gradient_opacities is not None
+    scalars = volume.finite_range() if gradients else (np.nan, np.nan)  # nothing else asks
+    camera = Camera.from_any(camera)
+    return Task.of(blocks, camera, (width, height), transfer_function, options, scalars)
+
+
+def vdi_of(
+    task: Task,
+    volume: Volume,
+    rows: Sequence[Rows],
+    device_name: str,
+    counted: Mapping[str, int],
+    metadata: Mapping[str, Any] | None,
+) -> VDI:
+    """Return the VDI of finished rows, from the lowest to the highest.
+
+    ``counted``: the points that were read of the volume, again where they were, and the runs of
+    all blocks together.
+    """
+    offsets = np.zeros(task.size[0] * task.size[1] + 1, np.uint64)
+    np.cumsum(np.concatenate([part.lengths for part in rows]), out=offsets[1:])
+    front, back, color, optical_depth = (
+        np.concatenate([part[k] for part in rows]) for k in range(1, len(Rows._fields))
+    )
+    rays = task.rays()
+    depth_origin = rays.forms(task.camera, task.size).rays.reference_depth
+    made_by = made_from(volume, task.transfer_function, task.options, rays, device_name)
+    return VDI(
+        task.camera,
+        task.size,
+        offsets,
+        front,
+        back,
+        color,
+        optical_depth,
+        task.blocks.grid.bounds,
+        depth_origin=depth_origin,
+        metadata={
+            **made_by,
+            "blocks": list(task.blocks.counts),
+            **counted,
+            **(metadata or {}),
+        },
+    ).with_precision(task.options.precision)
+
+
+def chunks_of(volume: Volume, chunks: Sequence[int] | None) -> Sequence[int]:
+    """Return where blocks of a volume may be cut."""
+    if chunks is not None:
+        return chunks
+    if volume.chunks is not None:
+        return volume.chunks.chunks
+    raise InvalidArgumentError(f"the volume {volume.name!r} is not chunked: give chunks")
+
+
+def known_ranges(volume: Volume, task: Task) -> Ranges | None:
+    """Return the least and the largest scalar of each chunk, if they are known."""
+    array = _with_ranges(volume, task)
+    return None if array is None else array.ranges()
+
+
+def keep_ranges(volume: Volume, task: Task, seen: Mapping[Indices, Seen]) -> None:
+    """Keep what the first pass has found beside the store, so that nothing unseen is read again."""
+    array = _with_ranges(volume, task)
+    if array is not None:
+        ranges = {block: found.ranges for block, found in seen.items()}
+        array.keep_ranges(*task.blocks.to_chunks(ranges))
+
+
+def _with_ranges(volume: Volume, task: Task) -> ChunkedArray | None:
+    """Return the volume's array if its chunks are the task's: ranges are kept of no others."""
+    array = volume.chunks
+    return array if array is not None and array.chunks == task.blocks.chunks else None
+
+
+def generate_chunked(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    options: GenerationOptions | None = None,
+    *,
+    device: Any = None,
+    progress: Progress | None = None,
+    metadata: Mapping[str, Any] | None = None,
+    chunks: Sequence[int] | None = None,
+    block_bytes: int | None = None,
+    **changes: Any,
+) -> VDI:
+    """Make a VDI of a volume block by block, each of which is read twice.
+
+    Parameters are those of :func:`~pyvista_vdi.generation.generate.generate_vdi`, and:
+
+    chunks : (int, int, int), optional
+        Where blocks may be cut: points along z, y and x; the array's own by default.
+    block_bytes : int, optional
+        Most bytes of a block's points, unless a chunk has more.
+    """
+    options = GenerationOptions.of(options, changes)
+    chunks = chunks_of(volume, chunks)
+    task = task_of(volume, camera, window_size, transfer_function, options, chunks, block_bytes)
+    blocks, halo = task.blocks, task.halo
+    windows = blocks.windows(task.camera, task.size)
+    report(progress, 0.0)
+    seen: dict[Indices, Seen] = {}
+    known = known_ranges(volume, task)
+    order = task.to_read(windows, known)
+    reading = Plan.of(task, volume.array, known)
+    for k, block in enumerate(order):
+        window = windows.get(block, NOWHERE)
+        seen[block] = task.first_pass(block, reading.read(block)(), window, device)
+        report(progress, 0.4 * (k + 1) / len(order))
+    if known is None and len(seen) == len(blocks):
+        keep_ranges(volume, task, seen)
+    ambient = (
+        task.ambient([each.opacities for each in seen.values()], device) if task.occlusion else None
+    )
+    pieces: list[Piece] = []
+    entering = light_entering(task, windows, seen)
+    for k, (block, light) in enumerate(entering.items()):
+        parts = {
+            offset: halo.from_slabs(seen[other].slabs, offset)
+            for offset, other in blocks.neighbours(block, halo).items()
+        }
+        values = blocks.with_halo(reading.read(block)(), parts, halo)
+        pieces.append(task.second_pass(block, values, windows[block], light, device, ambient))
+        report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
+    rows = task.merge(0, task.size[1], pieces, device)
+    report(progress, 1.0)
+    counted = {
+        "points_read": sum(reading.read(block).points for block in [*order, *entering]),
+        "runs_merged": sum(len(piece.runs) for piece in pieces),
+    }
+    return vdi_of(task, volume, [rows], get_runtime(device).info.name, counted, metadata)

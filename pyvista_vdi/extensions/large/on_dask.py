@@ -1,0 +1,587 @@
+"""A chunked volume to a VDI on the workers of a Dask cluster.
+
+The client submits tasks and sums up the light; values, lists and rows stay with the workers and go
+from one to the other. Every task is a function of its arguments, so that Dask does again what was
+lost with a worker. Which worker did what, and what came first, changes no bit.
+"""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+from distributed import (
+    CancelledError,
+    Client,
+    Future,
+    KilledWorker,
+    Worker,
+    as_completed,
+    get_worker,
+    wait,
+)
+from distributed.protocol.pickle import dumps, loads
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.errors import (
+    Cancelled,
+    DeviceError,
+    DeviceMemoryError,
+    InvalidVolumeError,
+    NoDeviceError,
+    VDIError,
+    VDIFileError,
+    warn_external,
+)
+from pyvista_vdi.extensions.large.blocks import Indices, Values, ends_of
+from pyvista_vdi.extensions.large.generate import (
+    NOWHERE,
+    chunks_of,
+    keep_ranges,
+    known_ranges,
+    task_of,
+    vdi_of,
+)
+from pyvista_vdi.extensions.large.passes import Opacities, Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.extensions.large.reading import Plan, Read
+from pyvista_vdi.extensions.large.rows import balanced
+from pyvista_vdi.generation.generate import Progress, report
+from pyvista_vdi.io.store_identity import StoreIdentity, check_once, identity_of
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.chunked import ChunkedArray
+from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+
+#: Share of the workers' memory that values may take which are kept from the first pass to the
+#: second; otherwise they are read again.
+_SHARE_FOR_VALUES = 0.25
+#: Errors that keep their type where they say which block they are of.
+_OURS = (DeviceMemoryError, InvalidVolumeError, NoDeviceError, VDIFileError)
+#: Times that Dask tries again what a lost worker was at.
+_RETRIES = 3
+#: Seconds after which is looked whether the only workers that may do something are still there.
+_LOOK_EVERY = 5.0
+#: Ranges of rows for each worker, so that one with more to do does not keep all others waiting.
+RANGES_PER_WORKER = 4
+#: Shares of the two passes and of the merging in what is reported.
+_SHARES = (0.4, 0.4, 0.2)
+#: A worker's threads do one block after the other: a block's memory is needed once.
+_one_block = threading.Lock()
+
+
+def generate_on_dask(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    options: GenerationOptions | None = None,
+    *,
+    client: Client,
+    workers: Sequence[str] | None = None,
+    device: Any = None,
+    progress: Progress | None = None,
+    metadata: Mapping[str, Any] | None = None,
+    chunks: Sequence[int] | None = None,
+    block_bytes: int | None = None,
+    **changes: Any,
+) -> VDI:
+    """Make a VDI of a chunked volume on the workers of a cluster.
+
+    Parameters are those of :func:`~pyvista_vdi.extensions.large.generate.generate_chunked`, and:
+
+    client : distributed.Client
+        Of the cluster. ``device`` is a selector that each worker understands.
+    workers : sequence of str, optional
+        Addresses of those that may be taken; all by default.
+
+    Raises
+    ------
+    NoDeviceError
+        If no worker has an OpenCL device.
+    InvalidVolumeError
+        If a worker does not find the volume's files, or others than this process; the message names
+        it.
+    DeviceError
+        If a block could not be made; the message names it.
+    Cancelled
+        If ``progress`` returned ``False``.
+
+    Warns
+    -----
+    VDIWarning
+        If some workers have no device: they do nothing.
+    """
+    options = GenerationOptions.of(options, changes)
+    able = _workers_with_device(client, device, workers)
+    chunks = chunks_of(volume, chunks)
+    task = task_of(volume, camera, window_size, transfer_function, options, chunks, block_bytes)
+    run = _Run(client, task, volume, list(able), device, progress)
+    try:
+        rows = run.rows()
+    except BaseException:
+        run.cancel()
+        raise
+    names = sorted(set(able.values()))
+    return vdi_of(task, volume, rows, ", ".join(names), run.counted, metadata)
+
+
+class _Run:
+    """One generation: its futures, and what is known of it."""
+
+    def __init__(
+        self,
+        client: Client,
+        task: Task,
+        volume: Volume,
+        workers: list[str],
+        device: Any,
+        progress: Progress | None,
+    ) -> None:
+        self._client, self._task, self._volume = client, task, volume
+        self._workers, self._device, self._progress = workers, device, progress
+        self._token = uuid.uuid4().hex[:12]
+        self._futures: list[Future[Any]] = []
+        # A worker that is started again has another address: tasks are tied to some only where
+        # others may not do them. (Not asked of `scheduler_info`, whose answer the client replaces
+        # now and then by one without workers, from another thread.)
+        some = {"workers": workers, "allow_other_workers": False}
+        self._where: dict[str, Any] = some if len(workers) < len(client.nthreads()) else {}
+        limits = client.run(_memory_limit, workers=workers, on_error="ignore")
+        memory = sum(limit or np.inf for limit in limits.values())
+        self._sent = self._array_for_workers()
+        self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
+        self._done = 0.0
+        self.counted: dict[str, int] = {}
+
+    def rows(self) -> list[Rows]:
+        """Return the finished lists, from the lowest rows to the highest."""
+        task, blocks, halo = self._task, self._task.blocks, self._task.halo
+        report(self._progress, 0.0)
+        windows = blocks.windows(task.camera, task.size)
+        known = known_ranges(self._volume, task)
+        order = task.to_read(windows, known)
+        chunks = self._volume.chunks
+        lazy = chunks is not None and chunks.lazy is not None  # Dask knows what it computes
+        reading = Plan.of(task, self._sent, None if lazy else known)
+        reads = {block: reading.read(block) for block in order}
+        values = self._values(reads)
+        in_window = [windows.get(block, NOWHERE) for block in order]
+        first = self._mapped(
+            "first-pass", order, self._bound(_first_pass), order, values.values(), in_window
+        )
+        seen = self._gathered("seen", first, _without_slabs, _SHARES[0])
+        if known is None and len(seen) == len(blocks):
+            self._check_ranges(seen)
+            keep_ranges(self._volume, task, seen)
+        entering = light_entering(task, windows, seen)
+        ambient: list[Any] = [None] * len(entering)
+        if task.occlusion is not None:
+            parts = self._mapped("opacities", order, _opacities, first.values())
+            columns = ([part] for part in parts.values())
+            (found,) = self._mapped("ambient", [()], self._bound(_ambient), *columns).values()
+            ambient = [found] * len(entering)
+        again = () if self._kept else entering
+        self.counted["points_read"] = sum(reads[block].points for block in [*order, *again])
+        around = [blocks.neighbours(block, halo) for block in entering]
+        pieces = self._mapped(
+            "second-pass",
+            entering,
+            self._bound(_second_pass),
+            entering,
+            [values[block] for block in entering],
+            [windows[block] for block in entering],
+            entering.values(),
+            ambient,
+            *([first.get(found.get(at)) for found in around] for at in halo.offsets()),
+        )
+        del values, seen
+        lengths = self._gathered("lengths", pieces, _lengths, _SHARES[1])
+        first.clear()
+        self.counted["runs_merged"] = int(sum(many.sum() for many in lengths.values()))
+        return self._merged(windows, pieces, lengths)
+
+    def cancel(self) -> None:
+        """Give up what has not been done."""
+        self._client.cancel(self._futures, force=True)
+
+    def _values(self, reads: Mapping[Indices, Read]) -> dict[Indices, Any]:
+        """Return blocks' points, as futures where they are kept, or what reads them."""
+        array = self._volume.chunks
+        if array is None:
+            return {block: read().copy() for block, read in reads.items()}  # go with the tasks
+        if array.lazy is not None:
+            futures = self._client.compute(
+                [array.lazy[r.box] for r in reads.values()], **self._where
+            )
+            return dict(zip(reads, futures, strict=True))
+        if not self._kept:
+            return dict(reads)
+        return self._mapped("read", reads, partial(_read, self._task), reads, reads.values())
+
+    def _array_for_workers(self) -> Any:
+        """Return the array as it goes to workers, each of which has shown that it has its files."""
+        array = self._volume.chunks
+        if array is None:
+            return self._volume.array
+        if array.lazy is not None:
+            for identity in _identities_in(array.lazy):
+                self._require_files(identity)
+            return array
+        own = array.identity()
+        if own is not None:
+            self._require_files(own)
+        return _Sent(array, own, self._token)
+
+    def _require_files(self, identity: StoreIdentity) -> None:
+        answers = self._client.run(_wrong_with, identity, workers=self._workers, on_error="return")
+        failed = {at: error for at, error in answers.items() if error is not None}
+        if failed:
+            at, error = next(iter(failed.items()))
+            raise InvalidVolumeError(
+                f"{len(failed)} of {len(answers)} workers do not read what this process does; "
+                f"worker {at}: {error}"
+            )
+
+    def _check_ranges(self, seen: Mapping[Indices, Seen]) -> None:
+        """Read a chunk of the widest range and one of the narrowest here, too, before all are kept.
+
+        Raises
+        ------
+        InvalidVolumeError
+            If they hold other values here.
+        """
+        array, blocks = self._volume.chunks, self._task.blocks
+        if array is None or array.lazy is not None:
+            return
+        widths = {block: found.ranges[1] - found.ranges[0] for block, found in seen.items()}
+        for choose in (np.nanmax, np.nanmin):
+            known = {at: choose(width) for at, width in widths.items() if np.isfinite(width).any()}
+            if not known:
+                return
+            block = max(known, key=lambda at: known[at] if choose is np.nanmax else -known[at])
+            low, high = seen[block].ranges
+            at = np.unravel_index(np.nanargmax(widths[block] == known[block]), low.shape)
+            box = tuple(
+                slice(part.start + k * n, min(part.start + (k + 1) * n, part.stop))
+                for part, k, n in zip(blocks.own(block), at, blocks.chunks, strict=True)
+            )
+            here = ends_of(array[box])
+            if here != (low[at], high[at]):
+                raise InvalidVolumeError(
+                    f"{_named(self._task, block)}: the workers read values from {low[at]} to "
+                    f"{high[at]} where this process reads {here[0]} to {here[1]} in "
+                    f"{array.source}: all must have the same files, which stay as they are"
+                )
+
+    def _bound(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        return partial(function, self._task, self._device)
+
+    def _mapped(
+        self,
+        name: str,
+        places: Iterable[tuple[int, ...]],
+        function: Callable[..., Any],
+        *columns: Iterable[Any],
+        priority: int = 0,
+    ) -> dict[Any, Future[Any]]:
+        """Submit a function of each place's arguments, all of them as one graph."""
+        at = list(places)
+        futures = self._client.map(
+            function,
+            *map(list, columns),
+            key=[(f"{name}-{self._token}", *place) for place in at],
+            retries=_RETRIES,
+            pure=False,
+            priority=priority,
+            **self._where,
+        )
+        self._futures += futures
+        return dict(zip(at, futures, strict=True))
+
+    def _gathered(
+        self,
+        name: str,
+        futures: Mapping[Indices, Future[Any]],
+        function: Callable[[Any], Any],
+        share: float,
+    ) -> dict[Indices, Any]:
+        """Return what a function makes of each block's result, as they come."""
+        mapped = self._mapped(name, futures, function, futures.values())
+        parts = {future: block for block, future in mapped.items()}
+        found = {}
+        for future in self._completed(parts):
+            found[parts[future]] = self._result(future, parts[future])
+            self._report(share / len(parts))
+        return found
+
+    def _merged(
+        self,
+        windows: Mapping[Indices, Rectangle],
+        pieces: Mapping[Indices, Future[Any]],
+        lengths: Mapping[Indices, NDArray[np.int64]],
+    ) -> list[Rows]:
+        height = self._task.size[1]
+        of_rows = np.zeros(height, np.int64)
+        for block, many in lengths.items():
+            window = windows[block]
+            of_rows[window.y0 : window.y1] += many
+        ranges = list(balanced(of_rows, RANGES_PER_WORKER * len(self._workers)))
+        cut = [
+            (block, y0, y1)
+            for y0, y1 in ranges
+            for block in pieces
+            if windows[block].y0 < y1 and windows[block].y1 > y0
+        ]
+        rows = self._mapped(
+            "rows",
+            [(*block, y0) for block, y0, _ in cut],
+            _rows,
+            [pieces[block] for block, _, _ in cut],
+            *zip(*(ends for _, *ends in cut), strict=True),
+        )
+        of_ranges: dict[int, list[Future[Any]]] = {y0: [] for y0, _ in ranges}
+        for block, y0, _ in cut:
+            of_ranges[y0].append(rows[(*block, y0)])
+        # Merged rows need less memory than pieces: before the next range is cut
+        mapped = self._mapped(
+            "merge",
+            ranges,
+            self._bound(_merge),
+            ranges,
+            *zip_longest(*of_ranges.values()),
+            priority=1,
+        )
+        merged = {future: y0 for (y0, _), future in mapped.items()}
+        found: dict[int, Rows] = {}
+        for future in self._completed(merged):
+            found[merged[future]] = self._result(future, (merged[future],))
+            self._report(_SHARES[2] / len(merged))
+        return [found[y0] for y0 in sorted(found)]
+
+    def _completed(self, futures: Collection[Future[Any]]) -> Iterator[Future[Any]]:
+        """Yield futures as they are done, as long as there are workers that may do them."""
+        if not self._where:
+            yield from as_completed(futures)
+            return
+        pending = set(futures)
+        while pending:
+            try:
+                done, pending = wait(pending, _LOOK_EVERY, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                self._require_workers()
+                continue
+            yield from done
+
+    def _require_workers(self) -> None:
+        if not set(self._client.nthreads()) & set(self._workers):
+            raise DeviceError(
+                f"the workers that may make the VDI are gone: {', '.join(self._workers)}"
+            )
+
+    def _value(self, future: Future[Any]) -> Any:
+        """Return what a future that was done holds, made again if it was lost meanwhile."""
+        while self._where:
+            try:
+                return future.result(timeout=_LOOK_EVERY)
+            except TimeoutError:
+                self._require_workers()
+        return future.result()
+
+    def _result(self, future: Future[Any], at: tuple[int, ...]) -> Any:
+        try:
+            return self._value(future)
+        except KilledWorker as error:
+            raise DeviceError(
+                f"{_named(self._task, at)} could not be made: the workers that were at it died, "
+                f"{_RETRIES + 1} in all (of too little memory, mostly): give workers more memory, "
+                f"or store the volume in smaller chunks; {error}"
+            ) from error
+        except (VDIError, CancelledError):
+            raise
+        except Exception as error:  # of whoever reads: it does not know what for
+            raise DeviceError(
+                f"{_named(self._task, at)} could not be made: {type(error).__name__}: {error}"
+            ) from error
+
+    def _report(self, share: float) -> None:
+        self._done = min(self._done + share, 1.0)
+        report(self._progress, self._done)
+
+
+def _workers_with_device(
+    client: Client, device: Any, workers: Sequence[str] | None
+) -> dict[str, str]:
+    """Return the device of each worker that has one; warn of the others."""
+    answers = client.run(
+        _device_name, device, workers=None if workers is None else list(workers), on_error="return"
+    )
+    if not answers:
+        raise NoDeviceError("the cluster has no workers: start some, or wait for them")
+    without = {at: answer for at, answer in answers.items() if not isinstance(answer, str)}
+    names = "; ".join(f"{at}: {answer}" for at, answer in without.items())
+    if len(without) == len(answers):
+        raise NoDeviceError(f"no worker of the cluster has an OpenCL device: {names}")
+    if without:
+        warn_external(
+            f"{len(without)} of {len(answers)} workers have no OpenCL device and do nothing: "
+            f"{names}"
+        )
+    return {at: name for at, name in answers.items() if at not in without}
+
+
+def _wrong_with(identity: StoreIdentity) -> str | None:
+    """Return what is wrong with a worker's files, if anything is."""
+    try:
+        identity.check()
+    except InvalidVolumeError as error:
+        return str(error)
+    return None
+
+
+def _device_name(device: Any) -> str:
+    return get_runtime(device).info.name
+
+
+def _memory_limit(dask_worker: Worker) -> int | None:
+    """Return how many bytes a worker may take; Dask hands it in by the parameter's name."""
+    return dask_worker.memory_manager.memory_limit
+
+
+class _Sent:
+    """A chunked array on its way to workers: unpickled where a part is read.
+
+    Dask waits for ever where arguments cannot be unpickled, as arrays of files that are not there.
+
+    Parameters
+    ----------
+    array : ChunkedArray
+        The array.
+    identity : StoreIdentity, optional
+        Of its files, if there are any.
+    run : str
+        Tells one generation from the next.
+    """
+
+    def __init__(self, array: ChunkedArray, identity: StoreIdentity | None, run: str) -> None:
+        self.dtype, self._array = array.dtype, dumps(array)
+        self._identity, self._run = identity, run
+
+    def __getitem__(self, box: tuple[slice, ...]) -> Values:
+        if self._identity is not None:
+            check_once(self._identity, self._run)
+            self._identity.check_chunks(box)
+        try:
+            array: ChunkedArray = loads(self._array)
+        except Exception as error:
+            raise InvalidVolumeError(
+                f"the volume's array cannot be opened there ({type(error).__name__}: {error}): "
+                "each worker needs the library that reads it, and the right to read its files"
+            ) from error
+        return array[box]
+
+
+def _identities_in(lazy: Any) -> list[StoreIdentity]:
+    """Return what tells the files of arrays in a Dask graph from others."""
+    layers = getattr(lazy.dask, "layers", {}).values()
+    found = (identity_of(value) for layer in layers if len(layer) == 1 for value in layer.values())
+    return [identity for identity in found if identity is not None]
+
+
+# What follows runs on workers
+
+
+def _read(task: Task, block: Indices, read: Read) -> Values:
+    with _naming(task, block):
+        return read()
+
+
+def _first_pass(task: Task, device: Any, block: Indices, values: Any, window: Rectangle) -> Seen:
+    with _at(task, block):
+        return task.first_pass(block, _at_hand(values), window, device)
+
+
+def _second_pass(
+    task: Task,
+    device: Any,
+    block: Indices,
+    values: Any,
+    window: Rectangle,
+    light: NDArray[np.float16],
+    ambient: NDArray[np.float32] | None,
+    *around: Seen | None,
+) -> Piece:
+    with _at(task, block):
+        halo = task.halo
+        neighbours = zip(halo.offsets(), around, strict=True)
+        parts = {at: halo.from_slabs(seen.slabs, at) for at, seen in neighbours if seen is not None}
+        whole = task.blocks.with_halo(_at_hand(values), parts, halo)
+        return task.second_pass(block, whole, window, light, device, ambient)
+
+
+def _rows(piece: Piece, y0: int, y1: int) -> Piece:
+    part = piece.rows(y0, y1)
+    return part._replace(runs=part.runs.copy())
+
+
+def _merge(task: Task, device: Any, at: tuple[int, int], *pieces: Piece | None) -> Rows:
+    with _at(task, at):
+        return task.merge(*at, [piece for piece in pieces if piece is not None], device)
+
+
+def _without_slabs(seen: Seen) -> Seen:
+    return seen._replace(slabs={}, opacities=None)
+
+
+def _opacities(seen: Seen) -> Opacities | None:
+    return seen.opacities
+
+
+def _ambient(task: Task, device: Any, *opacities: Opacities | None) -> NDArray[np.float32]:
+    with _at(task, ()):
+        return task.ambient(opacities, device)
+
+
+def _lengths(piece: Piece) -> NDArray[np.int64]:
+    return piece.counts.sum(axis=1, dtype=np.int64)
+
+
+def _at_hand(values: Any) -> Values:
+    found: Values = values() if isinstance(values, Read) else values
+    return found
+
+
+@contextmanager
+def _at(task: Task, at: tuple[int, ...]) -> Iterator[None]:
+    """Do one thing at a time in a process, and say what failed where."""
+    with _naming(task, at), _one_block:
+        yield
+
+
+@contextmanager
+def _naming(task: Task, at: tuple[int, ...]) -> Iterator[None]:
+    try:
+        yield
+    except (Cancelled, MemoryError):
+        raise
+    except Exception as error:
+        kind = type(error) if isinstance(error, _OURS) else DeviceError
+        raise kind(f"{_named(task, at)} on worker {get_worker().address}: {error}") from error
+
+
+def _named(task: Task, at: tuple[int, ...]) -> str:
+    if not at:
+        return "the VDI's ambient occlusion"
+    if len(at) < 3:
+        return f"rows {at[0]} and following of the VDI"
+    box = ", ".join(f"{part.start}:{part.stop}" for part in task.blocks.own((at[0], at[1], at[2])))
+    return f"block {at[:3]} (points [{box}] of the volume)"

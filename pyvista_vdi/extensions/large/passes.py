@@ -1,0 +1,548 @@
+"""What is done for a block, and for rows of lists: wherever it is done, by the same functions.
+
+The first pass finds each ray's optical depth in each block. Behind the sums of these, in the order
+in which V_O sees the blocks, the second pass knows the light that enters a block, and makes lists
+whose merge errors count as they do in one piece. Rows of all blocks' lists are then put behind each
+other, and merged to the budget.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.device.buffers import bytes_text
+from pyvista_vdi.device.constants import RUN_WORDS
+from pyvista_vdi.device.work_order import Rectangle, block_items
+from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.extensions.large.blocks import Blocks, Ends, Halo, Indices, Values, ends_of
+from pyvista_vdi.generation.list_arrays import growing_lists
+from pyvista_vdi.generation.march import March
+from pyvista_vdi.generation.merge import Merge
+from pyvista_vdi.generation.pack import Pack
+from pyvista_vdi.generation.records import Records
+from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
+from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.chunked import Ranges
+from pyvista_vdi.model.float32_limits import held_unit_distance
+from pyvista_vdi.model.options import GenerationOptions, MediumOptions
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.volume.classified_volume import (
+    DeviceVolume,
+    GridRays,
+    checked_sample_distance,
+)
+from pyvista_vdi.volume.grid_part import GridPart
+from pyvista_vdi.volume.march_step import march_step
+from pyvista_vdi.volume.occlusion_grid import ambient_of_opacities
+
+Opacities = tuple[tuple[int, int, int], NDArray[np.float32]]
+
+#: Most bytes of the grid of ambient occlusion, which is not cut into blocks.
+_MOST_OCCLUSION = 2**31
+#: Light of which nothing is told apart any more, as an optical depth.
+_DARK = 80.0
+
+
+class Seen(NamedTuple):
+    """What the first pass finds of a block.
+
+    Attributes
+    ----------
+    depths : numpy.ndarray or None
+        Optical depth of each ray of the block's window, float16 (rows, columns); ``None`` where
+        the block is transparent.
+    slabs : dict
+        What neighbours need of its points, by axis (z, y, x) and side.
+    ends : dict
+        Least and largest scalar of each slab, and by ``None`` of all its own points; NaN left out,
+        and where there is nothing else.
+    ranges : (numpy.ndarray, numpy.ndarray)
+        Least and largest scalar of each of its chunks, float64.
+    opacities : ((int, int, int), numpy.ndarray) or None
+        Where there is ambient occlusion: the first node along x, y and z, and what the block has of
+        the opacities of nodes from it on, float32 (nz, ny, nx); ``None`` where that is nothing.
+    """
+
+    depths: NDArray[np.float16] | None
+    slabs: dict[tuple[int, int], Values]
+    ends: dict[tuple[int, int] | None, Ends]
+    ranges: Ranges
+    opacities: Opacities | None = None
+
+
+class Piece(NamedTuple):
+    """Lists of a block's rays, or of some rows of them.
+
+    Attributes
+    ----------
+    window : Rectangle
+        Which lists of V_O's window they are.
+    counts : numpy.ndarray
+        Runs of each list, uint16 (rows, columns).
+    runs : numpy.ndarray
+        The runs of ``generation/runs.cl``, list by list, float32 (n, 8).
+    """
+
+    window: Rectangle
+    counts: NDArray[np.uint16]
+    runs: NDArray[np.float32]
+
+    def rows(self, y0: int, y1: int) -> Piece:
+        """Return the lists in rows y0 to y1 - 1 of V_O's window."""
+        window = self.window
+        y0, y1 = min(max(y0, window.y0), window.y1), max(min(y1, window.y1), window.y0)
+        y1 = max(y0, y1)
+        of_rows = self.counts.sum(axis=1, dtype=np.int64)
+        first = int(of_rows[: y0 - window.y0].sum())
+        last = first + int(of_rows[y0 - window.y0 : y1 - window.y0].sum())
+        counts = self.counts[y0 - window.y0 : y1 - window.y0]
+        return Piece(window._replace(y0=y0, y1=y1), counts, self.runs[first:last])
+
+
+class Rows(NamedTuple):
+    """Finished lists of whole rows: their lengths, and a VDI's arrays of them."""
+
+    lengths: NDArray[np.uint32]
+    front: NDArray[np.float32]
+    back: NDArray[np.float32]
+    color: NDArray[np.float32]
+    optical_depth: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A VDI that is to be made in blocks: all that whoever does a part of it needs to know.
+
+    Attributes
+    ----------
+    blocks : Blocks
+        The grid, and how it is cut.
+    camera : Camera
+        V_O.
+    size : (int, int)
+        Lists along its window's width and height.
+    transfer_function : TransferFunction
+        With its unit distance.
+    options : GenerationOptions
+        With the sample distance.
+    scalar_range : (float, float)
+        Of all values.
+    """
+
+    blocks: Blocks
+    camera: Camera
+    size: tuple[int, int]
+    transfer_function: TransferFunction
+    options: GenerationOptions
+    scalar_range: tuple[float, float]
+
+    @classmethod
+    def of(
+        cls,
+        blocks: Blocks,
+        camera: Camera,
+        size: tuple[int, int],
+        transfer_function: TransferFunction,
+        options: GenerationOptions,
+        scalar_range: tuple[float, float],
+    ) -> Task:
+        """Make defaults that follow from the whole grid explicit.
+
+        Raises
+        ------
+        DeviceMemoryError
+            If ambient occlusion is asked for, and its grid is too large to be made in one piece.
+        """
+        grid = blocks.grid
+        if options.ambient_occlusion is not None:
+            asked = options.ambient_occlusion
+            occlusion = OcclusionGrid.of(grid, asked)
+            if occlusion.nbytes > _MOST_OCCLUSION:
+                gib, nodes = occlusion.nbytes / 2**30, " x ".join(map(str, occlusion.nodes))
+                raise DeviceMemoryError(
+                    f"ambient occlusion with a radius of {asked.radius_in(grid)} needs {gib:.1f} "
+                    f"GiB for a grid of {nodes} nodes, of {_MOST_OCCLUSION / 2**30:g} GiB at most: "
+                    "a larger radius takes a coarser grid"
+                )
+        step = checked_sample_distance(grid, options.sample_distance)
+        unit = transfer_function.unit_distance or grid.default_unit_distance
+        return cls(
+            blocks,
+            camera,
+            size,
+            transfer_function.replace(unit_distance=unit),
+            GenerationOptions.of(options, {"sample_distance": step}),
+            scalar_range,
+        )
+
+    @property
+    def halo(self) -> Halo:
+        """What blocks read of their neighbours."""
+        return Halo.of(self.transfer_function)
+
+    @property
+    def occlusion(self) -> OcclusionGrid | None:
+        """The grid on which ambient occlusion is computed, if it is asked for."""
+        asked = self.options.ambient_occlusion
+        return None if asked is None else OcclusionGrid.of(self.blocks.grid, asked)
+
+    def first_pass(
+        self, block: Indices, values: Values, window: Rectangle, device: Any = None
+    ) -> Seen:
+        """Find the optical depths of a block's rays, without its neighbours' points."""
+        slabs = self.halo.slabs(values)
+        ends: dict[tuple[int, int] | None, Ends] = {None: ends_of(values)}
+        ends.update((side, ends_of(slab)) for side, slab in slabs.items())
+        seen = Seen(None, slabs, ends, self.blocks.ranges(values))
+        occlusion = self.occlusion
+        if not (window.pixels or occlusion) or not self.may_be_visible(*seen.ends[None]):
+            return seen
+        runtime = get_runtime(device)
+        volume = self._volume(values)
+        part = self.blocks.part(block, None, self.scalar_range)
+        with _Marched(self, runtime, volume, part, window, lit=False) as marched:
+            if occlusion is not None:
+                seen = seen._replace(opacities=marched.opacities(block, occlusion))
+            if not window.pixels:
+                return seen
+            depths = marched.optical_depths()
+        return seen._replace(depths=depths.astype(np.float16)) if depths.any() else seen
+
+    def ambient(
+        self, opacities: Iterable[Opacities | None], device: Any = None
+    ) -> NDArray[np.float32]:
+        """Return the mean transmittances around the occlusion's nodes, of all blocks' opacities.
+
+        The grid is as coarse as its radius: it is made in one piece.
+        """
+        grid = self.occlusion
+        assert grid is not None
+        of_all = np.zeros(grid.nodes[::-1], np.float32)
+        for (x, y, z), part in filter(None, opacities):
+            nz, ny, nx = part.shape
+            of_all[z : z + nz, y : y + ny, x : x + nx] += part
+        return ambient_of_opacities(get_runtime(device), grid, of_all)
+
+    def second_pass(
+        self,
+        block: Indices,
+        values: Values,
+        window: Rectangle,
+        light: NDArray[np.float16],
+        device: Any = None,
+        ambient: NDArray[np.float32] | None = None,
+    ) -> Piece:
+        """Make the lists of a block, whose points come with their halo.
+
+        ``light``: that which enters it along each ray of its window, 0 to 1; ``ambient``: what
+        :meth:`ambient` returns, where there is occlusion.
+        """
+        runtime = get_runtime(device)
+        part = self.blocks.part(block, self.halo, self.scalar_range)
+        volume = self._volume(values)
+        with _Marched(self, runtime, volume, part, window, ambient=ambient) as marched:
+            return marched.lists(light)
+
+    def merge(self, y0: int, y1: int, pieces: Iterable[Piece], device: Any = None) -> Rows:
+        """Put rows of all blocks' lists behind each other and merge them to the budget.
+
+        ``pieces`` come in the order in which V_O sees the blocks.
+        """
+        return _merged(self, get_runtime(device), y0, y1, [p.rows(y0, y1) for p in pieces])
+
+    def may_be_visible(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
+        """Whether anything between two scalars is not transparent; not where they are NaN."""
+        table = self.transfer_function.opacities
+        first, last = self.transfer_function.scalar_range
+        per_scalar = (len(table) - 1) / (last - first) if last > first else np.inf
+        with np.errstate(invalid="ignore"):
+            at = np.nan_to_num((np.array([low, high], np.float64) - first) * per_scalar)
+        # So much of an entry on either side covers the rounding of scalars, and of their places
+        margin = max(1e-3, 2.4e-7 * len(table))
+        begin = np.clip(np.floor(at[0] - margin), 0, len(table) - 1).astype(int)
+        end = np.clip(np.ceil(at[1] + margin), 0, len(table) - 1).astype(int)
+        before = np.concatenate([[0], np.cumsum(table > 0)])
+        found: NDArray[np.bool_] = (before[end + 1] > before[begin]) & (
+            np.asarray(low) <= np.asarray(high)
+        )
+        return found
+
+    def visible(self, block: Indices, seen: Mapping[Indices, Seen]) -> bool:
+        """Whether anything in a block's cells may be visible, of what the first pass has found.
+
+        Between its last point and a neighbour's first one there is something of both.
+        """
+        if block not in seen:
+            return False
+        ends = [seen[block].ends[None]]
+        for offset, other in self.blocks.neighbours(block, self.halo).items():
+            axis = next(k for k, along in enumerate(offset) if along)
+            if other in seen:
+                ends.append(seen[other].ends[axis, offset[axis]])
+        low, high = zip(*ends, strict=True)
+        return bool(self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)))
+
+    def to_read(
+        self,
+        windows: Mapping[Indices, Rectangle],
+        ranges: Ranges | None,
+    ) -> list[Indices]:
+        """Return the blocks that the first pass must read, in the order in which V_O sees them.
+
+        ``ranges``: least and largest scalar of each chunk, where they are known. A block in the
+        window that may be visible needs its neighbours' points; no others are read.
+        """
+        of_blocks = None if ranges is None else self.blocks.of_chunks(*ranges)
+        wanted = set()
+        # What hides light from what is seen may itself be out of sight
+        for block in windows if self.occlusion is None else self.blocks:
+            around = [block, *self.blocks.neighbours(block, self.halo).values()]
+            if of_blocks is not None:
+                low, high = zip(*(of_blocks[other] for other in around), strict=True)
+                if not self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)):
+                    continue
+            wanted.update(around)
+        return [block for block in self.blocks.in_order(self.camera) if block in wanted]
+
+    def _volume(self, values: Values) -> Volume:
+        grid = self.blocks.grid
+        return Volume(values, grid.spacing, grid.origin, grid.direction, name="block")
+
+    def rays(self) -> GridRays:
+        """Return what rays are marched through, without values."""
+        step = checked_sample_distance(self.blocks.grid, self.options.sample_distance)
+        assert self.transfer_function.unit_distance is not None
+        unit = held_unit_distance(self.transfer_function.unit_distance, step)
+        return GridRays(self.blocks.grid, step, unit)
+
+
+class _Marched:
+    """A block on a device, and the rays through its window."""
+
+    def __init__(
+        self,
+        task: Task,
+        runtime: Runtime,
+        volume: Volume,
+        part: GridPart,
+        window: Rectangle,
+        *,
+        lit: bool = True,
+        ambient: NDArray[np.float32] | None = None,
+    ) -> None:
+        self._task, self._runtime, self._window = task, runtime, window
+        self._size = (window.x1 - window.x0, window.y1 - window.y0)
+        _require_within_limit(task, runtime, volume, self._size)
+        options = MediumOptions.of(task.options, {} if lit else {"ambient_occlusion": None})
+        self._medium = DeviceVolume(
+            runtime, volume, task.transfer_function, options, part=part, ambient=ambient
+        )
+
+    def __enter__(self) -> _Marched:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._runtime.finish()
+
+    def opacities(self, block: Indices, grid: OcclusionGrid) -> Opacities | None:
+        """Return what the block has of the opacities of the occlusion's nodes around it."""
+        ends = self._task.blocks.ends(block)
+        first, nodes = grid.nodes_around(*(tuple(reversed(end)) for end in ends))
+        found = self._medium.part_opacities(grid, first, nodes)
+        return (first, found) if found.any() else None
+
+    def optical_depths(self) -> NDArray[np.float32]:
+        """Return those of the window's rays, (rows, columns)."""
+        task, runtime, medium, window = self._task, self._runtime, self._medium, self._window
+        rays = medium.forms(task.camera, task.size)
+        defines = {**medium.defines, **rays.defines}
+        step = march_step(runtime, "large/optical_depths.cl", "optical_depths", defines)
+        columns, rows = self._size
+        place = (*task.size, window.x0, columns, window.y0, rows)
+        voxel = min(medium.grid.spacing) / medium.sample_distance * (1 + 1e-9)
+        with (
+            runtime.upload(rays.packed(), "rays") as forms,
+            runtime.buffer((rows, columns), name="optical depths") as depths,
+        ):
+            step.launch(
+                runtime,
+                block_items(columns, rows),
+                *medium.medium_arguments(task.camera),
+                forms,
+                np.int32(rays.planes),
+                np.float32(medium.sample_distance),
+                np.float32(medium.unit_distance),
+                *(np.int32(n) for n in place),
+                np.int32(max(1, min(voxel, CHUNK_STEPS))),
+                depths,
+            )
+            return runtime.download(depths)
+
+    def lists(self, light: NDArray[np.float16]) -> Piece:
+        """Return the lists of the window's rays."""
+        task, runtime, medium = self._task, self._runtime, self._medium
+        slices = Slices(runtime, self._size, task.options)
+        counts, runs = [], []
+        with (
+            runtime.upload(light.astype(np.float32), "light that enters") as entering,
+            Records(
+                runtime, medium, task.camera, task.size, slices, task.options, self._window
+            ) as records,
+            March(records, medium, task.camera, entering) as march,
+        ):
+            merge = Merge(records, task.options)
+            for part in slices:
+                records.clear()
+                for chunk in march.chunks(part):
+                    march.advance(part, chunk)
+                    merge.make_room(part, chunk)
+                if task.options.criterion == "least-error":
+                    merge.to_budget(part)
+                of_part, runs_of_part = _downloaded(records, part)
+                counts.append(of_part)
+                runs.append(runs_of_part)
+        return Piece(self._window, np.concatenate(counts), np.concatenate(runs))
+
+
+def _require_within_limit(
+    task: Task, runtime: Runtime, volume: Volume, size: tuple[int, int]
+) -> None:
+    """Raise DeviceMemoryError where a block or rows of all lists are more than may be taken."""
+    limit = task.options.memory_limit
+    if limit is None or not all(size):
+        return
+    own = volume.array.nbytes + Slices(runtime, size, task.options).bytes
+    together = _slices_to_merge(task, runtime, task.size[1])
+    if max(own, together.bytes) > limit:
+        points = " x ".join(map(str, volume.dimensions))
+        raise DeviceMemoryError(
+            f"a block of {points} points takes {bytes_text(own)} with its lists, and "
+            f"{together.rows} rows of {task.size[0]} lists {bytes_text(together.bytes)}; "
+            f"memory_limit is {bytes_text(limit)}: raise memory_limit, write the volume in smaller "
+            "chunks, or use a smaller window size or max_supersegments"
+        )
+
+
+def _slices_to_merge(task: Task, runtime: Runtime, rows: int) -> Slices:
+    """Return what rows of all blocks' lists are merged in."""
+    size, longest = (task.size[0], rows), task.options.max_supersegments
+    if task.options.criterion != "least-error":  # what is recorded is cut when all is together
+        longest = Slices(runtime, size, task.options).kept
+    return Slices(runtime, size, task.options, max(CHUNK_STEPS, longest))
+
+
+def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
+    """Return the lengths and the runs of a slice's records."""
+    runtime, columns = records.runtime, records.window.x1 - records.window.x0
+    n = part.rows * columns
+    counts = runtime.download(records.counts)[:n]
+    begins = np.zeros(n, np.uint32)
+    np.cumsum(counts[:-1], out=begins[1:])
+    made = int(counts.sum())
+    if made:
+        kernel = runtime.kernel("large/runs.cl", "copy_runs", {**records.of_rays, "LANES": 1})
+        with (
+            runtime.upload(begins, "places of runs") as places,
+            runtime.buffer((made, RUN_WORDS), name="runs") as runs,
+        ):
+            runtime.launch(
+                kernel,
+                block_items(columns, part.rows),
+                64,
+                records.runs,
+                np.int32(records.slices.capacity),
+                np.int32(columns),
+                np.int32(part.rows),
+                records.counts,
+                places,
+                runs,
+            )
+            found = runtime.download(runs)
+    else:
+        found = np.zeros((0, RUN_WORDS), np.float32)
+    return counts.reshape(part.rows, columns).astype(np.uint16), found
+
+
+def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece]) -> Rows:
+    width = task.size[0]
+    window, options = Rectangle(0, width, y0, y1), task.options
+    slices = _slices_to_merge(task, runtime, y1 - y0)
+    medium = task.rays()
+    with (
+        Records(runtime, medium, task.camera, task.size, slices, options, window) as records,
+        growing_lists(
+            runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
+        ) as lists,
+    ):
+        merge, pack = Merge(records, options), Pack(records, lists)
+        for part in slices:
+            records.clear()
+            first = y0 + part.first_row
+            for piece in pieces:
+                of_part = piece.rows(first, first + part.rows)
+                if len(of_part.runs):
+                    _append(records, part, of_part)
+                    merge.shorten(part)  # each ray by what it has itself, whatever the rows
+            merge.to_budget(part)
+            if part.number > 0:
+                lists.wait()
+            pack.append(part)
+        offsets, *arrays = lists.finished()
+    return Rows(np.diff(offsets).astype(np.uint32), *arrays)
+
+
+def _append(records: Records, part: Slice, piece: Piece) -> None:
+    runtime, window = records.runtime, piece.window
+    columns = window.x1 - window.x0
+    begins = np.zeros(piece.counts.size + 1, np.uint32)
+    np.cumsum(piece.counts.ravel(), out=begins[1:])
+    defines = {**records.of_rays, "LANES": 1}
+    with (
+        runtime.upload(begins, "places of runs") as places,
+        runtime.upload(np.ascontiguousarray(piece.runs), "runs") as runs,
+    ):
+        runtime.launch(
+            runtime.kernel("large/runs.cl", "append_runs", defines),
+            block_items(records.window.x1 - records.window.x0, part.rows),
+            64,
+            *records.place(part),
+            records.forms,
+            np.int32(records.slices.capacity),
+            *records.weights,
+            records.finest,
+            np.array([window.x0, window.y0, columns, window.y1 - window.y0], np.int32),
+            places,
+            runs,
+            records.runs,
+            records.counts,
+        )
+        runtime.finish()  # the runs may be host memory in use
+
+
+def light_entering(
+    task: Task, windows: Mapping[Indices, Rectangle], seen: Mapping[Indices, Seen]
+) -> dict[Indices, NDArray[np.float16]]:
+    """Return the light that enters each block that may be seen, along its window's rays, 0 to 1.
+
+    Blocks come in the order in which V_O sees them.
+    """
+    width, height = task.size
+    passed = np.zeros((height, width), np.float32)
+    found = {}
+    for block in task.blocks.in_order(task.camera):
+        if block in windows and task.visible(block, seen):
+            x0, x1, y0, y1 = windows[block]
+            before = passed[y0:y1, x0:x1]
+            found[block] = np.exp(-np.minimum(before, _DARK)).astype(np.float16)
+            depths = seen[block].depths
+            if depths is not None:
+                before += depths
+    return found

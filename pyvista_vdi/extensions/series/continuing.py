@@ -1,0 +1,144 @@
+"""Goes on with a .vdis file that another run has begun, and replaces none by accident."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.extensions.series import layout
+from pyvista_vdi.extensions.series.reader import StepsReader
+from pyvista_vdi.io.vdi_file.description import to_json
+from pyvista_vdi.model.checks import as_flag
+
+#: What a VDI's metadata say that must be the same in all steps.
+_SAME = ("transfer_function", "lights", "ambient_occlusion")
+
+
+class _Frames(StepsReader):
+    """The steps of a file that may have none yet."""
+
+    _LEAST = 0
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A file that has steps.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        The file.
+    first : SeriesInfo or VDI
+        What has the camera, the window size and the metadata of the first step.
+    head : dict
+        What the file's head says.
+    entries : list of bytes
+        The index so far.
+    last_time : float
+        Of the last step.
+    end : int
+        Where the last step ends.
+    """
+
+    path: Path
+    first: Any
+    head: dict[str, Any]
+    entries: list[bytes]
+    last_time: float
+    end: int
+
+    def check_head(self, **given: Any) -> None:
+        """Raise InvalidArgumentError if steps would be written in another way."""
+        for name, value in given.items():
+            if self.head.get(name) != value:
+                shown = {"codec": "compression"}.get(name, name)
+                raise InvalidArgumentError(
+                    f"{self.path} was written with {shown}={self.head.get(name)!r}, and goes on "
+                    f"with the same only; got {value!r}"
+                )
+
+    def check(self, step: Any) -> None:
+        """Raise InvalidArgumentError if a VDI is not of this series."""
+        check_goes_on(self.path, self.first, step)
+
+
+def begun(path: Path, append: Any, overwrite: Any) -> Begun | None:
+    """Return what there is of a file to go on with; ``None`` if it is to be written anew.
+
+    Raises
+    ------
+    VDIFileError
+        If there is a file that is neither to be appended to nor to be replaced, or it is damaged.
+    InvalidArgumentError
+        If both are asked for.
+    """
+    append, overwrite = checked_way(append, overwrite)
+    if overwrite or not path.exists() or path.stat().st_size == 0:
+        return None
+    try:
+        steps = _Frames(path)
+    except VDIFileError:
+        if append:
+            raise
+        raise refused(path, "") from None
+    frames = steps.frames
+    if not frames:
+        return None  # there is nothing to lose
+    place, last = frames[-1]
+    if not append:
+        raise refused(path, f" with {len(frames)} steps, the last at time {last.time:g}")
+    if last.number != len(frames) - 1:
+        raise VDIFileError(
+            f"{path} has lost steps and cannot be gone on with: write what it has to another file "
+            "(pyvista-vdi convert), or begin a new one"
+        )
+    return Begun(
+        path,
+        steps.info(),
+        steps.head,
+        [layout.ENTRY.pack(at) + header.to_bytes() for at, header in frames],
+        last.time,
+        place + layout.HEADER_BYTES + last.n_bytes,
+    )
+
+
+def checked_way(append: Any, overwrite: Any) -> tuple[bool, bool]:
+    """Return both as truth values, or raise InvalidArgumentError if both are asked for."""
+    append, overwrite = as_flag(append, "append"), as_flag(overwrite, "overwrite")
+    if append and overwrite:
+        raise InvalidArgumentError(
+            "append=True goes on with a file and overwrite=True replaces it: pass one of them"
+        )
+    return append, overwrite
+
+
+def refused(path: Path, with_what: str) -> VDIFileError:
+    """Return the error by which a file is kept from being replaced."""
+    return VDIFileError(
+        f"{path} is there already{with_what}: pass append=True to go on with it, overwrite=True to "
+        "replace it, or another name"
+    )
+
+
+def check_goes_on(path: Any, first: Any, step: Any) -> None:
+    """Raise InvalidArgumentError if a VDI has another view or classification than one before."""
+    pairs = {
+        "camera": (first.camera, step.camera),
+        "window_size": (tuple(first.window_size), tuple(step.window_size)),
+    }
+    for name, (before, now) in pairs.items():
+        if before != now:
+            raise InvalidArgumentError(
+                f"{path} cannot be gone on with: its {name} is {before}, and that of this step is "
+                f"{now}; give the same, or begin another file"
+            )
+    for name in _SAME:
+        before, now = (json.loads(to_json(vdi.metadata.get(name))) for vdi in (first, step))
+        if before != now:
+            raise InvalidArgumentError(
+                f"{path} cannot be gone on with: its {name.replace('_', ' ')} is another than that "
+                "of this step; give the same classification (clim, too), or begin another file"
+            )

@@ -1,0 +1,327 @@
+"""Makes the VDIs of a series: one classification, one view, one volume after the other."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    UnsupportedError,
+    naming,
+    warn_external,
+    with_article,
+)
+from pyvista_vdi.extensions.large.entrance import generate_in_blocks
+from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
+from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import check_callback
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.inputs import as_volume
+from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
+from pyvista_vdi.model.providers import provider
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, bytes_of, warn_missed
+from pyvista_vdi.quality.probe import generate_by_dial
+
+_DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")
+_GRID = ("spacing", "origin")
+
+Progress = Callable[[float], object]
+
+
+def generate_series(
+    volumes: Any,
+    camera: Any,
+    window_size: Sequence[int],
+    times: Iterable[float] | None = None,
+    *,
+    spacing: Sequence[float] | None = None,
+    origin: Sequence[float] | None = None,
+    client: Any = None,
+    progress: Progress | None = None,
+    device: Any = None,
+    **options: Any,
+) -> VDISeries:
+    """Generate the VDIs of a volume that changes in time, all from one view.
+
+    The transfer function is made once, of the first step, and so is what a dial chooses: a colour
+    stands for the same value in all steps. Pass ``clim`` where the first step does not have the
+    range of the others.
+
+    Parameters
+    ----------
+    volumes : iterable or callable or array_like or VTK source
+        The steps: each what :func:`pyvista_vdi.generate` takes, or an array indexed [z, y, x],
+        for which ``spacing`` is given, so that a NumPy or Dask array indexed [step, z, y, x] will
+        do. They are taken one by one. Or a function that returns step i; or a VTK or PyVista
+        source that has time steps; or what :func:`pyvista_vdi.open_volume` returned for a store
+        that has.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The generating view V_O.
+    window_size : (int, int)
+        Width and height in pixels.
+    times : iterable of float, optional
+        Of the steps, ascending; those of a source or a store, else 0, 1, 2 … by default. For a
+        function they say how many steps there are.
+    spacing, origin : (float, float, float), optional
+        Of steps that are bare arrays, (x, y, z).
+    client : distributed.Client, optional
+        As for :func:`pyvista_vdi.generate`: of a Dask cluster, whose workers make the VDIs of
+        chunked volumes. Dask arrays are chunked then, and else brought into memory step by step.
+    progress : callable, optional
+        Called with the finished fraction, 0 to 1, of the series where its length is known, else of
+        each step; work stops if it returns ``False``.
+    device : str, int or device, optional
+        Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
+    **options
+        All else that :func:`pyvista_vdi.generate` takes, classification included. ``precision`` is
+        ``"8-byte"`` by default, which is what files of series are made for.
+
+    Returns
+    -------
+    VDISeries
+        In memory. Its ``volumes`` are the steps' as :class:`Volume` where they can be had again:
+        where ``volumes`` is a sequence, a function or a source. To write a series that need not
+        fit in memory, see :class:`pyvista_vdi.SeriesWriter`.
+
+    Raises
+    ------
+    TypeError
+        If a keyword is unknown.
+    InvalidArgumentError
+        If times do not ascend, or are not as many as the steps, or an option cannot be used.
+    InvalidVolumeError
+        If a step is no volume, or has no value to render; the message says which.
+    Cancelled
+        If ``progress`` returned ``False``.
+
+    See Also
+    --------
+    generate : has the options, and the other errors.
+    """
+    check_callback(progress)
+    steps, known_times = _steps(volumes, times)
+    make = StepMaker(
+        "generate_series",
+        camera,
+        window_size,
+        device=device,
+        client=client,
+        **{"spacing": spacing, "origin": origin, **options},
+    )
+    sized = steps if known_times is None else known_times
+    total = len(sized) if isinstance(sized, Sized) else None
+    vdis: list[VDI] = []
+    for volume in steps:
+        if known_times is not None and len(vdis) == len(known_times):
+            raise InvalidArgumentError(f"there are more steps than the {len(vdis)} times")
+        with naming(f"step {len(vdis)}"):
+            vdis.append(make(volume, _part(progress, len(vdis), total)))
+        warn_missed(vdis[-1])
+    again: Sequence[Volume] | None = None
+    if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
+        again = Called(lambda i: make.volume(steps[i]), range(len(vdis)))
+    if not vdis:
+        raise InvalidArgumentError("there is no step: pass at least one volume")
+    series = VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)
+    series._maker = make
+    return series
+
+
+class StepMaker:
+    """Makes a VDI of each volume that it is called with, all by what the first one implied.
+
+    Parameters
+    ----------
+    function : str
+        Name of the caller's function, for messages.
+    camera, window_size, device, client
+        As for :func:`generate_series`.
+    default_precision : str
+        Of the VDIs, unless it is given or a dial chooses it.
+    **given
+        The options, as there.
+    """
+
+    def __init__(
+        self,
+        function: str,
+        camera: Any,
+        window_size: Sequence[int],
+        default_precision: str = "8-byte",
+        *,
+        device: Any = None,
+        client: Any = None,
+        **given: Any,
+    ) -> None:
+        self._camera = Camera.from_any(camera)
+        self._size = check_window_size(window_size)
+        self._device, self._client = device, client
+        looks = {n: v for n, v in given.items() if n not in (*GENERATION_NAMES, *_DIAL, *_GRID)}
+        self._looks = Classification(looks, function, (*GENERATION_NAMES, *_DIAL, *_GRID))
+        dial: dict[str, Any] = {
+            "target_angle": TARGET_ANGLE,
+            **{n: given[n] for n in _DIAL if n in given},
+        }
+        self._dial = Dial.of(*[dial.get(name) for name in _DIAL])  # type: ignore[arg-type]
+        options = {n: given[n] for n in GENERATION_NAMES if n in given}
+        if self._dial is None:
+            options.setdefault("precision", default_precision)
+        self._options = GenerationOptions(**options)
+        self._grid = {n: given[n] for n in _GRID if given.get(n) is not None}
+        self._table: TransferFunction | None = None
+        self._chosen: dict[str, Any] = {}
+        self._max_bytes = None if self._dial is None else self._dial.max_bytes
+
+    def __call__(
+        self,
+        volume: Any,
+        progress: Progress | None = None,
+        *,
+        camera: Any = None,
+        window_size: Sequence[int] | None = None,
+    ) -> VDI:
+        """Return a step's VDI.
+
+        Parameters
+        ----------
+        volume : object
+            See :func:`generate_series`.
+        progress : callable, optional
+            As for :func:`pyvista_vdi.generate`.
+        camera, window_size : optional
+            In place of the series' own.
+        """
+        volume = self.volume(volume)
+        # The first step's range is all steps', while a property's functions have theirs in each
+        if self._table is None or self._looks.in_place:
+            self._table = self._looks.transfer_function(volume)
+        vdi = generate_anywhere(
+            volume,
+            self._camera if camera is None else Camera.from_any(camera),
+            self._size if window_size is None else check_window_size(window_size),
+            self._table,
+            self._dial,
+            self._options,
+            client=self._client,
+            device=self._device,
+            progress=progress,
+            metadata={
+                "classification": self._looks.describe(),
+                "scalars": volume.name,
+                **self._chosen,
+            },
+        )
+        if self._dial is not None:
+            self._keep_the_choice(vdi)
+        elif self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
+            warn_external(
+                f"max_bytes={self._max_bytes} is not kept by all steps: one has {bytes_of(vdi)} "
+                "bytes on the device, with what was chosen for the first step; allow less, or "
+                "begin with a step that has as much to show"
+            )
+            self._max_bytes = None  # told once
+        return vdi
+
+    def volume(self, volume: Any) -> Volume:
+        """Return what a user calls a step's volume as a :class:`Volume`."""
+        if self._grid and not hasattr(volume, "GetClassName") and not isinstance(volume, Volume):
+            array = volume if self._client is not None else np.asarray(volume)
+            volume = Volume(array, **self._grid)
+        return as_volume(volume, self._looks.scalars, self._looks.preference)
+
+    def _keep_the_choice(self, vdi: VDI) -> None:
+        """Take what the dial chose for the first step as the settings of all others."""
+        self._dial = None
+        self._size = vdi.window_size
+        # Missed targets are told once
+        self._chosen = {"dial": {**vdi.metadata["dial"], "missed": []}}
+        chosen = vdi.metadata["dial"]["chosen"]
+        self._options = dataclasses.replace(
+            self._options,
+            max_supersegments=chosen["max_supersegments"],
+            precision=chosen["precision"],
+        )
+
+
+def generate_anywhere(
+    volume: Volume,
+    camera: Camera,
+    window_size: Sequence[int],
+    transfer_function: TransferFunction,
+    dial: Dial | None,
+    options: GenerationOptions,
+    *,
+    client: Any = None,
+    device: Any = None,
+    progress: Progress | None = None,
+    metadata: Mapping[str, Any] | None = None,
+) -> VDI:
+    """Make a VDI of a volume in memory, or of a chunked one in blocks, here or by workers.
+
+    Arguments and errors are those of :func:`pyvista_vdi.generate`.
+    """
+    scene = (volume, camera, window_size, transfer_function)
+    made: dict[str, Any] = {"device": device, "progress": progress, "metadata": metadata}
+    if volume.chunked:
+        if dial is not None:
+            raise UnsupportedError(
+                "quality, target_ssim, target_fps and max_bytes measure the scene, and "
+                f"{volume.name!r} is chunked: give max_supersegments, or load a coarse level"
+            )
+        return generate_in_blocks(*scene, options, client=client, **made)
+    if client is not None:
+        raise InvalidArgumentError(
+            f"client is for chunked volumes, and {volume.name!r} is in memory: give a Volume of a "
+            "Dask array (dask.array.from_array), or leave client out"
+        )
+    return generate_by_dial(*scene, dial, options, **made)
+
+
+def _steps(
+    volumes: Any, times: Iterable[float] | None
+) -> tuple[Iterable[Any], tuple[float, ...] | None]:
+    """Return the steps' volumes, a sequence where they can be had again, and their times."""
+    known = None if times is None else checked_times(times)
+    if hasattr(volumes, "GetOutputPort") or hasattr(volumes, "time_values"):
+        volumes, own = provider("temporal_volumes")(volumes)
+        known = checked_times(own) if known is None else known
+    elif callable(volumes):
+        if known is None:
+            raise InvalidArgumentError(
+                "volumes is a function of the step's index: pass times, one for each step"
+            )
+        volumes = Called(volumes, range(len(known)))
+    elif isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
+        own = volumes.store.times
+        known = checked_times(own) if known is None else known
+        volumes = Called(volumes.at_time, range(len(own)))
+    elif isinstance(volumes, Volume) or hasattr(volumes, "GetClassName"):
+        raise InvalidArgumentError(
+            "volumes are the steps of a series, got one volume: pass a list, or call generate"
+        )
+    elif isinstance(volumes, str | bytes | os.PathLike) or not np.iterable(volumes):
+        raise InvalidArgumentTypeError(
+            "volumes must be an iterable of volumes, or a function; got "
+            f"{with_article(type(volumes).__name__)}: open files by pyvista.read or "
+            "pyvista_vdi.open_volume, one step after the other"
+        )
+    if known is not None and hasattr(volumes, "__len__") and len(volumes) != len(known):
+        raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")
+    return volumes, known
+
+
+def _part(progress: Progress | None, step: int, total: int | None) -> Progress | None:
+    """Return what reports a step's progress as the series'."""
+    if progress is None or total is None:
+        return progress
+    return lambda fraction: progress((step + fraction) / total)

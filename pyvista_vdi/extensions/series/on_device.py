@@ -1,0 +1,313 @@
+"""Steps of a series decoded by a kernel: what :func:`differences.decoded` does, and faster."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import Runtime, aligned_empty, get_runtime, kept_together
+from pyvista_vdi.errors import DeviceError, InvalidVDIError, MissingDependencyError, NoDeviceError
+from pyvista_vdi.extensions.series.codes import Codes, Samples, Tables
+from pyvista_vdi.extensions.series.differences import (
+    HOW,
+    KEPT,
+    PLACED,
+    SAME,
+    Arrays,
+    Stepped,
+    unfolded,
+)
+from pyvista_vdi.model.packing import GRID, TAU_BASE, TAU_CODES, Packed8, check_grid
+
+#: The arrays that are read by supersegment or by list, in the kernel's order.
+_STREAMS = (
+    *("gap", "length", "back", "front", "end"),
+    *("entry", "red", "green", "blue", "optical_depth"),
+)
+#: What is stored of numbers below this is summed in 32 bits without overflow.
+_TAME = 1 << 26
+#: Numbers of a list's places, see ``series/decode.cl``.
+_PLACES = 5
+#: Work-items of a group.
+_GROUP = 64
+
+
+class PackedStep(Stepped):
+    """A step in its 8-byte form; whole numbers by themselves are made of it when they are needed.
+
+    Parameters
+    ----------
+    offsets : numpy.ndarray
+        int32 (W * H + 1,): where each list begins.
+    packing : Packed8
+        Its supersegments.
+    entries : numpy.ndarray
+        uint8 (n,): which of the tables' colours each is nearest to.
+    tables, samples, window_size
+        See :class:`Stepped`.
+    """
+
+    def __init__(
+        self,
+        offsets: NDArray[np.int32],
+        packing: Packed8,
+        entries: NDArray[np.uint8],
+        tables: Tables,
+        samples: Samples | None,
+        window_size: tuple[int, int],
+    ) -> None:
+        self.offsets, self.packing, self.entries = offsets, packing, entries
+        self.tables, self.samples, self.window_size = tables, samples, window_size
+
+    @cached_property
+    def codes(self) -> Codes:  # type: ignore[override]
+        """The supersegments as whole numbers."""
+        return Codes.of_packed(np.diff(self.offsets), self.packing, self.entries)
+
+    def packed(self) -> tuple[NDArray[np.uint64], Packed8]:
+        """Return offsets and the packed form."""
+        return self.offsets.astype(np.uint64), self.packing
+
+    @classmethod
+    def of(cls, step: Stepped) -> PackedStep:
+        """Return a step in this form."""
+        if isinstance(step, cls):
+            return step
+        offsets, packing = step.packed()
+        words = aligned_empty(packing.words.shape, np.uint32)
+        words[...] = packing.words
+        packing = Packed8(packing.step, packing.origins, packing.strides, words)
+        return cls(
+            offsets.astype(np.int32),
+            packing,
+            step.codes.entries,
+            step.tables,
+            step.samples,
+            step.window_size,
+        )
+
+
+def runtime_for_decoding() -> Runtime | None:
+    """Return the default device if it can decode; None where there is none that can."""
+    try:
+        runtime = get_runtime()
+    except (NoDeviceError, MissingDependencyError, DeviceError):
+        return None
+    return runtime if runtime.info.has_fp64 else None
+
+
+def decoded_on(
+    runtime: Runtime,
+    arrays: Arrays,
+    step: float,
+    samples: Samples | None,
+    tables: Tables,
+    window_size: tuple[int, int],
+    before: Stepped | None,
+) -> PackedStep | None:
+    """Return a step, or None where its numbers are not as those that are written.
+
+    The parameters are those of :func:`differences.decoded`, which says what is wrong with them.
+    """
+    n_lists = window_size[0] * window_size[1]
+    how = arrays["how"]
+    way = how & HOW
+    if how.dtype != np.uint8 or len(how) != n_lists or (before is None and way.any()):
+        return None
+    for name in _STREAMS:
+        if arrays[name].dtype.kind != "u" or arrays[name].itemsize > 4:
+            return None
+        if arrays[name].itemsize == 4 and arrays[name].max(initial=0) >= _TAME:
+            return None
+    try:
+        old = None if before is None else PackedStep.of(before)
+    except InvalidVDIError:  # it was not looked at, and may still do
+        return None
+    places = _Places.of(arrays, way, old)
+    if places is None:
+        return None
+    pitches = None if samples is None else samples.pitches(window_size, step)
+    left = _left(arrays, way, places, plain=pitches is None)
+    if left is None:
+        return None
+    n = int(places.starts[-1])
+    check_grid(step, *(np.empty(0, np.int64),) * 3)  # of the step alone: the kernel looks at lists
+    nothing = np.zeros(2, np.int32)
+    base, streams = _together(arrays)
+    trouble = np.zeros(1, np.int32)
+    defines = {"GRID": GRID, "TAU_BASE": TAU_BASE, "TAU_CODES": TAU_CODES}
+    if pitches is None:
+        defines["PLAIN"] = 1
+    with kept_together() as keep:
+
+        def up(array: NDArray[Any], name: str) -> Any:
+            return keep(runtime.upload(array if array.size else nothing, name))
+
+        origins = keep(runtime.result((n_lists,), np.int32, "origins of lists"))
+        strides = keep(runtime.result((n_lists,), np.uint16, "strides of lists"))
+        words = keep(runtime.result((max(n, 1), 2), np.uint32, "supersegments", lasting=True))
+        entries = keep(runtime.result((max(n, 1),), np.uint8, "entries"))
+        told = keep(runtime.buffer((1,), np.int32, "trouble"))
+        runtime.write(told, trouble)
+        runtime.launch(
+            runtime.kernel("series/decode.cl", "decode_lists", defines),
+            -(-n_lists // _GROUP) * _GROUP,
+            _GROUP,
+            np.int32(n_lists),
+            up(how, "how lists are written"),
+            up(places.starts, "list offsets"),
+            up(places.table, "places"),
+            *(up(values, "what is left of lists") for values in left),
+            up(nothing.astype(np.float64) if pitches is None else pitches, "pitches"),
+            up(base, "arrays of a step"),
+            up(streams, "places of arrays"),
+            up(arrays.get("kept", nothing), "kept supersegments"),
+            up(arrays.get("kept_there", nothing), "supersegments that were kept"),
+            up(nothing if old is None else old.offsets, "list offsets before"),
+            up(nothing if old is None else old.packing.origins, "origins before"),
+            up(nothing.astype(np.uint16) if old is None else old.packing.strides, "strides before"),
+            up(nothing if old is None else old.packing.words, "supersegments before"),
+            up(nothing.astype(np.uint8) if old is None else old.entries, "entries before"),
+            up(tables.colors, "colours of entries"),
+            up(tables.extinctions, "extinctions of entries"),
+            origins,
+            strides,
+            words,
+            entries,
+            told,
+        )
+        if runtime.download(told)[0]:
+            return None
+        packing = Packed8(
+            step,
+            runtime.download(origins),
+            runtime.download(strides),
+            runtime.download(words)[:n],
+        )
+        return PackedStep(
+            places.starts, packing, runtime.download(entries)[:n], tables, samples, window_size
+        )
+
+
+class _Places:
+    """Where lists begin among their supersegments, and in a frame's arrays."""
+
+    starts: NDArray[np.int32]
+    table: NDArray[np.int32]
+    written: NDArray[np.bool_]  # lists that are written and not empty
+
+    @classmethod
+    def of(cls, arrays: Arrays, way: NDArray[Any], old: PackedStep | None) -> _Places | None:
+        """Return them; None where the arrays are not as many as they should be."""
+        places = cls()
+        coded = way != SAME
+        given = arrays["counts"]
+        if given.dtype.kind != "u" or given.itemsize > 4 or given.max(initial=0) >= _TAME:
+            return None
+        if len(given) != np.count_nonzero(coded):
+            return None
+        counts = np.zeros(len(way), np.int32)
+        counts[coded] = given
+        if old is not None:
+            before = np.diff(old.offsets)
+            placed = way >= PLACED
+            if not (before[placed] > 0).all():
+                return None
+            counts = np.where(placed, unfolded(counts) + before, np.where(coded, counts, before))
+        if len(counts) and not (counts.min() >= 0 and counts.max() <= 1 << 16):
+            return None
+        if counts.sum(dtype=np.int64) >= 1 << 28:  # offsets are of 32 bits
+            return None
+        places.written = coded & (counts > 0)
+        keeps = (way == KEPT) & (counts > 0)
+        places.starts = _sums(counts)
+        table = aligned_empty((len(way), _PLACES), np.int32)
+        rows = _sums(np.where(coded, counts, 0))
+        n_rows = int(rows[-1])
+        occupied = _sums(places.written)
+        table[:, 0], table[:, 2] = rows[:-1], occupied[:-1]
+        if any(len(arrays[name]) != n_rows for name in _STREAMS[2:4] + _STREAMS[5:]):
+            return None
+        if len(arrays["end"]) != occupied[-1]:
+            return None
+        table[:, 1], table[:, 3:] = rows[:-1], 0
+        n_new = n_rows
+        if old is not None:
+            bits = _sums(np.where(keeps, counts, 0))
+            there = _sums(np.where(keeps, np.diff(old.offsets), 0))
+            kept = _bits(arrays["kept"], int(bits[-1]))
+            if kept is None or _bits(arrays["kept_there"], int(there[-1])) is None:
+                return None
+            before_it = _sums(kept)
+            table[:, 1] -= before_it[bits[:-1]]
+            table[:, 3], table[:, 4] = bits[:-1], there[:-1]
+            n_new -= int(before_it[-1])
+        if len(arrays["gap"]) != n_new or len(arrays["length"]) != n_new:
+            return None
+        places.table = table
+        return places
+
+
+def _left(
+    arrays: Arrays, way: NDArray[Any], places: _Places, *, plain: bool
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]] | None:
+    """Return what is left of the origins and strides of lists, or all of them; and shifts."""
+    placed = way[places.written] >= PLACED
+    n = len(placed)
+    origin, stride = arrays["origin"], arrays["stride"]
+    if not (len(origin) == len(stride) == n and origin.dtype.kind == stride.dtype.kind == "u"):
+        return None
+    shift = np.zeros(n, np.int64)
+    if placed.any():
+        given = arrays["shift"]
+        if len(given) != np.count_nonzero(placed) or given.dtype.kind != "u":
+            return None
+        shift[placed] = unfolded(given.astype(np.int64))
+    origins, strides = (unfolded(values.astype(np.int64)) for values in (origin, stride))
+    origins[~placed] = np.cumsum(origins[~placed])
+    if plain:
+        strides[~placed] = np.cumsum(strides[~placed])
+    found = (origins, strides, shift)
+    for values, limit in zip(found, _LIMITS, strict=True):
+        if np.abs(values).max(initial=0) >= limit:
+            return None
+    left = tuple(aligned_empty(n, np.int32) for _ in found)
+    for values, given in zip(left, found, strict=True):
+        values[...] = given
+    return left  # type: ignore[return-value]
+
+
+#: Of origins and strides, and of shifts: those of ``differences``.
+_LIMITS = (1 << 28, 1 << 28, 1 << 20)
+
+
+def _together(arrays: Arrays) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:
+    """Return bytes that hold all streams, and for each where it is in them, and its element's."""
+    memory = getattr(arrays, "memory", None)
+    if memory is None:
+        sizes = [-(-arrays[name].nbytes // 8) * 8 for name in _STREAMS]
+        begins = np.cumsum([0, *sizes])
+        memory = aligned_empty(int(begins[-1]), np.uint8)
+        for name, begin in zip(_STREAMS, begins[:-1], strict=True):
+            memory[begin : begin + arrays[name].nbytes] = arrays[name].view(np.uint8)
+    else:
+        begins = np.array([arrays[name].ctypes.data for name in _STREAMS]) - memory.ctypes.data
+    streams = [(begins[k], arrays[name].itemsize) for k, name in enumerate(_STREAMS)]
+    return memory, np.array(streams, np.uint32)
+
+
+def _sums(values: NDArray[Any]) -> NDArray[np.int32]:
+    """Return the sums of the values before each, and of all."""
+    sums = aligned_empty(len(values) + 1, np.int32)
+    sums[0] = 0
+    np.cumsum(values, out=sums[1:], dtype=np.int32)
+    return sums
+
+
+def _bits(packed: NDArray[Any], n: int) -> NDArray[np.uint8] | None:
+    if packed.dtype != np.uint8 or len(packed) != -(-n // 8):
+        return None
+    return np.unpackbits(packed, count=n)

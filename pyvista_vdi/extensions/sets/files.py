@@ -1,0 +1,182 @@
+"""Writes and reads .vdiset files: those of a series in all but their head, which has the views."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.extensions.series.layout import index_bytes
+from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
+from pyvista_vdi.extensions.series.writer import StepsWriter
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
+from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file.description import number
+from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
+from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.providers import provider
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.view_error import eye_from_centre
+
+FORMAT_NAME = "pyvista-vdi-set"
+SUFFIX = ".vdiset"
+#: The first bytes; the rest is as of a series, see :mod:`pyvista_vdi.extensions.series.layout`.
+MAGIC = b"\x89VDIV\r\n\x1a"
+
+
+class SetReader(StepsReader):
+    """The VDIs of a .vdiset file: read and decoded when they are asked for, from any thread.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Raises
+    ------
+    VDIFileError
+        As for :class:`~pyvista_vdi.extensions.series.reader.StepsReader`.
+    """
+
+    _MAGIC, _PART = MAGIC, "view"
+    _FOREIGN = (
+        "a set of VDIs: it begins with {!r}; such a file is written by VDISet.save() or "
+        "'pyvista-vdi set'"
+    )
+    _KEPT_VDIS = 8
+
+    def _check_head(self, found: dict[str, Any]) -> None:
+        self._views = [Camera.from_dict(view) for view in found["views"]]
+        self.picture_size = check_window_size(found["picture_size"])
+        self.all_bounds = tuple(number(bound) for bound in found["bounds"])
+        self.about = found["about"]
+        if not isinstance(self.about, dict):
+            raise TypeError("what is said about a set is a dictionary")
+        if self.about.get("camera") is not None:
+            Camera.from_dict(self.about["camera"])
+        if len(self.all_bounds) != 6 or not all(map(math.isfinite, self.all_bounds)):
+            raise ValueError("bounds are six finite numbers")
+        for view in self._views:  # as the set will ask
+            eye_from_centre(view, self.all_bounds, self._views[0].model_transform[:3, :3])
+
+    @property
+    def cameras(self) -> list[Camera]:
+        """The view V_O of each VDI that is there."""
+        if self._frames[-1][1].number >= len(self._views):
+            self._refuse("it has more VDIs than views")
+        return [self._views[header.number] for _, header in self._frames]
+
+    def _decoded(self, i: int) -> VDI:
+        vdi = super()._decoded(i)
+        if vdi.bounds != self.all_bounds:
+            self._refuse(f"view {self._frames[i][1].number} is of another scene")
+        return vdi
+
+
+def write(
+    vdi_set: VDISet,
+    path: str | os.PathLike[str],
+    *,
+    precision: str = "8-byte",
+    tolerance: float = 0.0,
+    compression: str = "zstd",
+    level: int = 1,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a set to a file, which appears whole or not at all: see :meth:`VDISet.save`."""
+    target = check_writable(with_suffix(as_path(path), (SUFFIX,), "a set"))
+    writer = StepsWriter(precision, tolerance, 1, compression, level)
+    with whole_file(target) as stream:
+        write_all(stream, writer, vdi_set, progress)
+    return target
+
+
+def write_all(
+    stream: BinaryIO, writer: StepsWriter, vdi_set: VDISet, progress: Progress | None = None
+) -> int:
+    """Write a whole file to a stream; return how many bytes show its first VDI."""
+    views, first = list(vdi_set.cameras), 0
+    done = Pieces(progress, len(views))
+    _begin(writer, stream, vdi_set)
+    if stream.tell() > MAX_DESCRIPTION_BYTES:
+        raise InvalidVDIError(f"{len(views)} views are more than a file's head can hold")
+    for i in range(len(views)):
+        writer.write(stream, vdi_set[i], float(i))
+        first = first or stream.tell()
+        done()
+    writer.finish(stream)
+    return first
+
+
+def bytes_around(vdi_set: VDISet) -> int:
+    """Return the bytes that a set's file has beside the frames of its VDIs."""
+    stream = io.BytesIO()
+    _begin(StepsWriter("8-byte", 0.0, 1, "zstd", 1), stream, vdi_set)
+    return stream.tell() + index_bytes(len(vdi_set.cameras))
+
+
+def _begin(writer: StepsWriter, stream: BinaryIO, vdi_set: VDISet) -> None:
+    """Write the head of a set's file."""
+    writer.begin(
+        stream,
+        MAGIC,
+        FORMAT_NAME,
+        views=[view.to_dict() for view in vdi_set.cameras],
+        picture_size=list(vdi_set.window_size),
+        bounds=list(vdi_set.bounds),
+        about=vdi_set.about,
+    )
+
+
+def read(
+    path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any
+) -> VDISet:
+    """Read a set from a .vdiset file; VDIs are decoded when they are asked for.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    progress : callable, optional
+        Called with 1: opening reads no VDI.
+    **options
+        There are no others.
+
+    Raises
+    ------
+    VDIFileError
+        If the file is absent, foreign, of a newer version or damaged, or has no finished view.
+    InvalidArgumentError
+        If an option is given.
+    """
+    if options:
+        raise InvalidArgumentError(
+            f"{path!s} is read without the option {', '.join(sorted(options))}"
+        )
+    views = SetReader(path)
+    Pieces(progress, 1)()
+    return VDISet(
+        views,
+        views.cameras,
+        window_size=views.picture_size,
+        bounds=views.all_bounds,
+        about=views.about,
+    )
+
+
+def read_info(path: str | os.PathLike[str]) -> tuple[SeriesInfo, dict[str, Any]]:
+    """Read what a .vdiset file says about itself, and what made it: errors as for :func:`read`."""
+    views = SetReader(path)
+    return views.info(), views.about
+
+
+def is_set_file(path: Any) -> bool:
+    """Whether a file is read as a set: by its name, and a page by its content."""
+    name = str(path).lower()
+    if name.endswith(".html"):
+        return bool(provider("html_files").begins_with(path, MAGIC))
+    return name.endswith(SUFFIX)

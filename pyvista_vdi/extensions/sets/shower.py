@@ -1,0 +1,198 @@
+"""What shows a set: the VDIs of the view at hand, others decoded ahead, and more of them made."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.errors import Cancelled
+from pyvista_vdi.extensions.series.player import MEMORY, ON_DEVICE, Decoding
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.worker import Job, Worker
+from pyvista_vdi.raycasting.prepared import prepared_vdi
+
+#: How many of the VDIs nearest to a view are decoded.
+_AHEAD = 8
+#: Degrees by which a view must have turned, or come nearer, until another is looked at to grow.
+_MOVED = 1.0
+
+
+class SetShower:
+    """Keeps at hand what frames need of a set.
+
+    The thread that draws tells where it looks from by :meth:`look`, asks for :attr:`vdi` and
+    :meth:`parts` in its frames, and calls :meth:`advance` between two of them. Another thread
+    decodes what is nearest to the view, and brings it to the device, as far as there is memory;
+    a third makes VDIs of views that do not reach the set's target, where :meth:`grow` is called.
+
+    Parameters
+    ----------
+    vdi_set : VDISet
+        What is shown.
+
+    Attributes
+    ----------
+    vdi_set : VDISet
+        As above.
+    device : optional
+        Where VDIs are drawn, see :func:`pyvista_vdi.list_devices`.
+    memory : float
+        Bytes that decoded VDIs may take, on the device and beside it; those that are drawn are
+        always kept.
+    """
+
+    def __init__(self, vdi_set: VDISet) -> None:
+        self.vdi_set = vdi_set
+        self.device: Any = None
+        self.memory: float = MEMORY
+        self._view: Camera = vdi_set.cameras[0]
+        self._weights = vdi_set.weights(self._view)
+        self._lock = threading.Lock()
+        self._ready: dict[int, VDI] = {}
+        self._bytes: dict[int, float] = {}
+        self._broken: set[int] = set()
+        self._decoder = Worker("pyvista-vdi set")
+        self._grower = Worker("pyvista-vdi set's growth")
+        self._grown_for: Camera | None = None
+
+    def look(self, camera: Camera) -> None:
+        """Look from a view, whose model transform places the set, and decode what is near it."""
+        self._view = camera
+        self._weights = self.vdi_set.weights(camera)
+        if not self._decoder.running and self._wanted() is not None:
+            self._decoder.put(Decoding(lambda on, _report: self._decode(on), self.device))
+
+    @property
+    def nearest(self) -> int:
+        """Index of the VDI whose V_O is nearest."""
+        return self._weights[0][0]
+
+    @property
+    def vdi(self) -> VDI:
+        """The nearest, decoded now if it is not ready.
+
+        Raises
+        ------
+        VDIError
+            If it cannot be decoded.
+        """
+        return self._at(self.nearest)
+
+    def parts(self) -> list[tuple[VDI, float]]:
+        """Return what a picture is blended of, with weights; the nearest first."""
+        return [(self._at(i), weight) for i, weight in self._weights]
+
+    def _at(self, i: int) -> VDI:
+        with self._lock:
+            known = self._ready.get(i)
+        if known is None:
+            known = self.vdi_set[i]
+            self._keep(i, known)
+        return known
+
+    @property
+    def growing(self) -> bool:
+        """Whether a VDI is being made, or was made and :meth:`advance` has not taken it."""
+        return self._grower.job is not None
+
+    def grow(self) -> None:
+        """Have a VDI made of the view behind the frames, if its picture misses the target."""
+        view, before = self._view, self._grown_for
+        if self.growing or not self.vdi_set.can_grow:
+            return
+        if before is not None and self.vdi_set.apart(view, before) < _MOVED:
+            return
+        self._grown_for = view
+
+        def make(runtime: Runtime, _report: Any) -> list[VDI]:
+            vdi = self.vdi_set.lacking(view)
+            if vdi is not None:
+                prepared_vdi(runtime, vdi)
+            return [] if vdi is None else [vdi]
+
+        self._grower.put(Job(make, self.device))
+
+    def grow_now(self) -> None:
+        """Add a VDI of the view to the set, made first, if its picture misses the target."""
+        view = self._view
+        if view == self._grown_for or not self.vdi_set.can_grow:
+            return
+        self._grown_for = view
+        vdi = self.vdi_set.lacking(view)
+        if vdi is not None:
+            self.vdi_set.add(vdi)
+            self._keep(len(self.vdi_set) - 1, vdi)
+            self._weights = self.vdi_set.weights(view)
+
+    def stop_growing(self) -> None:
+        """Give up what is being made: the view turns."""
+        if self._grower.running:
+            self._grower.clear()
+            self._grown_for = None
+
+    def advance(self) -> bool:
+        """Add what was made to the set; whether there is another VDI to be drawn.
+
+        Raises
+        ------
+        VDIError
+            What made it fail.
+        """
+        made = self._grower.take()
+        for vdi in made or ():
+            self.vdi_set.add(vdi)
+            self._keep(len(self.vdi_set) - 1, vdi)
+        return bool(made)
+
+    def close(self) -> None:
+        """Leave no thread; the next frame may begin anew."""
+        for worker in (self._decoder, self._grower):
+            worker.clear()
+            worker.join()
+        with self._lock:
+            self._ready.clear()
+            self._bytes.clear()
+
+    def _order(self) -> list[int]:
+        """Return all VDIs, the nearest to the view first."""
+        return [int(i) for i in self.vdi_set.distances(self._view).argsort(kind="stable")]
+
+    def _wanted(self) -> int | None:
+        """Return the next VDI to be decoded; None where enough are, or there is no memory."""
+        with self._lock:
+            order, drawn = self._order(), dict(self._weights)
+            taken, each = sum(self._bytes.values()), max(self._bytes.values(), default=0.0)
+            last = max((order.index(k) for k in self._ready if k not in drawn), default=-1)
+            for rank, i in enumerate(order[:_AHEAD]):
+                if i not in self._ready and i not in self._broken:
+                    # In place of one that is farther, where memory is not enough
+                    return i if taken + each <= self.memory or rank < last else None
+        return None
+
+    def _decode(self, runtime: Runtime) -> bool:
+        while (i := self._wanted()) is not None and self._decoder.running:
+            try:
+                vdi = self.vdi_set[i]
+                prepared_vdi(runtime, vdi)
+            except Cancelled:
+                raise
+            except Exception:  # a frame that needs it says what is wrong
+                with self._lock:
+                    self._broken.add(i)
+                continue
+            self._keep(i, vdi)
+        return True
+
+    def _keep(self, i: int, vdi: VDI) -> None:
+        """Keep a decoded VDI, and let go of the farthest where memory is not enough."""
+        drawn = dict(self._weights)
+        with self._lock:
+            self._ready[i], self._bytes[i] = vdi, vdi.nbytes * (1 + ON_DEVICE)
+            for k in reversed(self._order()):
+                if sum(self._bytes.values()) <= self.memory:
+                    break
+                if k in self._ready and k not in drawn and k != i:
+                    del self._ready[k], self._bytes[k]

@@ -1,0 +1,374 @@
+"""The set of VDIs: one for each of many sides."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_float, as_floats
+from pyvista_vdi.model.inputs import as_vdi, each_of
+from pyvista_vdi.model.providers import provider
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.view_error import eye_from_centre
+
+#: Degrees by which a V_O may be farther than the nearest and still be seen: benchmarks/sets.py.
+BLEND = 6.0
+#: Tangent of half the angle of VTK's lens.
+_LENS = math.tan(math.radians(15))
+#: Most V_Os that a picture is blended of.
+MOST_BLENDED = 3
+
+
+class Maker(Protocol):
+    """What makes VDIs of other views of the volume."""
+
+    def __call__(self, camera: Camera) -> VDI:
+        """Return a VDI of a view."""
+        ...
+
+    def lacking(self, vdi_set: VDISet, camera: Camera) -> VDI | None:
+        """Return a VDI of a view that does not reach what the set is to reach, else None."""
+        ...
+
+
+class VDISet(Sequence[VDI]):
+    """The VDIs of one scene from many views V_O: a sequence of :class:`VDI`.
+
+    Made by :func:`pyvista_vdi.generate_set`, by :func:`pyvista_vdi.read` from a ``.vdiset`` file,
+    whose VDIs are decoded when they are asked for, or by :meth:`of` from VDIs at hand.
+    :func:`pyvista_vdi.render`, :func:`pyvista_vdi.pick` and ``Plotter.add_vdi`` take it as they
+    take a VDI, and look at that which was made nearest to the view.
+
+    Parameters
+    ----------
+    views : sequence of VDI
+        One per V_O; at least one, all of the same bounds.
+    cameras : sequence of Camera, optional
+        Their views, where they are known without the VDIs.
+    window_size : (int, int), optional
+        Width and height of the pictures that it is for; by default the first VDI's.
+    bounds : sequence of float, optional
+        Of the VDIs, in the model frame; by default the first one's.
+    about : mapping, optional
+        What made it, as JSON can hold it: see :attr:`about`.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If there is no VDI, or cameras are not as many.
+    InvalidCameraError
+        If an eye is farther from the centre of the bounds than float64 can say.
+
+    Attributes
+    ----------
+    window_size : (int, int)
+        As above.
+    bounds : tuple of float
+        As above.
+    about : dict
+        What made it. ``camera``; ``target_ssim``; ``chosen``: ``lists`` per pixel along an edge and
+        ``max_supersegments``; ``reached``: of how many ``directions`` the SSIM was measured, the
+        ``least`` and the ``mean``.
+    """
+
+    def __init__(
+        self,
+        views: Sequence[VDI],
+        cameras: Sequence[Camera] | None = None,
+        *,
+        window_size: Sequence[int] | None = None,
+        bounds: Sequence[float] | None = None,
+        about: Mapping[str, Any] | None = None,
+    ) -> None:
+        if not isinstance(views, Sequence):
+            raise InvalidArgumentTypeError(
+                f"views must be a sequence of VDIs, got {type(views).__name__}: pass a list"
+            )
+        if cameras is None:
+            cameras = [as_vdi(vdi).camera for vdi in views]
+        elif not np.iterable(cameras):
+            raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
+        cameras = [Camera.from_any(camera) for camera in cameras]
+        if not len(views) == len(cameras) > 0:
+            raise InvalidArgumentError(
+                f"a set has a camera for each VDI, and at least one; got {len(views)} VDIs and "
+                f"{len(cameras)} cameras"
+            )
+        self.window_size = check_window_size(
+            views[0].picture_size if window_size is None else window_size
+        )
+        given = as_floats(views[0].bounds if bounds is None else bounds)
+        if given.shape != (6,) or not np.isfinite(given).all():
+            raise InvalidArgumentError(f"bounds must be six finite numbers; got {bounds!r}")
+        self.bounds: tuple[float, ...] = tuple(given.tolist())
+        if not isinstance(about, Mapping | None):
+            raise InvalidArgumentTypeError(f"about must be a mapping of names; got {about!r}")
+        self.about: dict[str, Any] = dict(about or {})
+        self._views, self._added = views, list[VDI]()
+        self._cameras = tuple(cameras)
+        self._places = self._places_of(self._cameras)
+        self._blend = BLEND
+        self._maker: Maker | None = None  # of the volume, where it is at hand
+
+    @classmethod
+    def of(cls, vdis: Iterable[VDI], *, window_size: Sequence[int] | None = None) -> VDISet:
+        """Return a set of VDIs in memory.
+
+        Parameters
+        ----------
+        vdis : iterable of VDI
+            Of one scene, from any views, or their VTK form.
+        window_size : (int, int), optional
+            As for :class:`VDISet`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If there is none.
+        InvalidVDIError
+            If one is no VDI, or they are of other bounds than the first.
+        """
+        if isinstance(vdis, VDI):
+            raise InvalidVDIError("a set is made of several VDIs: pass them in a list")
+        views = tuple(as_vdi(vdi) for vdi in each_of(vdis))
+        for i, vdi in enumerate(views):
+            if vdi.bounds != views[0].bounds:
+                raise InvalidVDIError(
+                    f"the VDIs of a set are of one scene: number {i} has the bounds "
+                    f"{vdi.bounds}, the first {views[0].bounds}"
+                )
+        return cls(views, window_size=window_size)
+
+    @property
+    def camera(self) -> Camera:
+        """The view to begin with, for pictures of :attr:`window_size`; else the first V_O.
+
+        Of a sphere the one that told distance and lens, of cameras the first.
+        """
+        stored = self.about.get("camera")
+        return self._cameras[0] if stored is None else Camera.from_dict(stored)
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """:attr:`window_size`, by the name that it has for a VDI."""
+        return self.window_size
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The generating view V_O of each VDI."""
+        return self._cameras
+
+    def __len__(self) -> int:
+        return len(self._cameras)
+
+    @overload
+    def __getitem__(self, index: int) -> VDI: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[VDI]: ...
+    def __getitem__(self, index: int | slice) -> VDI | list[VDI]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(len(self))[index]]
+        i, n = range(len(self))[index], len(self._views)
+        return self._views[i] if i < n else self._added[i - n]
+
+    def __iter__(self) -> Iterator[VDI]:
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def blend(self) -> float:
+        """Degrees by which a V_O may be farther than the nearest and still be blended in.
+
+        The farther, the less it counts, so that nothing jumps when another one becomes the
+        nearest. 0 shows the nearest alone.
+        """
+        return self._blend
+
+    @blend.setter
+    def blend(self, degrees: float) -> None:
+        value = as_float(degrees)
+        if not 0 <= value <= 180:
+            raise InvalidArgumentError(f"blend must be degrees, 0 to 180; got {degrees!r}")
+        self._blend = value
+
+    def distances(self, camera: Any) -> NDArray[np.float64]:
+        """Return how far each V_O's eye is from that of a view, degrees, float64 (n,).
+
+        The angle between both as seen from the centre of the bounds; where they are not as far
+        from it, together with the logarithm of the ratio, by Pythagoras: what an eye has moved by
+        over how far it is away.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            The view; its model transform places the set.
+        """
+        return _apart(self._places, self._places_of([Camera.from_any(camera)]))
+
+    def apart(self, one: Any, other: Any) -> float:
+        """Return how far the eyes of two views are from each other, as :meth:`distances` does.
+
+        Parameters
+        ----------
+        one, other : Camera or vtkCamera or pyvista.Camera
+            The views.
+        """
+        first, second = self._places_of([Camera.from_any(view) for view in (one, other)])
+        return float(_apart(first[None], second[None])[0])
+
+    def nearest(self, camera: Any) -> int:
+        """Return the index of the VDI whose V_O is nearest to a view; of two, the earlier.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            The view.
+        """
+        return int(self.distances(camera).argmin())
+
+    def weights(self, camera: Any) -> list[tuple[int, float]]:
+        """Return what a picture is blended of: indices and weights, the nearest first.
+
+        The weights fall linearly with the distance beyond the nearest one's, to 0 at :attr:`blend`,
+        and add up to 1.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            The view.
+        """
+        distances = self.distances(camera)
+        order = np.argsort(distances, kind="stable")[: MOST_BLENDED + 1]
+        beyond = distances[order] - distances[order[0]]
+        # Continuous where another one comes in for the last, too
+        reach = min(self._blend, beyond[-1]) if len(order) > MOST_BLENDED else self._blend
+        shares = np.maximum(0.0, 1.0 - beyond[1:] / reach) if reach > 0 else np.zeros(0)
+        shares = np.append(1.0, shares[shares > 0])
+        return [(int(i), float(w)) for i, w in zip(order, shares / shares.sum(), strict=False)]
+
+    @property
+    def can_grow(self) -> bool:
+        """Whether the volume is at hand, so that :meth:`generate` works: of files it is not."""
+        return self._maker is not None
+
+    def generate(self, camera: Any) -> VDI:
+        """Return a VDI of another view, made as those of the set were.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            A view of the set's :attr:`window_size`; the VDI covers the whole volume.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the volume is not at hand.
+        """
+        if self._maker is None:
+            raise InvalidArgumentError(
+                "the volume of this set is not at hand: make it by generate_set, or generate VDIs "
+                "of the volume and add them"
+            )
+        return self._maker(Camera.from_any(camera))
+
+    def lacking(self, camera: Any) -> VDI | None:
+        """Return a VDI of a view, made if the set's picture of it misses the target, else None.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            As for :meth:`generate`, whose error it has, too.
+        """
+        if self._maker is None:
+            return self.generate(camera)
+        return self._maker.lacking(self, Camera.from_any(camera))
+
+    def add(self, vdi: VDI) -> None:
+        """Add a VDI of the same scene, as from another thread.
+
+        Parameters
+        ----------
+        vdi : VDI
+            Of the same bounds.
+
+        Raises
+        ------
+        InvalidVDIError
+            If it has other bounds.
+        """
+        vdi = as_vdi(vdi)
+        if vdi.bounds != self.bounds:
+            raise InvalidVDIError(
+                f"the VDIs of a set are of one scene: this one has the bounds {vdi.bounds}, the "
+                f"set {self.bounds}"
+            )
+        self._added.append(vdi)
+        self._cameras = (*self._cameras, vdi.camera)
+        # Last: threads that look for the nearest find no VDI that is not there yet
+        self._places = np.concatenate([self._places, self._places_of([vdi.camera])])
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a ``.vdiset`` file that :func:`pyvista_vdi.read` opens; whole or not at all.
+
+        Parameters
+        ----------
+        path : path-like
+            The target; its name ends in ``.vdiset``.
+        **options
+            ``precision`` (``"8-byte"``), ``tolerance`` (0), ``compression`` (``"zstd"``) and
+            ``level`` (1) as for :class:`pyvista_vdi.SeriesWriter`; ``progress``, called with the
+            finished fraction.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        VDIFileError
+            If the target cannot be written.
+        InvalidArgumentError
+            If an option is out of its range.
+        """
+        return provider("write_set")(self, path, **options)  # type: ignore[no-any-return]
+
+    def save_cinema(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a Cinema database (specification D): a folder of pictures and their table.
+
+        See :func:`pyvista_vdi.extensions.sets.cinema.write`.
+        """
+        return provider("write_cinema")(self, path, **options)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        width, height = self.window_size
+        return f"VDISet({len(self)} VDIs, for pictures of {width} x {height})"
+
+    def _places_of(self, cameras: Sequence[Camera]) -> NDArray[np.float64]:
+        """Return the direction of each eye from the centre, and the logarithm of its distance.
+
+        float64 (n, 4). Directions are those of the model as the first V_O's transform shows it.
+        """
+        shown = self._cameras[0].model_transform[:3, :3]
+        towards, lengths = zip(
+            *(eye_from_centre(view, self.bounds, shown) for view in cameras), strict=True
+        )
+        # Of a parallel view, which is infinitely far: where a lens shows as much of the height
+        away = [
+            view.parallel_scale / _LENS if view.parallel_projection else length
+            for view, length in zip(cameras, lengths, strict=True)
+        ]
+        return np.column_stack([towards, np.log(away)])
+
+
+def _apart(places: NDArray[np.float64], here: NDArray[np.float64]) -> NDArray[np.float64]:
+    cross = np.linalg.norm(np.cross(places[:, :3], here[:, :3]), axis=1)
+    angle = np.arctan2(cross, places[:, :3] @ here[0, :3])
+    return np.asarray(np.degrees(np.hypot(angle, places[:, 3] - here[0, 3])))

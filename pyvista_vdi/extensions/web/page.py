@@ -1,0 +1,381 @@
+"""One HTML file with the viewer and a VDI: opens from disk, offline, and loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import html
+import io
+import os
+import re
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi._version import __version__
+from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.series.writer import KEY_EVERY, StepsWriter, write_all
+from pyvista_vdi.extensions.web.bundle import viewer_script
+from pyvista_vdi.io.progress import Progress
+from pyvista_vdi.io.vdi_file import reader
+from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
+from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.io.vdi_file.writer import write_to
+from pyvista_vdi.io.whole_file import check_writable, whole_file
+from pyvista_vdi.model.compositing import opacity, transmittance
+from pyvista_vdi.model.metrics import over_background
+from pyvista_vdi.model.vdi import VDI
+
+#: What the script elements that hold a .vdi file as base64 say of themselves.
+DATA_TYPE = "application/vdi+base64"
+
+#: The same, of what is beside the VDI: see web/scenes/scene.py.
+_SCENE = '<script type="application/vdi-scene+base64">{}</script>\n'
+
+#: Longest edge of the still picture, pixels, and the quality of its JPEG.
+_STILL_EDGE, _STILL_QUALITY = 480, 75
+
+#: Bytes of a part of a series, which a page decodes from base64 at once; a multiple of three.
+_PART = 3 << 20
+#: Bytes of a page within which its data begin: behind the still picture.
+_HEAD = 1 << 20
+
+# To its end, or to that of a file that was cut
+_DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
+
+# Nothing is loaded, from nowhere: what the page needs is in it.
+_POLICY = "default-src 'unsafe-inline' 'unsafe-eval' data: blob:"
+
+# The coarse level stands before the script, which finds it there; the rest may still be coming.
+_PAGE = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="generator" content="pyvista-vdi {version}">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<title>{title}</title>
+<style>
+html, body {{ height: 100%; margin: 0; background: {background}; color: gray; }}
+vdi-viewer {{ width: 100%; height: 100%; aspect-ratio: auto; }}
+vdi-viewer:not(:defined) {{ display: block; text-align: center; }}
+vdi-viewer > img {{ max-width: 100%; max-height: 100%; }}
+p {{ font: 14px sans-serif; text-align: center; }}
+</style>
+</head>
+<body>
+{views}</body>
+</html>
+"""
+
+_VIEW = """\
+<vdi-viewer background="{background}"{attributes}>
+<img alt="{title}" src="data:image/jpeg;base64,{still}">
+{parts}</vdi-viewer>
+"""
+
+_NO_SCRIPT = (
+    "<noscript><p>Scripts are turned off: this is a still picture of what could be turned.</p>"
+    "</noscript>\n"
+)
+
+
+@dataclass
+class View:
+    """What a viewer in a page shows.
+
+    Attributes
+    ----------
+    vdi : VDI or None
+        As it is sent; ``None`` if all is in the scene, or it is a series.
+    background : str
+        As CSS has it.
+    still : numpy.ndarray
+        uint8 (H, W, 3), the picture where nothing can be turned.
+    still_size : (int, int)
+        Width and height that it is shown as, or smaller.
+    scene : bytes, optional
+        What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scenes.scene`.
+    attributes : dict of str to str
+        More attributes of the element.
+    series : sequence of bytes
+        Parts of a .vdis file; the first shows its first step. Or those of a .vdiset file.
+    """
+
+    vdi: VDI | None
+    background: str
+    still: NDArray[np.uint8]
+    still_size: Sequence[int]
+    scene: bytes | None = None
+    attributes: dict[str, str] = field(default_factory=dict)
+    series: Sequence[bytes] = ()
+
+
+def page(
+    vdi: VDI,
+    *,
+    title: str = "VDI",
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    precision: str | None = None,
+    level: int | None = None,
+    progress: Progress | None = None,
+) -> bytes:
+    """Return an HTML page that shows a VDI, as large as the window.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What to show.
+    title : str
+        Of the page.
+    background : (float, float, float)
+        RGB, 0 to 1, behind the VDI.
+    precision : {"exact", "16-byte", "8-byte"}, optional
+        Bytes of a supersegment before they are compressed; ``"8-byte"`` by default.
+    level : int, optional
+        Effort of the compressor (deflate), 1 to 9; 6 by default.
+    progress : callable, optional
+        As for :func:`pyvista_vdi.io.write`.
+
+    Returns
+    -------
+    bytes
+        UTF-8 text.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the background is no colour, or a list is too long for the precision.
+    """
+    sent = vdi.with_precision(precision or "8-byte")
+    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    still = over_background(_from_generating_view(vdi), background)
+    view = View(sent, f"rgb({percents})", np.rint(still * 255).astype(np.uint8), vdi.picture_size)
+    return assembled([view], title=title, level=level, progress=progress)
+
+
+def assembled(
+    views: Sequence[View],
+    *,
+    title: str,
+    level: int | None = None,
+    progress: Progress | None = None,
+) -> bytes:
+    """Return a page with one or several viewers.
+
+    Parameters
+    ----------
+    views : sequence of View
+        What they show. :func:`read` gives the first one's VDI back.
+    title : str
+        Of the page.
+    level, progress : optional
+        As for :func:`page`.
+    """
+    title = html.escape(title)
+    has_scene = any(view.scene is not None for view in views)
+    has_series = any(view.series for view in views)
+    parts = []
+    for number, view in enumerate(views):
+        files = list(view.series)
+        if view.vdi is not None:
+            stream = io.BytesIO()
+            write_to(stream, view.vdi, DEFLATE, level, progress if number == 0 else None)
+            data = stream.getvalue()
+            cut = _end_of_coarse(stream)
+            files = [data[:cut], data[cut:]]
+        of = f' data-of="{number}"' if number else ""  # read() looks for the first one's
+        texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in files]
+        first, rest = "".join(texts[:1]), "".join(texts[1:])
+        scene = "" if view.scene is None else _SCENE.format(_text(view.scene))
+        viewer = "" if number else viewer_script(scene=has_scene, series=has_series)
+        script = f"<script>\n{viewer}</script>\n" if viewer else ""
+        width, height = view.still_size
+        said = {"fit": f"{width}/{height}", **view.attributes}
+        named = {name: html.escape(value) for name, value in said.items()}
+        parts.append(
+            _VIEW.format(
+                title=title,
+                background=view.background,
+                attributes="".join(f' {name}="{value}"' for name, value in named.items()),
+                still=_text(_jpeg(view.still, view.still_size)),
+                parts=("" if number else _NO_SCRIPT) + first + scene + script + rest,
+            )
+        )
+    text = _PAGE.format(
+        version=__version__,
+        policy=_POLICY,
+        title=title,
+        background=views[0].background,
+        views="".join(parts),
+    )
+    return text.encode()
+
+
+def write(
+    vdi: VDI,
+    path: str | os.PathLike[str],
+    *,
+    compression: str = DEFLATE,
+    level: int | None = None,
+    precision: str | None = None,
+    title: str | None = None,
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    progress: Progress | None = None,
+) -> Path:
+    """Write a page with a VDI: see :func:`pyvista_vdi.io.write`, and :func:`page`.
+
+    ``compression`` is deflate, the one that browsers decode; the title is the file's name by
+    default.
+    """
+    target = Path(os.path.realpath(path))
+    content = page(
+        vdi,
+        title=target.stem if title is None else title,
+        background=background,
+        precision=precision,
+        level=level,
+        progress=progress,
+    )
+    with whole_file(target) as stream:
+        stream.write(content)
+    return target
+
+
+def write_series(
+    series: VDISeries,
+    path: str | os.PathLike[str],
+    *,
+    precision: str = "8-byte",
+    tolerance: float = 0.0,
+    key_every: int = KEY_EVERY,
+    compression: str = "zstd",
+    level: int | None = None,
+    title: str | None = None,
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    autoplay: bool = False,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a page that plays a series: see :meth:`pyvista_vdi.VDISeries.save`, and :func:`page`.
+
+    With ``autoplay`` it plays as soon as it is opened.
+    """
+    target = Path(os.path.realpath(check_writable(Path(path))))
+    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    first = series[0]
+    still = over_background(_from_generating_view(first), background)
+    writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
+    cut = write_all(stream, writer, series, series.times, progress)
+    view = View(
+        None,
+        f"rgb({percents})",
+        np.rint(still * 255).astype(np.uint8),
+        first.picture_size,
+        attributes={"autoplay": ""} if autoplay else {},
+        series=in_parts(stream.getvalue(), cut),
+    )
+    content = assembled([view], title=target.stem if title is None else title)
+    with whole_file(target) as out:
+        out.write(content)
+    return target
+
+
+def in_parts(data: bytes, cut: int) -> list[bytes]:
+    """Return the parts in which a page holds a .vdis or .vdiset file; the first has ``cut`` bytes.
+
+    Or a few more: base64 text is decoded by threes of bytes.
+    """
+    cut = -(-cut // 3) * 3
+    return [data[:cut], *(data[k : k + _PART] for k in range(cut, len(data), _PART))]
+
+
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:
+    """Read the VDI that a page shows: see :func:`pyvista_vdi.io.read`."""
+    return reader.read(path, progress=progress, stream=data_in(path))
+
+
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
+    """Read what a page's VDI says about itself: see :func:`pyvista_vdi.io.read_info`."""
+    return reader.read_info(path, stream=data_in(path))
+
+
+def begins_with(path: str | os.PathLike[str], magic: bytes) -> bool:
+    """Whether the file in a page begins so; False where there is none."""
+    try:
+        with Path(path).open("rb") as stream:
+            found = _DATA.search(stream.read(_HEAD))
+    except (OSError, TypeError, ValueError):
+        return False
+    text = found[1].lstrip()[: -(-len(magic) // 3) * 4] if found else b""
+    try:
+        return base64.b64decode(text).startswith(magic)
+    except binascii.Error:
+        return False
+
+
+def data_in(path: str | os.PathLike[str]) -> BinaryIO:
+    """Return the .vdi file in a page, or the .vdis one."""
+    try:
+        content = Path(path).read_bytes()
+    except (OSError, TypeError, ValueError) as error:
+        raise VDIFileError(
+            f"{path} cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from error
+    parts = _DATA.findall(content)
+    if not parts:
+        raise VDIFileError(
+            f"{path} is not a page with a VDI: it has no <script type={DATA_TYPE!r}>; "
+            "such a page is written by VDI.save() or 'pyvista-vdi convert'"
+        )
+    try:
+        return io.BytesIO(base64.b64decode(b"".join(b"".join(parts).split()), validate=True))
+    except binascii.Error as error:
+        raise VDIFileError(
+            f"{path} is damaged: what it holds of a VDI is no base64 ({error}); "
+            "copy it from its source again, or generate the VDI anew"
+        ) from error
+
+
+def _end_of_coarse(stream: BinaryIO) -> int:
+    """Return how many bytes of a .vdi file show its coarse level, as a multiple of three."""
+    with zipfile.ZipFile(stream) as archive:
+        members = archive.infolist()
+    behind = 2 if members[1].filename == COARSE else 1
+    return -(-members[behind].header_offset // 3) * 3
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def _jpeg(pixels: NDArray[np.uint8], size: Sequence[int]) -> bytes:
+    """Return a picture as a small JPEG."""
+    from PIL import Image
+
+    scale = min(1.0, _STILL_EDGE / max(size))
+    small = (max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
+    stream = io.BytesIO()
+    Image.fromarray(pixels).resize(small).save(stream, format="jpeg", quality=_STILL_QUALITY)
+    return stream.getvalue()
+
+
+def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:
+    """Composite each list's own supersegments: premultiplied RGBA (H, W, 4), top row first."""
+    counts = vdi.counts.reshape(-1)
+    tau = np.minimum(vdi.optical_depth, 100.0).astype(np.float64)
+    sums = np.concatenate([[0.0], np.cumsum(tau)])
+    before = sums[:-1] - np.repeat(sums[vdi.offsets.view(np.int64)[:-1]], counts)
+    share = transmittance(np.maximum(before, 0.0)) * opacity(tau)
+    own = np.repeat(np.arange(len(counts)), counts)
+    channels = [*(share * vdi.color.T.astype(np.float64)), share]
+    picture = np.empty((*vdi.window_size[::-1], 4))
+    for k, channel in enumerate(channels):
+        picture[..., k] = np.bincount(own, channel, len(counts)).reshape(picture.shape[:2])
+    return picture[::-1]

@@ -1,0 +1,44 @@
+"""The page that a server sends: a viewer, its controls, and the connection to the server."""
+
+from __future__ import annotations
+
+from pyvista_vdi.extensions.web.bundle import viewer_script
+
+_PAGE = """\
+<!DOCTYPE html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>VDI</title>
+<style>
+html, body {{ margin: 0; height: 100%; background: #202020; color: #d0d0d0; }}
+body {{ display: flex; flex-direction: column; font: 14px sans-serif; }}
+vdi-viewer {{ flex: 1; min-height: 0; }}
+form {{ position: relative; display: flex; flex-wrap: wrap; gap: 4px 16px; padding: 6px 10px;
+  align-items: center; min-height: 1.5em; }}
+label {{ display: flex; gap: 6px; align-items: center; }}
+input[type="number"] {{ width: 6em; }}
+input:invalid {{ outline: 2px solid #ff6060; }}
+/* Over the picture, as high as its text: the viewer's size, which is the view that is asked for,
+   depends on nothing that is said. */
+output {{ position: absolute; right: 0; bottom: 100%; max-width: 100%; box-sizing: border-box;
+  padding: 4px 10px; background: #000c; text-align: right; overflow-wrap: anywhere;
+  pointer-events: none; }}
+output:empty {{ padding: 0; }}
+</style>
+<body>
+<vdi-viewer id="viewer"></vdi-viewer>
+<form><span id="controls" style="display: contents"></span><output id="status"></output></form>
+<script type="module" nonce="{nonce}">
+{script}
+const byId = (id) => document.getElementById(id);
+window.remote = connectPage(byId("viewer"), byId("controls"), byId("status"));
+</script>
+</body>
+</html>
+"""
+
+
+def served_page(nonce: str) -> str:
+    """Return the page; its script carries the nonce of the page's content security policy."""
+    return _PAGE.format(nonce=nonce, script=viewer_script(remote=True, module=True))

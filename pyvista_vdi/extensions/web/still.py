@@ -1,0 +1,124 @@
+"""Pictures that stand where no viewer can, or does not turn: stills."""
+
+from __future__ import annotations
+
+import io
+import sys
+from base64 import b64encode
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.api import render
+from pyvista_vdi.errors import NoDeviceError
+from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
+from pyvista_vdi.io import to_bytes
+from pyvista_vdi.model.vdi import VDI
+
+#: How long a WebP file is packed, 0 to 100 and 0 to 6: by (0, 0) 1.2 to 2.6 times as long in a half
+#: to a tenth of the time, by (20, 2) a hundredth shorter.
+_EFFORT = {"quality": 0, "method": 1}
+#: Longest edge of a picture that is kept in a saved notebook, pixels.
+_EDGE = 800
+
+#: What an output does that has a picture, for where a widget's view comes to nothing: in a page
+#: that nbconvert has written with the widget's state, which has the view in place of the picture,
+#: and fetches from elsewhere what draws it; and in a notebook that is opened without its kernel.
+#: Viewers say that they are there in ``pyvistaVDIs``, and take the picture away.
+_STAND_IN = """\
+((place) => {{
+  const show = () => {{
+    if (!place || globalThis.pyvistaVDIs?.has("{key}")) return;
+    place.insertAdjacentHTML("beforeend", '<img data-vdi="{key}" style="max-width: 100%" '
+      + 'alt="a still picture of a volume" src="data:image/png;base64,{picture}">');
+  }};
+  const views = 'script[type="application/vnd.jupyter.widget-view+json"]';
+  if (document.readyState === "loading") {{
+    document.addEventListener("DOMContentLoaded", () => {{
+      const among = [...document.querySelectorAll(views)];
+      if (among.some(({{ textContent }}) => textContent.includes("{model_id}"))) show();
+    }});
+  }} else setTimeout(show, 3000);
+}})(typeof element === "undefined" ? null : element[0] ?? element);
+"""
+
+
+def picture(
+    vdi: VDI,
+    camera: dict[str, Any],
+    window_size: Sequence[int] | None = None,
+    background: Sequence[float] | None = None,
+    clipping_planes: ArrayLike | None = None,
+) -> NDArray[np.uint8]:
+    """Return what a viewer shows: uint8 (H, W, 3) RGB, or (H, W, 4) without a background.
+
+    Parameters
+    ----------
+    vdi : VDI
+        What it shows.
+    camera : dict
+        Its view, in the viewer's form.
+    window_size : (int, int), optional
+        Width and height in pixels; by default those the VDI was made for.
+    background : (float, float, float), optional
+        RGB, 0 to 1.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        As for :func:`pyvista_vdi.render`.
+    """
+    # Where the model is in the world is the VDI's own: the viewer's camera does not say it
+    placed = vdi.camera.model_transform
+    view = camera_of(camera).replace(model_transform=placed)
+    image = render(vdi, view, window_size, clipping_planes=clipping_planes)
+    return to_bytes(image, background)
+
+
+def still(
+    vdi: VDI,
+    camera: dict[str, Any] | None = None,
+    background: Sequence[float] | None = None,
+    clipping_planes: ArrayLike | None = None,
+    longest: int = _EDGE,
+) -> str | None:
+    """Return a view, the VDI's own by default, as base64 PNG; ``None`` without a device.
+
+    Its longer edge has at most ``longest`` pixels.
+    """
+    share = min(1, longest / max(vdi.picture_size))
+    size = [max(1, round(edge * share)) for edge in vdi.picture_size]
+    camera = viewer_camera(vdi.camera, vdi.picture_size) if camera is None else camera
+    try:
+        return png(picture(vdi, camera, size, background, clipping_planes))
+    except NoDeviceError:
+        return None
+
+
+def png(pixels: NDArray[np.uint8]) -> str:
+    """Return an image, uint8 (H, W, 3) or (H, W, 4), as base64 PNG."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="png")
+    return b64encode(stream.getvalue()).decode()
+
+
+def stand_in(picture: str, key: str, model_id: str) -> None:
+    """Have a notebook show a picture, base64 PNG, where a widget's view comes to nothing.
+
+    It is an output of its own: of one output, what shows notebooks takes the view alone.
+    """
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    if shell is not None and hasattr(shell, "kernel"):
+        script = _STAND_IN.format(picture=picture, key=key, model_id=model_id)
+        shell.display_pub.publish({"application/javascript": script})
+
+
+def webp(image: NDArray[np.float32]) -> bytes:
+    """Return a picture, premultiplied RGBA, float32 (H, W, 4), as a lossless WebP file: 8 bits."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(to_bytes(image)).save(stream, format="webp", lossless=True, **_EFFORT)
+    return stream.getvalue()

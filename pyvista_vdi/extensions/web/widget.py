@@ -1,0 +1,297 @@
+"""``VDIWidget``: the viewer in a notebook's output, which shares its camera with the kernel."""
+
+from __future__ import annotations
+
+import io
+import os
+import secrets
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.extensions.web.bundle import viewer_script
+from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
+from pyvista_vdi.extensions.web.still import picture, stand_in, still
+from pyvista_vdi.io import write_png
+from pyvista_vdi.io.vdi_file.layout import DEFLATE
+from pyvista_vdi.io.vdi_file.writer import write_to
+from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.packing import DEPTH_CODES
+from pyvista_vdi.model.render_options import checked_planes
+from pyvista_vdi.model.vdi import VDI
+
+try:
+    import anywidget
+    import traitlets
+except ImportError as error:
+    raise MissingDependencyError(
+        "a VDI is turned in a notebook by anywidget, which is not installed: "
+        'pip install "pyvista-vdi[notebook]"'
+    ) from error
+
+#: What anywidget calls in the page: a view of the model that the kernel's widget is.
+RENDER = """
+function render({ model, el }) {
+  const viewer = document.createElement("vdi-viewer");
+  const [width, height] = model.get("_picture_size");
+  viewer.style.cssText =
+    `display: block; width: 100%; max-width: ${width}px; aspect-ratio: ${width} / ${height}`;
+  let known = ""; // the camera that both sides have, as text
+  let told = 0; // the frame before which the kernel will be told
+  const takeCamera = () => {
+    const camera = model.get("camera");
+    const text = JSON.stringify(camera);
+    if (text === known) return;
+    known = text;
+    viewer.camera = camera;
+  };
+  const tellCamera = () => {
+    told = 0;
+    const text = JSON.stringify(viewer.camera);
+    if (text === known) return;
+    known = text;
+    model.set("camera", JSON.parse(text));
+    model.save_changes();
+  };
+  const onCamera = () => {
+    told = told || requestAnimationFrame(tellCamera);
+  };
+  const takeBackground = () => {
+    viewer.background = model.get("_gradient") || (model.get("background") ?? "transparent");
+  };
+  const takePlanes = () => {
+    // A scene has its own
+    const planes = model.get("_scene")?.byteLength ? [] : model.get("clipping_planes");
+    viewer.clippingPlanes =
+      planes.map((plane) => ({ origin: plane.slice(0, 3), normal: plane.slice(3) }));
+  };
+  const bytesOf = ({ buffer, byteOffset, byteLength }) =>
+    new Uint8Array(buffer, byteOffset, byteLength);
+  const takeScene = () => {
+    const packed = model.get("_scene"); // of a plotter
+    if (packed?.byteLength) viewer.scene = new Scene(bytesOf(packed));
+  };
+  const takeFile = () => {
+    viewer.showBytes(bytesOf(model.get("_file"))).catch(() => {}); // the viewer says what is wrong
+  };
+  el.replaceChildren(viewer);
+  const key = model.get("_key"); // what stands in for the viewer has it, too: still.py
+  (globalThis.pyvistaVDIs ??= new Set()).add(key);
+  document.querySelectorAll(`img[data-vdi="${key}"]`).forEach((picture) => picture.remove());
+  const taken = {
+    background: takeBackground, _gradient: takeBackground, clipping_planes: takePlanes,
+    _scene: takeScene, _file: takeFile, camera: takeCamera,
+  };
+  for (const [name, take] of Object.entries(taken)) {
+    take();
+    model.on(`change:${name}`, take);
+  }
+  viewer.addEventListener("camerachange", onCamera);
+  return () => {
+    cancelAnimationFrame(told);
+    for (const [name, take] of Object.entries(taken)) model.off(`change:${name}`, take);
+    viewer.remove();
+  };
+}
+export default { render };
+"""
+
+
+class _CameraTrait(traitlets.TraitType[dict[str, Any], Any]):
+    """A camera in the viewer's form; whatever is a camera becomes one."""
+
+    def validate(self, obj: Any, value: Any) -> dict[str, Any]:
+        return viewer_camera(value, obj._picture_size)
+
+
+class _ColorTrait(traitlets.TraitType["str | None", Any]):
+    """A colour as ``#rrggbb``, or ``None``."""
+
+    def validate(self, obj: Any, value: Any) -> str | None:
+        return None if value is None else _hex(value)
+
+
+class _PlanesTrait(traitlets.TraitType[list[list[float]], Any]):
+    """Clipping planes as lists of six numbers."""
+
+    def validate(self, obj: Any, value: Any) -> list[list[float]]:
+        planes = [list(plane) for plane in checked_planes(value)]
+        if len(planes) > MOST_PLANES:
+            raise InvalidArgumentError(
+                f"clipping_planes: the viewer clips a VDI to {MOST_PLANES} planes at most; "
+                f"got {len(planes)}"
+            )
+        return planes
+
+
+class VDIWidget(anywidget.AnyWidget):
+    """A VDI in a notebook's output, turned in the browser.
+
+    Its camera is one with the browser's: what is turned there is read here in another cell, and
+    what is set here is seen there. Nothing is fetched from elsewhere: viewer and VDI are in the
+    widget. The cell's output holds a picture besides, for what shows notebooks without running
+    them.
+
+    Parameters
+    ----------
+    vdi : VDI or vtkImageData
+        What to show, or its VTK form (``pyvista.read("x.vdi")``).
+    camera : Camera or pyvista.Camera or vtkCamera or dict, optional
+        The first view; by default the VDI's own.
+    background : str or (float, float, float), optional
+        ``"white"``, ``"#204060"`` or RGB from 0 to 1; by default the page shows through.
+    precision : {"8-byte", "16-byte", "exact"}, optional
+        What a supersegment takes on its way to the browser, see
+        :meth:`pyvista_vdi.VDI.with_precision`; by default 8 bytes, or what it has where lists are
+        too long for that.
+
+    Attributes
+    ----------
+    camera : dict
+        ``position``, ``focal_point``, ``view_up`` (world units), and ``view_angle`` (vertical,
+        degrees) or ``parallel_scale`` (world units). Any camera can be set:
+        ``widget.camera = plotter.camera``. A traitlet: ``widget.observe(function, "camera")`` is
+        told of each change.
+    background : str or None
+        ``#rrggbb``; whatever the argument takes can be set. A traitlet.
+    clipping_planes : list of list of float
+        Origin and normal of each plane, world coordinates; the side that the normal points to is
+        kept. Anything of the shape (k, 6) can be set, or ``None``. A traitlet.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+
+    Examples
+    --------
+    >>> from pyvista_vdi.extensions.web import VDIWidget  # doctest: +SKIP
+    >>> widget = VDIWidget(vdi, background="white")  # doctest: +SKIP
+    >>> widget  # doctest: +SKIP
+    """
+
+    _esm = viewer_script(module=True) + RENDER
+    _file = traitlets.Bytes().tag(sync=True)
+    _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
+    _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
+    _picture_size = traitlets.List(traitlets.Int(), [1, 1]).tag(sync=True)
+    _key = traitlets.Unicode("").tag(sync=True)
+    camera = _CameraTrait(allow_none=False).tag(sync=True)
+    background = _ColorTrait(None, allow_none=True).tag(sync=True)
+    clipping_planes = _PlanesTrait([]).tag(sync=True)
+
+    def __init__(
+        self,
+        vdi: Any,
+        *,
+        camera: Any = None,
+        background: Any = None,
+        precision: str | None = None,
+    ) -> None:
+        self._precision = precision
+        self._vdi = as_vdi(vdi)
+        super().__init__(
+            _file=self._encoded(self._vdi),
+            _picture_size=list(self._vdi.picture_size),
+            _key=secrets.token_hex(8),
+            camera=self._vdi.camera if camera is None else camera,
+            background=background,
+        )
+
+    @property
+    def vdi(self) -> VDI:
+        """What is shown. Another one that is set takes its place whole; the camera stays."""
+        return self._vdi
+
+    @vdi.setter
+    def vdi(self, vdi: Any) -> None:
+        vdi = as_vdi(vdi)
+        self._file = self._encoded(vdi, coarse=False)  # the one before is better meanwhile
+        self._vdi = vdi
+
+    def screenshot(
+        self,
+        filename: str | os.PathLike[str] | None = None,
+        window_size: Sequence[int] | None = None,
+    ) -> NDArray[np.uint8]:
+        """Return the picture of the present view, drawn by the kernel's OpenCL device.
+
+        A cell that runs cannot wait for the browser; this does not need one.
+
+        Parameters
+        ----------
+        filename : path-like, optional
+            A ``.png`` to write it to.
+        window_size : (int, int), optional
+            Width and height in pixels; by default what the VDI was made for.
+
+        Returns
+        -------
+        numpy.ndarray
+            uint8 (H, W, 3) RGB over the background, or without one (H, W, 4) straight RGBA; top
+            row first.
+
+        Raises
+        ------
+        NoDeviceError
+            If there is no OpenCL device.
+        VDIFileError
+            If the file cannot be written.
+        """
+        background = _rgb(self.background)
+        pixels = picture(self.vdi, self.camera, window_size, background, self.clipping_planes)
+        if filename is not None:
+            write_png(pixels, filename)
+        return pixels
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.vdi!r})"
+
+    def _encoded(self, vdi: VDI, *, coarse: bool = True) -> bytes:
+        fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
+        sent = vdi.with_precision(self._precision or "8-byte") if fits else vdi
+        stream = io.BytesIO()
+        # A cell waits for it: a twentieth more bytes than by level 6, in half the time
+        write_to(stream, sent, DEFLATE, 1, coarse=coarse)
+        return stream.getvalue()
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        """Return the view, and a picture for where there can be no view."""
+        data, metadata = super()._repr_mimebundle_(**kwargs)
+        shown = self._still()
+        if shown is None:
+            return data, metadata
+        stand_in(shown, self._key, self.model_id)
+        return {**data, "image/png": shown}, metadata
+
+    def _still(self) -> str | None:
+        """Return that picture as base64 PNG, if it can be had."""
+        return still(self.vdi, self.camera, _rgb(self.background), self.clipping_planes)
+
+
+def _hex(color: Any) -> str:
+    """Return a colour as ``#rrggbb``: of CSS, RGB from 0 to 1, or of PyVista."""
+    from PIL import ImageColor
+
+    try:
+        if isinstance(color, str):
+            values: tuple[int, ...] = ImageColor.getrgb(color)[:3]
+        else:
+            rgb = [float(value) for value in getattr(color, "float_rgb", color)]
+            if len(rgb) != 3 or not all(0 <= value <= 1 for value in rgb):
+                raise ValueError
+            values = tuple(round(255 * value) for value in rgb)
+    except (TypeError, ValueError):
+        raise InvalidArgumentError(
+            "a background is a name of CSS, '#rrggbb', or red, green and blue from 0 to 1; "
+            f"got {color!r}"
+        ) from None
+    return "#" + "".join(f"{value:02x}" for value in values)
+
+
+def _rgb(color: str | None) -> tuple[float, ...] | None:
+    """Return the colour of ``#rrggbb`` as RGB from 0 to 1."""
+    return None if color is None else tuple(value / 255 for value in bytes.fromhex(color[1:]))

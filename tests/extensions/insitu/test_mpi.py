@@ -1,0 +1,234 @@
+"""Blocks with four ranks of Open MPI, and a simulation that hands them in."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.extensions.insitu import InSitu
+from pyvista_vdi.extensions.large.generate import generate_chunked
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.quality.probe import turned
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "insitu.py"
+PROGRAM = Path(__file__).parents[2] / "support" / "mpi_program.py"
+
+needs_mpi = pytest.mark.skipif(
+    shutil.which("mpirun") is None or find_spec("mpi4py") is None,
+    reason="needs mpirun (Debian: openmpi-bin) and mpi4py (extra: mpi)",
+)
+
+
+def run(ranks, program, *arguments):
+    mpirun = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", str(ranks)]
+    done = subprocess.run(
+        [*mpirun, sys.executable, program, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@needs_mpi
+def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
+    tmp_path, default_runtime
+):
+    volume = volume_of("uint8")
+    function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
+    camera = VIEWS["all of it"](volume)
+    arguments = (volume, camera, WINDOW, function)
+    options = {"max_supersegments": 8, "ambient_occlusion": 8.0, "device": default_runtime}
+    # Here, so that not each rank compiles the kernels
+    generate_chunked(*arguments, chunks=(20, 41, 27), block_bytes=1, **options)
+    run(4, PROGRAM, "failing,same", tmp_path)
+    found = pvdi.read(tmp_path / "mpi.vdi")
+    whole = generate_vdi(*arguments, **options)
+    assert found.metadata["blocks"] == [2, 1, 2]
+    assert found.n_supersegments > 1000
+    # float32 sums of up to 200 steps, in another order: 200 x 2^-24, and as much for the other
+    np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
+    pictures = [pvdi.render(vdi, camera) for vdi in (found, whole)]
+    assert np.abs(pictures[0] - pictures[1]).max() <= 1 / 255
+    view = turned(camera, volume.bounds, 5)
+    assert compare_images(*(pvdi.render(vdi, view) for vdi in (found, whole))).ssim > 0.99
+
+
+@needs_mpi
+def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(tmp_path, default_runtime):
+    run(2, PROGRAM, "mistakes", tmp_path)
+
+
+@needs_mpi
+def test_whatever_is_wrong_with_the_input_of_one_rank_all_raise(tmp_path, default_runtime):
+    run(3, PROGRAM, "pipeline,closing", tmp_path)
+
+
+@pytest.mark.slow
+@needs_mpi
+def test_a_simulation_writes_a_series_and_single_files(tmp_path):
+    run(4, PROGRAM, "series", tmp_path)
+    series = pvdi.read(tmp_path / "run.vdis")
+    assert list(series.times) == [0.0, 1.0]
+    assert sorted(path.name for path in tmp_path.glob("*.vdi")) == ["s00.vdi", "s02.vdi"]
+    for k, name in enumerate(("s00.vdi", "s02.vdi")):
+        single = pvdi.read(tmp_path / name)
+        assert single.n_supersegments > 1000
+        np.testing.assert_array_equal(series[k].front, single.front)
+        np.testing.assert_array_equal(series[k].optical_depth, single.optical_depth)
+
+
+@needs_mpi
+@pytest.mark.slow
+def test_the_example_writes_a_picture_and_says_what_it_costs(tmp_path):
+    said = run(2, EXAMPLE, tmp_path / "smoke.png")
+    assert re.search(r"solver: \d+ ms a step; in situ: \d+ ms a VDI", said), said
+    picture = np.asarray(Image.open(tmp_path / "smoke.png").convert("RGB")).astype(int)
+    assert (picture[..., 0] - picture[..., 2] > 60).sum() > 200  # orange, in the spiral's middle
+    assert len(pvdi.read(tmp_path / "smoke.vdis")) == 7
+
+
+class OneRank:
+    """A communicator of one."""
+
+    rank, size = 0, 1
+
+    def allgather(self, value):
+        return [value]
+
+    gather = allgather
+
+    def alltoall(self, values):
+        return values
+
+    def scatter(self, values):
+        return values[0]
+
+    def bcast(self, value):
+        return value
+
+
+@pytest.fixture
+def scene(default_runtime):
+    pytest.importorskip("pyvista")  # its colour maps
+    volume = volume_of("uint8")
+    return volume, VIEWS["all of it"](volume), WINDOW
+
+
+def test_one_rank_is_one_piece(tmp_path, scene):
+    volume, *view = scene
+    options = {"clim": (0, 200), "precision": "exact"}
+    path = str(tmp_path / "{}.vdi")
+    with InSitu(path, *view, volume.dimensions, comm=OneRank(), **options) as show:
+        show(volume.array, (0, 0, 0), 0.0)
+    found = pvdi.read(tmp_path / "0.vdi")
+    expected = pvdi.generate(*scene, **options)
+    assert found.n_supersegments == expected.n_supersegments
+    np.testing.assert_array_equal(found.front, expected.front)
+
+
+@pytest.mark.parametrize("precision", ["exact", "16-byte"])
+def test_a_series_has_the_precision_that_is_asked_for(precision, tmp_path, scene):
+    volume, *view = scene
+    options = {"clim": (0, 200), "precision": precision}
+    path = tmp_path / "RUN.VDIS"
+    with InSitu(path, *view, volume.dimensions, comm=OneRank(), **options) as show:
+        show(volume.array, (0, 0, 0), 0.0)
+    found = pvdi.read(path)[0]
+    assert found.precision == precision
+    assert found.n_supersegments > 1000
+
+
+def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, scene):
+    volume, *view = scene
+    told = []
+
+    class Told(OneRank):
+        def allgather(self, value):
+            told.append(value)
+            return [value]
+
+    with pytest.raises(VDIFileError, match="does not exist"):
+        InSitu(tmp_path / "none" / "x.vdis", *view, volume.dimensions, comm=Told(), clim=(0, 200))
+    assert "does not exist" in str(told[-1])
+    show = InSitu(tmp_path / "{}.vdi", *view, volume.dimensions, comm=Told(), clim=(0, 200))
+    (tmp_path / "0.vdi").mkdir()
+    with pytest.raises(VDIFileError, match="is a folder"):
+        show(volume.array, (0, 0, 0), 0.0)
+    assert "is a folder" in str(told[-1])
+
+
+def simulate(path, scene, times, **options):
+    volume, camera, size = scene
+    options = {"clim": (0, 200), "max_supersegments": 4, **options}
+    with InSitu(path, camera, size, volume.dimensions, comm=OneRank(), **options) as show:
+        for time in times:
+            show(volume.array, (0, 0, 0), time)
+    return show
+
+
+@pytest.mark.parametrize("name", ["run.vdis", "s{:02d}.vdi"])
+def test_what_an_earlier_run_wrote_is_kept_or_gone_on_with(name, tmp_path, scene):
+    volume, camera, size = scene
+    path = tmp_path / name
+
+    def times():
+        if name == "run.vdis":
+            return list(pvdi.read(path).times)
+        return [pvdi.read(file).metadata["time"] for file in sorted(tmp_path.glob("s*.vdi"))]
+
+    show = simulate(path, scene, [0.0, 1.0, 2.0])
+    with pytest.raises(VDIFileError, match=r"is closed.*append=True"):
+        show(volume.array, (0, 0, 0), 3.0)
+    with pytest.raises(VDIFileError, match=r"is there already.*append=True.*overwrite=True"):
+        simulate(path, scene, [0.0])
+    simulate(path, scene, [3.0, 4.0], append=True)
+    for wrong, message in (
+        ({"times": [4.0]}, "times must ascend"),
+        ({"scene": (volume, camera.azimuth(1), size)}, "its camera is"),
+        ({"scene": (volume, camera, (9, 8))}, "its window_size is"),
+        ({"clim": (0, 100)}, "same classification"),
+        ({"overwrite": True}, "pass one of them"),
+    ):
+        with pytest.raises(InvalidArgumentError, match=message):
+            simulate(path, **{"scene": scene, "times": [9.0], "append": True, **wrong})
+    assert times() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    simulate(path, scene, [0.5], overwrite=True)
+    assert times()[0] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "dimensions", "options", "error", "message"),
+    [
+        ("x.vdis", (8, 8, 8), {}, InvalidArgumentError, "clim"),
+        *(
+            (name, (8, 8, 8), {"clim": (0, 1)}, InvalidArgumentError, "place for the step")
+            for name in ("x.vdi", "{}_{}.vdi", "{step}.vdi", "x{.vdi")
+        ),
+        ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": 0}, InvalidArgumentError, "every"),
+        *(
+            ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": every}, InvalidArgumentError, "every")
+            for every in ("often", "2", 2.5, None, True)
+        ),
+        ("x.vdis", (8, 8), {"clim": (0, 1)}, InvalidArgumentError, "three whole numbers"),
+        ("x.vdis", (8, 8, 8), {"clim": (0, 1), "colour": "red"}, TypeError, "colour"),
+    ],
+)
+def test_what_is_missing_is_said(name, dimensions, options, error, message, tmp_path):
+    camera = VIEWS["all of it"](volume_of("uint8"))
+    with pytest.raises(error, match=message):
+        InSitu(tmp_path / name, camera, WINDOW, dimensions, comm=OneRank(), **options)

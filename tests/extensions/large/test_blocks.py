@@ -1,0 +1,456 @@
+"""A volume in blocks: cuts, halos, the order in which V_O sees them, and the VDI of one piece."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from runtimes import fresh_runtime
+from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
+
+import pyvista_vdi as pvdi
+from pyvista_vdi import Shading, TransferFunction, Volume
+from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.errors import Cancelled, DeviceMemoryError
+from pyvista_vdi.extensions.large.blocks import Blocks, Halo
+from pyvista_vdi.extensions.large.generate import generate_chunked, task_of
+from pyvista_vdi.extensions.large.passes import Piece, light_entering
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.options import CRITERIA, GenerationOptions
+from pyvista_vdi.quality.probe import turned
+
+HALOS = [Halo(0, 1), Halo(1, 3)]
+CUTS = [(16, 16, 16), (47, 9, 50), (20, 41, 13)]
+
+
+@pytest.mark.parametrize("points", [(5, 6, 7), (33, 16, 17), (40, 19, 64)])
+@pytest.mark.parametrize("chunks", [(4, 4, 4), (16, 7, 100)])
+def test_every_point_is_in_one_block(points, chunks):
+    grid = Volume(np.zeros(points, np.uint8))
+    blocks = Blocks.of(grid, chunks, 1, 2000)
+    owners = np.zeros(points, int)
+    for block in blocks:
+        own = blocks.own(block)
+        owners[own] += 1
+        assert all(part.stop - part.start >= 4 or n < 8 for part, n in zip(own, points))  # noqa: B905
+        assert all(part.start % chunk == 0 for part, chunk in zip(own, chunks, strict=True))
+    assert (owners == 1).all()
+
+
+def test_blocks_grow_up_to_the_bytes_that_they_may_have():
+    grid = Volume(np.zeros((64, 64, 64), np.uint8))
+    for item, most, counts in ((1, 16**3, (4, 4, 4)), (2, 16**3, (4, 4, 8)), (1, 1, (8, 8, 8))):
+        assert Blocks.of(grid, (8, 8, 8), item, most).counts == counts
+
+
+@pytest.mark.parametrize("halo", HALOS, ids=str)
+@pytest.mark.parametrize("chunks", [(4, 5, 6), (8, 19, 7)])
+def test_neighbours_give_the_halo(halo, chunks):
+    values = np.random.default_rng(1).integers(0, 255, (13, 19, 17), np.uint8)
+    blocks = Blocks.of(Volume(values), chunks, 1, 1)
+    slabs = {block: halo.slabs(values[blocks.own(block)]) for block in blocks}
+    for block in blocks:
+        parts = {
+            offset: halo.from_slabs(slabs[other], offset)
+            for offset, other in blocks.neighbours(block, halo).items()
+        }
+        found = blocks.with_halo(values[blocks.own(block)], parts, halo)
+        box = tuple(
+            slice(max(part.start - halo.before, 0), part.stop + halo.after)
+            for part in blocks.own(block)
+        )
+        np.testing.assert_array_equal(found, values[box], str(block))
+        first = blocks.part(block, halo, (0, 1)).first
+        assert first == tuple(part.start for part in reversed(box))
+
+
+def test_ranges_of_chunks_come_together_and_apart():
+    values = np.random.default_rng(2).random((13, 19, 17)).astype(np.float32)
+    values[:4, :5] = np.nan
+    blocks = Blocks.of(Volume(values), (4, 5, 6), 4, 8 * 10 * 12 * 4)
+    low, high = blocks.to_chunks(
+        {block: blocks.ranges(values[blocks.own(block)]) for block in blocks}
+    )
+    assert low.shape == (4, 4, 3)
+    np.testing.assert_array_equal(low[3, 1, 2], values[12:, 5:10, 12:].min())
+    np.testing.assert_array_equal(high[0, 3, 1], values[:4, 15:, 6:12].max())
+    assert np.isnan(low[0, 0]).all()
+    for block, (least, largest) in blocks.of_chunks(low, high).items():
+        own = values[blocks.own(block)]
+        assert (least, largest) == (np.nanmin(own), np.nanmax(own))
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def points_along(camera, x, y):
+    """Homogeneous points of the model frame along the ray of a pixel."""
+    t = np.linspace(0.01, 250, 2000)
+    across = (np.array([x, y]) + 0.5) / WINDOW * 2 - 1 + camera.window_center
+    u, v = across * np.array(camera.half_extent(WINDOW))
+    scale = np.ones_like(t) if camera.parallel_projection else t
+    return np.linalg.inv(camera.model_to_view) @ [u * scale, v * scale, t, np.ones_like(t)]
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_rays_meet_blocks_in_their_order_and_windows(view):
+    volume = volume_of("uint8")
+    camera = VIEWS[view](volume)
+    blocks = Blocks.of(volume, (12, 10, 9), 1, 1)
+    order = {block: k for k, block in enumerate(blocks.in_order(camera))}
+    windows = blocks.windows(camera, WINDOW)
+    assert sorted(order) == sorted(blocks)
+    met = 0
+    to_index = np.linalg.inv(volume.index_to_model)
+    last = np.array(volume.dimensions)[:, None] - 1
+    for x, y in itertools.product(range(0, WINDOW[0], 4), range(0, WINDOW[1], 3)):
+        at = (to_index @ points_along(camera, x, y))[:3]
+        at = at[::-1, ((at >= 0) & (at <= last)).all(axis=0)]
+        numbers = [
+            np.clip(np.searchsorted(cuts[1:-1], positions, side="right"), 0, len(cuts) - 2)
+            for cuts, positions in zip(blocks.cuts, at, strict=True)
+        ]
+        passed = [
+            block for block, _ in itertools.groupby(zip(*np.array(numbers).tolist(), strict=True))
+        ]
+        places = [order[block] for block in passed]
+        assert places == sorted(places)
+        for block in passed:
+            window = windows[block]
+            assert window.x0 <= x < window.x1
+            assert window.y0 <= y < window.y1
+            met += 1
+    assert met > 200
+
+
+def in_blocks(volume, camera, function, chunks=(16, 16, 16), **options):
+    return generate_chunked(
+        volume, camera, WINDOW, function, chunks=chunks, block_bytes=1, **options
+    )
+
+
+def both_ways(volume, camera, function, chunks=(16, 16, 16), **options):
+    """Return the VDI of one piece, and that of blocks."""
+    whole = generate_vdi(volume, camera, WINDOW, function, **options)
+    return whole, in_blocks(volume, camera, function, chunks, **options)
+
+
+def check_ray_depths(found, whole):
+    """Optical depths add up whatever is merged: a step that is lost or taken twice shows.
+
+    float32 sums of up to 200 steps, in another order: 200 x 2^-24, and as much for the reference.
+    """
+    np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=2.4e-5, atol=1e-7)
+
+
+@pytest.mark.every(3)
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize(
+    "cuts", [CUTS[0], *(pytest.param(c, marks=pytest.mark.slow) for c in CUTS[1:])], ids=str
+)
+def test_every_step_belongs_to_one_block(runtime, view, cuts):
+    volume = volume_of("uint8", (1, 1.3, 0.8))
+    camera = VIEWS[view](volume)
+    options = {"max_supersegments": 12, "device": runtime.info.selector}
+    whole, found = both_ways(volume, camera, transfer_for(volume, "linear"), cuts, **options)
+    assert whole.n_supersegments > 500
+    assert found.metadata["blocks"] != [1, 1, 1]
+    assert np.diff(found.offsets.astype(np.int64)).max() <= 12
+    check_ray_depths(found, whole)
+
+
+BY_GRADIENT = {"gradient_opacities": np.linspace(0, 1, 8), "gradient_range": (0.0, 40.0)}
+KINDS = {
+    "bytes": ("uint8", "nearest", {}),
+    "words": ("uint16", "linear", {}),
+    "floats with NaN": ("float32", "linear", {}),
+    "scaled": ("float64", "linear", {}),
+    "shaded": ("uint8", "linear", {"shading": Shading()}),
+    "gradient opacity": ("int16", "linear", BY_GRADIENT),
+}
+
+
+@pytest.mark.every(6)
+@pytest.mark.parametrize("kind", KINDS)
+def test_pictures_are_those_of_one_piece(runtime, kind):
+    """At V_O to the rounding of float32; elsewhere lists are merged a little otherwise at faces.
+
+    Noise in lists that are several voxels wide is the worst case: less is changed than by marching
+    with steps that are two hundredths shorter.
+    """
+    dtype, interpolation, options = KINDS[kind]
+    volume = volume_of(dtype)
+    camera = VIEWS["all of it"](volume)
+    function = transfer_for(volume, interpolation, **options)
+    device = runtime.info.selector
+    whole, found = both_ways(volume, camera, function, device=device)
+    other = generate_vdi(volume, camera, WINDOW, function, device=device, sample_distance=0.49)
+    for degrees in (0, 5, 30):
+        view = turned(camera, volume.bounds, degrees)
+        expected, drawn, by_other = (
+            pvdi.render(vdi, view, device=device) for vdi in (whole, found, other)
+        )
+        compared = compare_images(expected, drawn)
+        assert compared.ssim >= compare_images(expected, by_other).ssim, (degrees, compared)
+        if degrees == 0:
+            assert np.abs(expected - drawn).max() <= 1 / 255
+
+
+@pytest.mark.every(3)
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_every_criterion(criterion):
+    volume = volume_of("uint8")
+    camera = VIEWS["all of it"](volume)
+    options = {"criterion": criterion, "max_supersegments": 6}
+    whole, found = both_ways(volume, camera, transfer_for(volume), **options)
+    assert np.diff(found.offsets.astype(np.int64)).max() <= 6
+    assert abs(found.n_supersegments / whole.n_supersegments - 1) < 0.01
+    expected, drawn = (pvdi.render(vdi, turned(camera, volume.bounds, 5)) for vdi in (whole, found))
+    # Of six supersegments each counts; measured: .9961 to 1
+    assert compare_images(expected, drawn).ssim >= 0.995
+
+
+def test_what_is_visible_only_between_two_blocks_is_seen():
+    """Neither 0 nor 200 shows; half way between them, in the cell between two blocks, 100 does."""
+    values = np.zeros((16, 16, 16), np.uint8)
+    values[:, :, 8:] = 200
+    volume = Volume(values)
+    opacities = np.zeros(256)
+    opacities[80:120] = 0.8
+    function = TransferFunction(np.ones((256, 3)), opacities, (0, 255), interpolation="linear")
+    camera = VIEWS["all of it"](volume)
+    whole, found = both_ways(volume, camera, function, (8, 8, 8))
+    assert whole.n_supersegments > 50
+    np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=1e-5)
+
+
+def first_passes(task, volume, blocks=None):
+    """What the first pass finds in all blocks, or in some."""
+    windows = task.blocks.windows(task.camera, WINDOW)
+    return windows, {
+        block: task.first_pass(block, volume.array[task.blocks.own(block)], windows[block])
+        for block in (blocks or windows)
+    }
+
+
+def first_depths(volume, camera, function, chunks):
+    """Return the sums of the optical depths that the first pass finds in all blocks."""
+    task = task_of(volume, camera, WINDOW, function, GenerationOptions(), chunks, 1)
+    total = np.zeros(WINDOW[::-1])
+    windows, seen = first_passes(task, volume)
+    for block, window in windows.items():
+        if seen[block].depths is not None:
+            total[window.y0 : window.y1, window.x0 : window.x1] += seen[block].depths
+    return total
+
+
+def test_the_first_pass_finds_the_light():
+    """One step per voxel of a smooth medium: the same ones whatever the blocks."""
+    z, y, x = np.mgrid[-1:1:40j, -1:1:36j, -1:1:44j]
+    volume = Volume((200 * np.exp(-2 * (x**2 + y**2 + z**2))).astype(np.uint8))
+    function = TransferFunction(np.ones((2, 3)), [0, 0.3], (0, 255), interpolation="nearest")
+    camera = VIEWS["all of it"](volume)
+    whole = ray_depths(generate_vdi(volume, camera, WINDOW, function)).reshape(WINDOW[::-1])
+    coarse, fine = (first_depths(volume, camera, function, n) for n in ((20, 18, 22), (7, 9, 8)))
+    deep = whole > 0.2
+    assert deep.sum() > 500
+    # At a face the last point stands for the next, which differs either way; if each block sampled
+    # its own first step, the mean would be 2 % larger
+    for depths in (coarse, fine):
+        assert depths[deep].mean() == pytest.approx(whole[deep].mean(), rel=0.01)
+        np.testing.assert_allclose(depths[deep], whole[deep], rtol=0.15)
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "behind", "expected"),
+    [("nearest", 100, 1), ("nearest", 200, 2), ("linear", 200, 4)],
+)
+def test_runs_are_joined_at_faces_where_they_are_alike(interpolation, behind, expected):
+    """Blocks meet at z = 8. The medium changes before it, or by two steps of half a cell at it."""
+    values = np.full((16, 16, 16), 100, np.uint8)
+    values[9 if interpolation == "linear" else 8 :] = behind
+    volume = Volume(values)
+    table = np.linspace([1, 0, 0], [0, 1, 1], 256)
+    function = TransferFunction(table, np.full(256, 0.2), (0, 255), interpolation=interpolation)
+    camera = VIEWS["along an axis"](volume).replace(
+        position=(7.5, 7.5, 60), focal_point=(7.5, 7.5, 7.5), parallel_scale=6
+    )
+    options = {"sample_distance": 0.5, "max_supersegments": 20}
+    whole, vdi = both_ways(volume, camera, function, (8, 16, 16), **options)
+    assert vdi.metadata["blocks"] == [2, 1, 1]
+    found, of_whole = (np.diff(each.offsets.astype(int)) for each in (vdi, whole))
+    assert (of_whole > 0).sum() > 500
+    np.testing.assert_array_equal(of_whole[of_whole > 0], expected)
+    np.testing.assert_array_equal(found, of_whole)
+
+
+def test_rows_do_not_depend_on_where_they_are_cut():
+    volume = volume_of("uint8")
+    camera = VIEWS["all of it"](volume)
+    options = GenerationOptions(max_supersegments=5)
+    task = task_of(volume, camera, WINDOW, transfer_for(volume), options, (8, 8, 8), 1)
+    blocks, halo = task.blocks, task.halo
+    windows, seen = first_passes(task, volume)
+    pieces = []
+    for block, light in light_entering(task, windows, seen).items():
+        parts = {
+            offset: halo.from_slabs(seen[other].slabs, offset)
+            for offset, other in blocks.neighbours(block, halo).items()
+        }
+        values = blocks.with_halo(volume.array[blocks.own(block)], parts, halo)
+        pieces.append(task.second_pass(block, values, windows[block], light))
+    height = WINDOW[1]
+    whole = task.merge(0, height, pieces)
+    for cuts in ((0, 20, height), (0, 4, 8, 28, height), range(height + 1)):
+        rows = [task.merge(y0, y1, pieces) for y0, y1 in itertools.pairwise(cuts)]
+        for k, expected in enumerate(whole):
+            np.testing.assert_array_equal(np.concatenate([part[k] for part in rows]), expected)
+
+
+def test_rows_of_a_piece():
+    counts = np.array([[1, 0], [2, 1], [0, 0], [1, 1]], np.uint16)
+    runs = np.arange(6 * 8, dtype=np.float32).reshape(6, 8)
+    piece = Piece(Rectangle(3, 5, 10, 14), counts, runs)
+    part = piece.rows(11, 13)
+    assert part.window == Rectangle(3, 5, 11, 13)
+    np.testing.assert_array_equal(part.counts, counts[1:3])
+    np.testing.assert_array_equal(part.runs, runs[1:4])
+    assert piece.rows(0, 10).counts.shape == (0, 2)
+    assert len(piece.rows(14, 20).runs) == 0
+
+
+def test_known_ranges_leave_blocks_unread():
+    volume = volume_of("uint8")
+    camera = VIEWS["all of it"](volume)
+    task = task_of(volume, camera, WINDOW, transfer_for(volume), GenerationOptions(), (8, 8, 8), 1)
+    blocks = task.blocks
+    windows, seen = first_passes(task, volume)
+    ranges = blocks.to_chunks(
+        {block: blocks.ranges(volume.array[blocks.own(block)]) for block in blocks}
+    )
+    some = task.to_read(windows, ranges)
+    assert 0 < len(some) < len(blocks) == len(task.to_read(windows, None))
+    assert set(light_entering(task, windows, seen)) <= set(some)
+
+
+class Store:
+    """A zarr array, as far as volumes know, that counts the points that are read."""
+
+    chunks = (8, 8, 8)
+
+    def __init__(self, values):
+        self.values, self.shape, self.dtype, self.points = values, values.shape, values.dtype, 0
+
+    def __getitem__(self, box):
+        part = self.values[box]
+        self.points += part.size
+        return part
+
+
+Store.__module__ = "zarr.test"
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
+def test_what_nothing_shows_of_is_read_once(default_runtime, interpolation):
+    """The second VDI of a store knows its ranges: bytes that are not read change no bit of it."""
+    rng = np.random.default_rng(8)
+    values = np.zeros((48, 40, 40), np.uint8)
+    values[:20] = rng.integers(1, 9, (20, 40, 40))  # noise of which nothing shows
+    values[14:30, 10:20, 5:30] = rng.integers(100, 200, (16, 10, 25))
+    store = Store(values)
+    volume = Volume(store)
+    opacities = np.where(np.arange(256) < 50, 0, 0.3)
+    function = TransferFunction(np.ones((256, 3)), opacities, (0, 255), interpolation=interpolation)
+    camera = VIEWS["all of it"](volume)
+    read, made = [], []
+    for _ in range(2):
+        store.points = 0
+        vdi = generate_chunked(volume, camera, WINDOW, function, block_bytes=16**3)
+        assert vdi.metadata["points_read"] == store.points
+        read.append(store.points)
+        made.append(vdi)
+    assert read[0] > values.size
+    assert read[1] < 0.6 * read[0]  # most of the noise is, where it touches what is seen
+    assert made[1].equals(made[0])
+    whole = generate_vdi(Volume(values), camera, WINDOW, function)
+    check_ray_depths(made[1], whole)
+
+
+def test_nan_beside_one_value_stays_nan(default_runtime):
+    """Ranges leave NaN out: a chunk of NaN and one value is read all the same."""
+    values = np.full((24, 24, 24), np.nan, np.float32)
+    values[4:20, 6:18, 3:12] = 7
+    volume = Volume(Store(values))
+    function = TransferFunction(np.ones((2, 3)), [0.3, 0.3], (0, 10))
+    camera = VIEWS["all of it"](volume)
+    vdis = [generate_chunked(volume, camera, WINDOW, function, block_bytes=1) for _ in range(2)]
+    assert vdis[1].equals(vdis[0])
+    assert vdis[1].metadata["points_read"] < vdis[0].metadata["points_read"]  # of NaN alone
+
+
+def test_ranges_are_of_the_array_s_own_chunks(default_runtime):
+    values = np.zeros((24, 24, 24), np.uint8)
+    values[4:20, 6:18, 3:12] = 100
+    volume = Volume(Store(values))
+    function = TransferFunction(np.ones((2, 3)), [0, 0.3], (0, 255))
+    camera = VIEWS["all of it"](volume)
+    in_blocks(volume, camera, function, (12, 12, 12))
+    assert volume.chunks.ranges() is None
+    generate_chunked(volume, camera, WINDOW, function, block_bytes=1)
+    assert volume.chunks.ranges()[0].shape == (3, 3, 3)
+    assert in_blocks(volume, camera, function, (12, 12, 12)).metadata["points_read"] > values.size
+
+
+@pytest.mark.parametrize(("radius", "view"), [(6.0, "all of it"), (20.0, "from inside")])
+def test_occlusion_is_that_of_one_piece(default_runtime, radius, view):
+    """Cells of one voxel and of two; what is out of sight darkens what is seen."""
+    volume = volume_of("uint8")
+    camera = VIEWS[view](volume)
+    arguments = (volume, camera, transfer_for(volume, "linear"))
+    bare = generate_vdi(volume, camera, WINDOW, arguments[-1])
+    whole, vdi = both_ways(*arguments, (12, 10, 9), ambient_occlusion=radius)
+    without, expected, found = (pvdi.render(each, camera) for each in (bare, whole, vdi))
+    assert np.abs(without - expected).max() > 0.1
+    # Opacities in the last cell before a neighbour are those of the last point: 0.3 / 255 measured
+    assert np.abs(found - expected).max() <= 1 / 255
+    assert vdi.metadata["ambient_occlusion"] == whole.metadata["ambient_occlusion"]
+
+
+def test_a_grid_of_occlusion_that_is_too_large_is_refused_before_anything_is_read():
+    store = Store(np.zeros((40, 40, 40), np.uint8))
+    store.shape = (4096, 4096, 4096)
+    volume = Volume(store)
+    function = TransferFunction(np.ones((2, 3)), [0, 1], (0, 255))
+    camera = VIEWS["all of it"](volume)
+    with pytest.raises(DeviceMemoryError, match=r"radius of 8.*larger radius"):
+        generate_chunked(volume, camera, WINDOW, function, ambient_occlusion=8.0)
+    assert store.points == 0
+
+
+@pytest.mark.parametrize("limit", [10_000, 700_000, 1_600_000, 8_000_000])
+def test_no_more_memory_is_taken_than_allowed(runtime, limit):
+    values = np.random.default_rng(1).integers(0, 255, (96, 96, 96)).astype(np.float32)
+    volume = Volume(values)
+    arguments = (volume, VIEWS["all of it"](volume), WINDOW, transfer_for(volume, "linear"))
+    own = fresh_runtime(runtime)
+    options = {"chunks": (24, 24, 24), "memory_limit": limit, "max_supersegments": 5}
+    if limit < 1_000_000:
+        with pytest.raises(DeviceMemoryError, match="rows of .* memory_limit is .* smaller chunks"):
+            generate_chunked(*arguments, device=own, **options)
+    else:
+        generate_chunked(*arguments, device=own, **options)
+        assert own.peak_allocated <= limit
+
+
+def test_it_is_given_up_when_it_is_asked_to():
+    volume = volume_of("uint8")
+    told = []
+
+    def progress(fraction):
+        told.append(fraction)
+        return fraction < 0.5
+
+    with pytest.raises(Cancelled):
+        in_blocks(volume, VIEWS["all of it"](volume), transfer_for(volume), progress=progress)
+    assert told == sorted(told)
+    assert 0.5 <= told[-1] < 0.9

@@ -1,0 +1,272 @@
+"""A series that plays: which step is shown when, by a clock that stands still between looks."""
+
+from __future__ import annotations
+
+import threading
+import time
+import weakref
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.extensions.series.player import Player
+
+#: Seconds after which something that should have happened has not.
+LONG = 600.0
+N = 8
+
+
+def _vdi(k):
+    camera = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
+    color = [[k / N, 0.5, 0.0]]
+    return pvdi.VDI(camera, (1, 1), [0, 1], [4.0], [6.0], color, [2.0], (-1, 1, -1, 1, -1, 1))
+
+
+class Clock:
+    """Seconds that pass when the test says so."""
+
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+class Steps(Sequence):
+    """Steps that count how often they are decoded, take their time, or are damaged.
+
+    ``copies``: each is made anew when it is asked for, as those of a file are; ``living`` are those
+    that somebody holds.
+    """
+
+    def __init__(self, clock):
+        self.vdis = [_vdi(k) for k in range(N)]
+        self.asked = []
+        self.copies, self.made = False, []
+        self.seconds, self.damaged, self._clock = 0.0, (), clock
+
+    def __len__(self):
+        return N
+
+    def __getitem__(self, k):
+        self.asked.append(k)
+        self._clock.now += self.seconds
+        if k in self.damaged:
+            raise VDIFileError(f"step {k} is damaged")
+        if not self.copies:
+            return self.vdis[k]
+        vdi = _vdi(k)
+        self.made.append(weakref.ref(vdi))
+        return vdi
+
+    def living(self):
+        _settled()
+        return sum(made() is not None for made in self.made)
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def steps(clock):
+    return Steps(clock)
+
+
+@pytest.fixture
+def player(steps, clock, default_runtime):
+    player = Player(pvdi.VDISeries(steps, np.arange(N) * 0.5), clock)
+    yield player
+    player.close()
+
+
+def _settled():
+    """Wait until the thread has decoded all that it wants now: then it ends."""
+    end = time.monotonic() + LONG
+    while any(thread.name == "pyvista-vdi series" for thread in threading.enumerate()):
+        assert time.monotonic() < end, "it has not ended"
+        time.sleep(0.001)
+
+
+def look(player, clock, seconds=0.1001):
+    """Go on by some seconds when all is ready; by default a little more than a tenth."""
+    _settled()
+    clock.now += seconds
+    return player.advance()
+
+
+def test_a_step_is_shown_by_its_index_or_by_its_time(player, steps):
+    assert (player.step, player.time, player.vdi) == (0, 0.0, steps.vdis[0])
+    player.step = -1
+    assert (player.step, player.time, player.vdi) == (N - 1, 3.5, steps.vdis[-1])
+    player.time = 1.1
+    assert (player.step, player.vdi) == (2, steps.vdis[2])
+    player.step = np.int64(3)
+    assert player.step == 3
+    assert not player.advance()
+    assert not player.playing
+
+
+@pytest.mark.parametrize("step", [N, -N - 1, 1.5, "first", None])
+def test_steps_that_there_are_not(player, step):
+    with pytest.raises(InvalidArgumentError, match=f"from 0 to {N - 1}"):
+        player.step = step
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        *(({"rate": rate}, "rate") for rate in (0, -1, float("nan"), float("inf"), "fast", True)),
+        ({"memory_limit": "much"}, "memory_limit"),
+    ],
+)
+def test_rates_and_limits_that_are_none(player, arguments, named):
+    with pytest.raises(InvalidArgumentError, match=named):
+        player.play(**arguments)
+    assert not player.playing
+
+
+def test_every_step_is_shown_when_it_is_due(player, steps, clock):
+    player.play(rate=10)
+    player.advance()
+    shown = []
+    for _ in range(2 * N):
+        _settled()
+        assert not player.advance()  # not yet
+        assert look(player, clock)
+        shown.append(player.step)
+        assert player.vdi is steps.vdis[player.step]
+    assert shown == [(1 + k) % N for k in range(2 * N)]
+    assert player.dropped == 0
+
+
+def test_steps_are_left_out_where_frames_take_longer(player, clock):
+    player.play(rate=10)
+    player.advance()
+    assert look(player, clock, 0.31)
+    assert (player.step, player.dropped) == (3, 2)
+
+
+def test_what_is_decoded_slowly_is_shown_in_its_time(player, steps, clock):
+    steps.seconds = 0.25  # two and a half steps
+    player.memory = 0
+    player.play(rate=10)
+    began = clock.now
+    late = []
+    for _ in range(12):
+        player.advance()
+        _settled()
+        clock.now += 0.0001
+        looked = clock.now  # the thread may go on when it has been shown
+        if player.advance():
+            late.append(((looked - began) * 10 - player.step) % N)
+    # The first is decoded before it is known what one takes; then a step is shown while it is due,
+    # which is for one step's time, and the look comes .001 of it later
+    assert len(late) > 3
+    assert max(late[1:]) < 1.001
+    assert player.dropped > 0
+
+
+def test_without_a_loop_the_last_step_is_the_end(player, clock):
+    player.step = N - 3
+    player.play(rate=10, loop=False)
+    player.advance()
+    for _ in range(10):
+        look(player, clock, 0.1)
+    assert (player.step, player.playing) == (N - 1, False)
+    player.play(rate=10, loop=False)  # anew
+    assert (player.step, player.playing) == (0, True)
+
+
+def test_the_end_comes_although_the_last_step_is_damaged(player, steps, clock):
+    steps.damaged = (N - 1,)
+    player.step = N - 3
+    player.play(rate=10, loop=False)
+    player.advance()
+    told = 0
+    for _ in range(10):
+        try:
+            look(player, clock, 0.1)
+        except VDIFileError:
+            told += 1
+    assert (player.step, player.playing, told) == (N - 2, False, 1)
+
+
+def test_a_seek_goes_on_playing_from_there(player, clock):
+    player.play(rate=10)
+    player.advance()
+    clock.now += 0.1
+    player.step = 5
+    assert player.playing
+    player.advance()
+    assert look(player, clock)
+    assert player.step == 6
+
+
+def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
+    steps.damaged = (2,)
+    player.play(rate=10)
+    player.advance()
+    told, shown = [], []
+    for _ in range(2 * N):
+        try:
+            if look(player, clock):
+                shown.append(player.step)
+        except VDIFileError as error:
+            told.append(str(error))
+            shown.append(player.step)
+    assert told == ["step 2 is damaged"]
+    assert 2 not in shown
+    assert {1, 3, 4, 5, 6, 7, 0} <= set(shown)
+    player.step = 2
+    with pytest.raises(VDIFileError, match="step 2"):
+        _ = player.vdi
+
+
+def test_few_steps_are_held_where_memory_is_short(player, steps, clock):
+    steps.copies = True
+    player.play(rate=10, memory_limit=1)
+    player.advance()
+    for _ in range(N - 1):
+        look(player, clock)
+        assert steps.living() <= 4
+    assert steps.asked[: N - 1] == list(range(1, N))
+
+
+@pytest.mark.parametrize("kept", [N, 6])
+def test_what_is_kept_is_not_decoded_in_the_next_round(player, steps, clock, kept):
+    steps.copies = True
+    taken = steps.vdis[0].nbytes * 2.2
+    player.play(rate=10, memory_limit=kept * taken)
+    player.advance()
+    for turn in range(3 * N):
+        if turn == 2 * N:
+            steps.asked.clear()
+        assert look(player, clock)
+        assert steps.living() <= kept
+        assert player.vdi.equals(steps.vdis[player.step])
+    # Of a round that does not fit, some are the same in each
+    assert len(steps.asked) == 0 if kept == N else len(set(steps.asked)) < N
+
+
+def test_nobody_looks_and_nothing_goes_on(player, steps, clock):
+    steps.seconds = 1.0
+    player.play(rate=10)
+    player.advance()
+    _settled()
+    assert len(steps.asked) <= 3
+    player.close()
+    assert not [t for t in threading.enumerate() if t.name == "pyvista-vdi series"]
+
+
+def test_another_vdi_of_the_step(player, steps):
+    other = _vdi(3)
+    player.replace(other)
+    assert player.vdi is other
+    player.step = 4
+    assert player.vdi is steps.vdis[4]
+    player.step = 0
+    assert player.vdi is steps.vdis[0]

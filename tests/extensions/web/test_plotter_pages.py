@@ -1,0 +1,179 @@
+"""``plotter.vdi.export_html``: series, sets and subplots in a page; PyVista is not patched."""
+
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from browsers import picture
+from plugin_scenes import soft_ball
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.extensions.sets.sphere import orbit, spread
+from pyvista_vdi.model.standard_cases import filling_camera
+
+pytestmark = pytest.mark.gl
+
+SIZE = (161, 91)
+N = 4
+LOOKS = {"cmap": "viridis", "opacity": "linear", "clim": (0, 255)}
+#: What draws VDIs as they are, whatever the view.
+AS_IT_IS = {"show_scalar_bar": False, "draw": "vdi", "regenerate": "never"}
+#: Of 255, as in test_scene.py.
+MEAN = 0.6
+
+
+@pytest.fixture
+def plotter():
+    made = pv.Plotter(off_screen=True, window_size=SIZE)
+    made.set_background("black")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def from_disk(open_page, tmp_path):
+    """Write a plotter's page, and open it."""
+
+    def from_disk(plotter, size=SIZE):
+        path = tmp_path / "scene.html"
+        plotter.vdi.export_html(path)
+        viewport = {"width": size[0], "height": size[1]}
+        return open_page(url=path.as_uri(), viewport=viewport, offline=True)
+
+    return from_disk
+
+
+def ball(step):
+    """A ball that moves."""
+    volume = soft_ball(16)
+    volume.origin = np.add(volume.origin, (0.2 * step, 0, 0))
+    return volume
+
+
+@pytest.fixture(scope="module")
+def series(default_runtime):
+    camera = filling_camera((-1, 1.6, -1, 1, -1, 1), SIZE)
+    return pvdi.generate_series([ball(k) for k in range(N)], camera, SIZE, range(N), **LOOKS)
+
+
+@pytest.fixture(scope="module")
+def vdi_set(default_runtime):
+    volume = soft_ball(16)
+    views = orbit(filling_camera(volume.bounds, SIZE), volume.bounds, spread(6))
+    return pvdi.VDISet.of([pvdi.generate(volume, view, SIZE, **LOOKS) for view in views])
+
+
+def look_from(plotter, view):
+    plotter.camera.position, plotter.camera.focal_point = view.position, view.focal_point
+    plotter.camera.up, plotter.camera.view_angle = view.view_up, view.view_angle
+    plotter.camera_set = True
+
+
+def assert_as_plotter(page, plotter):
+    plotter.render()
+    want = plotter.screenshot(return_img=True)[..., :3].astype(float)
+    assert np.ptp(want) > 60
+    assert np.abs(picture(page, SIZE)[..., :3] - want).mean() <= MEAN
+
+
+def test_a_series_is_whole_in_the_page_and_plays(plotter, from_disk, series, tmp_path):
+    """The first VDI is a single one, and the series no more than half as dense."""
+    single = plotter.add_vdi(series[0].with_precision("8-byte"), **AS_IT_IS)
+    single.position = (0, 1.5, 0)
+    actor = plotter.add_vdi(series, **AS_IT_IS)
+    actor.opacity_multiplier = 0.5
+    plotter.add_mesh(pv.Sphere(radius=0.3, center=(0, 0, 1)), color="tomato")
+    look_from(plotter, series.camera)
+    page = from_disk(plotter)
+    page.ready()
+    assert page.evaluate("viewer.series.times") == list(range(N))
+    for time in (0, N - 1):
+        page.evaluate("(time) => { viewer.time = time; return viewer.ready.then(() => 0) }", time)
+        actor.time = time
+        assert_as_plotter(page, plotter)
+    assert page.page.locator("vdi-viewer .controls").is_visible()
+    page.evaluate("viewer.time = 0")
+    page.evaluate("viewer.play({ rate: 50, loop: false })")
+    page.wait_for(f"viewer.time === {N - 1} && !viewer.playing")
+    again = pvdi.read(tmp_path / "scene.html")
+    assert isinstance(again, pvdi.VDISeries)
+    assert again.times == series.times
+
+
+def test_of_a_set_the_page_draws_the_nearest(plotter, from_disk, vdi_set, tmp_path):
+    vdi_set.blend = 0
+    actor = plotter.add_vdi(vdi_set, show_scalar_bar=False)
+    look_from(plotter, vdi_set.cameras[0])
+    page = from_disk(plotter)
+    page.ready()
+    for view in vdi_set.cameras[1:3]:
+        page.evaluate(
+            "(camera) => { viewer.camera = {...viewer.camera, ...camera}; "
+            "return viewer.ready.then(() => 0) }",
+            {name: getattr(view, name) for name in ("position", "focal_point", "view_up")},
+        )
+        look_from(plotter, view)
+        assert_as_plotter(page, plotter)
+        nearest = actor.vdi_set.nearest(plotter.camera)
+        assert page.evaluate("viewer.set") == {"length": len(vdi_set), "nearest": nearest}
+    again = pvdi.read(tmp_path / "scene.html")
+    assert isinstance(again, pvdi.VDISet)
+    assert len(again) == len(vdi_set)
+
+
+def test_of_several_series_those_that_do_not_play_are_named(plotter, series, vdi_set):
+    for name, more in (("first", series), ("second", series[:2]), ("third", vdi_set)):
+        plotter.add_vdi(more, name=name, **AS_IT_IS)
+    with pytest.warns(VDIWarning, match="without all but one of the") as warned:
+        plotter.vdi.export_html(None)
+    words = str(warned[0].message)
+    assert "2 steps of a series (second)" in words
+    assert "6 VDIs of a set (third)" in words
+    assert "first" not in words
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_subplots_turn_together_if_they_are_linked(linked, from_disk):
+    """Not if their cameras are equal: those of PyVista are if they look the same way."""
+    plotter = pv.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE)
+    for k in range(2):
+        plotter.subplot(0, k)
+        plotter.add_vdi(soft_ball(8), show_scalar_bar=False, **LOOKS)
+        plotter.camera_position = [(5, 4, 6), (0, 0, 0), (0, 1, 0)]
+        plotter.camera.parallel_scale = 1
+    if linked:
+        plotter.link_views()
+    page = from_disk(plotter)
+    assert plotter.renderers[0].camera == plotter.renderers[1].camera
+    plotter.close()
+    positions = page.evaluate(
+        """async () => {
+          const viewers = [...document.querySelectorAll("vdi-viewer")];
+          await Promise.all(viewers.map((viewer) => viewer.ready));
+          viewers[0].camera = { ...viewers[0].camera, position: [1, 2, 9] };
+          return viewers.map((viewer) => viewer.camera.position);
+        }"""
+    )
+    assert positions[0] == [1, 2, 9]
+    assert (positions[1] == positions[0]) == linked
+
+
+def test_a_scene_without_vdis_is_a_page_too(plotter, from_disk):
+    plotter.add_mesh(pv.Sphere(), color="tomato")
+    hidden = plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
+    hidden.visibility = False
+    page = from_disk(plotter)
+    page.ready()
+    assert_as_plotter(page, plotter)
+
+
+def test_nothing_of_pyvista_is_patched():
+    """Its classes have this package's components, and functions of its own."""
+    ours = str(Path(pvdi.__file__).parent)
+    for kind in (pv.Plotter, pv.BasePlotter, pv.DataSet, pv.ImageData):
+        functions = [one for one in vars(kind).values() if isinstance(one, types.FunctionType)]
+        assert functions
+        assert [one for one in functions if one.__code__.co_filename.startswith(ours)] == []

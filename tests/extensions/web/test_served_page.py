@@ -1,0 +1,228 @@
+"""The page of a server in a real browser: it draws what it has, and is sent what its view needs."""
+
+import io
+import re
+import urllib.request
+
+import numpy as np
+import pytest
+from browsers import picture
+from PIL import Image
+from web_client import soft_ball
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.extensions import web
+
+pytestmark = pytest.mark.usefixtures("settled_at_once")
+
+
+def checkered(ball):
+    """A ball whose every other voxel is thin: seen from near, it needs more lists."""
+    values = ball.array.copy()
+    values[np.indices(values.shape).sum(axis=0) % 2 == 1] //= 8
+    return pvdi.Volume(values, ball.spacing, ball.origin)
+
+
+BALL = checkered(soft_ball(16))
+LOOK = {"clim": (0, 255), "opacity": "linear", "cmap": "bone"}
+SIZE = (240, 180)
+#: The viewer is not as high as the pictures that are compared, so that pixels and lists do not
+#: coincide: .94 to .97 where a full VDI is shown, below .9 by that of the view before.
+ENOUGH = 0.92
+
+#: Gives its sockets away.
+SOCKETS = """
+window.sockets = [];
+window.WebSocket = class extends WebSocket {
+  constructor(...given) { super(...given); sockets.push(this); }
+};
+"""
+
+
+@pytest.fixture(scope="module")
+def server(default_runtime):
+    with web.serve([BALL, BALL], port=0, wait=False, announce=None, **LOOK) as serving:
+        yield serving
+
+
+@pytest.fixture
+def page(server, open_page):
+    viewport = {"width": SIZE[0], "height": SIZE[1] + 100}
+    return open_page(url=server.url, before=SOCKETS, viewport=viewport)
+
+
+def camera_of(page):
+    state = page.evaluate("viewer.camera")
+    names = ("position", "focal_point", "view_up", "view_angle")
+    return pvdi.Camera(**{name: state[name] for name in names})
+
+
+def ssim_of(page, **look):
+    shown = picture(page, SIZE).astype(np.float32) / 255
+    truth = pvdi.render_volume(BALL, camera_of(page), SIZE, **{**LOOK, **look})
+    return pvdi.compare_images(shown, truth).ssim
+
+
+def wait(page, condition):
+    # Playwright's own wait evaluates text in the page, which its policy forbids
+    while not page.evaluate(condition):
+        page.page.wait_for_timeout(20)
+
+
+def test_the_page_is_the_viewer_and_leaks_nothing(server):
+    with urllib.request.urlopen(server.url) as response:
+        text, headers = response.read().decode(), response.headers
+    assert "<vdi-viewer" in text
+    assert server.token not in text
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert headers["Cache-Control"] == "no-store"
+    nonce = re.search(r"nonce-([\w-]+)", headers["Content-Security-Policy"])[1]
+    assert re.findall(r"<script[^>]*>", text) == [f'<script type="module" nonce="{nonce}">']
+
+
+def test_a_page_is_sent_what_its_view_needs(page):
+    wait(page, "remote.received.full === 1")
+    assert page.evaluate("remote.received.coarse") == 1
+    page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 4 }")
+    wait(page, "remote.received.full === 2")
+    assert ssim_of(page) > ENOUGH
+
+
+def test_a_view_at_rest_is_the_volumes_own_picture(page):
+    over = """viewer.shadowRoot.querySelector("img.over")"""
+    wait(page, "viewer.camera !== null && remote.received.full >= 1")
+    page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 9 }")
+    # The bar of what is being loaded lies over the picture's last rows
+    bar = """viewer.shadowRoot.querySelector("progress")"""
+    wait(page, f"remote.received.full >= 2 && !{over}.hidden && {bar}.hidden")
+    file = page.page.locator("vdi-viewer").screenshot()
+    shown = np.asarray(Image.open(io.BytesIO(file)).convert("RGB"), np.int16)
+    truth = pvdi.render_volume(BALL, camera_of(page), shown.shape[1::-1], **LOOK)[..., :3] * 255
+    # Straight colour and opacity are rounded to eight bits, and so is their product
+    assert np.abs(shown - truth).max() <= 2
+    page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 10 }")
+    assert page.evaluate(f"{over}.hidden")
+
+
+def test_a_view_that_goes_on_moving_is_shown_what_comes(open_page):
+    """None of its frames has all pixels, so no VDI is ever drawn to its end."""
+    page = open_page(
+        script='import { RemoteVDI } from "./remote.js"; window.RemoteVDI = RemoteVDI;'
+    )
+    shown = page.evaluate(
+        """async () => {
+          let socket;
+          window.WebSocket = class { constructor() { socket = this; } close() {} };
+          const viewer = document.createElement("div"), shown = [];
+          viewer.showBytes = (file) => {
+            shown.push(file[0]);
+            return new Promise(() => {});
+          };
+          const remote = new RemoteVDI(viewer, "");
+          for (const byte of [1, 2]) {
+            const head = { type: "vdi", level: "coarse", bytes: 1 };
+            socket.onmessage({ data: JSON.stringify(head) });
+            socket.onmessage({ data: Uint8Array.of(byte).buffer });
+          }
+          const before = [...shown];
+          const frame = { detail: { full: false, state: "full" } };
+          viewer.dispatchEvent(new CustomEvent("framedrawn", frame));
+          await new Promise((done) => setTimeout(done));
+          remote.close();
+          return [before, shown];
+        }"""
+    )
+    assert shown == [[1], [1, 2]]
+
+
+@pytest.mark.slow
+def test_look_clipping_and_time_are_changed_in_the_page(page):
+    wait(page, "remote.received.full === 1")
+    page.page.get_by_label("Colours").select_option("hot")
+    wait(page, "remote.received.full >= 2")
+    assert ssim_of(page, cmap="hot") > ENOUGH
+
+    page.page.get_by_label("Clip").first.select_option("x")
+    assert page.evaluate("viewer.clippingPlanes") == [{"origin": [0, 0, 0], "normal": [1, 0, 0]}]
+    assert ssim_of(page, cmap="hot", clipping_planes=[(0, 0, 0, 1, 0, 0)]) > ENOUGH
+
+    page.page.get_by_label("Time").fill("1")
+    wait(page, "remote.received.full >= 3")
+
+
+@pytest.mark.slow
+def test_a_lost_connection_comes_back(page):
+    wait(page, "remote.received.full === 1")
+    page.evaluate("sockets.at(-1).close(); viewer.camera = { ...viewer.camera, view_angle: 5 }")
+    wait(page, "remote.received.full === 2")
+
+
+def named_controls(page):
+    """The controls of a page that can be used, by what a screen reader says of them."""
+    session = page.page.context.new_cdp_session(page.page)
+    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
+    kinds = {"slider", "spinbutton", "combobox", "checkbox"}
+    seen = [node for node in nodes if not node["ignored"] and node["role"]["value"] in kinds]
+    return [(node["role"]["value"], node["name"]["value"]) for node in seen]
+
+
+def test_controls_have_names_and_a_range_that_is_none_is_said(page):
+    wait(page, "remote.received.coarse >= 1")
+    names = named_controls(page)
+    assert len(names) == len(set(names)) == 8
+    assert all(name and not name.replace(".", "").isdigit() for _, name in names)
+
+    line, inputs = page.page.locator("output"), page.page.locator("input[type=number]")
+    valid = "[...document.querySelectorAll('input[type=number]')].map((it) => it.validity.valid)"
+    page.evaluate("() => { remote.looks = []; remote.setLook = (look) => remote.looks.push(look) }")
+    inputs.nth(0).fill("200")
+    inputs.nth(1).fill("100")
+    inputs.nth(1).press("Tab")
+    assert page.evaluate(valid) == [False, False]
+    assert inputs.nth(0).get_attribute("aria-invalid") == "true"
+    assert "200 is not below 100" in line.inner_text()
+    # Nothing of it was told, and what else is chosen leaves the range as it was
+    clims = [[200, page.evaluate("remote.hello.range[1]")]]
+    assert page.evaluate("remote.looks.map(({ clim }) => clim)") == clims
+    page.page.get_by_label("Colours").select_option("hot")
+    assert page.evaluate("remote.looks.map(({ clim }) => clim)") == 2 * clims
+    inputs.nth(1).fill("250")
+    inputs.nth(1).press("Tab")
+    assert page.evaluate(valid) == [True, True]
+    assert "below" not in line.inner_text()
+    assert page.evaluate("remote.looks.at(-1).clim") == [200, 250]
+    for key, wrong in (("-", True), ("Backspace", False)):
+        inputs.nth(0).fill("")
+        inputs.nth(0).press(key)
+        inputs.nth(0).press("Tab")
+        assert ("two numbers" in line.inner_text()) == wrong
+
+
+def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
+    default_runtime, open_page
+):
+    def serve(token, port=0):
+        return web.serve([BALL], port=port, token=token, wait=False, announce=None, **LOOK)
+
+    line = "document.querySelector('output').textContent"
+    serving = serve("a")
+    viewport = {"width": SIZE[0], "height": SIZE[1] + 100}
+    refusals = "ERR_CONNECTION|WebSocket|403"
+    page = open_page(url=serving.url, viewport=viewport, expected=refusals)
+    wait(page, "remote.received.full === 1")
+    height = page.evaluate("viewer.clientHeight")
+    serving.close()
+    wait(page, f"{line}.includes('no connection to the server; trying again in')")
+    # All of it can be read, and the viewer is as large as before
+    hidden = "(({ scrollHeight, clientHeight }) => scrollHeight - clientHeight)"
+    assert page.evaluate(f"{hidden}(document.querySelector('output'))") == 0
+    assert page.evaluate("viewer.clientHeight") == height
+    serving = serve("a", serving.port)
+    wait(page, f"remote.received.full === 2 && !{line}.includes('trying')")
+    serving.close()
+    with serve("b", serving.port):
+        wait(page, f"{line}.includes('no longer valid')")
+        asked = len(page.urls)
+        page.page.wait_for_timeout(2500)
+        assert len(page.urls) == asked
+        assert "trying" not in page.evaluate(line)
