@@ -56,12 +56,7 @@ def by_absolute_path(array: Any) -> Any:
 def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> StoreIdentity | None:
     """Return what tells an array's files from others, if it is in files here.
 
-    Parameters
-    ----------
-    array : zarr.Array or h5py.Dataset
-        Others have none.
-    index : sequence of int or slice, optional
-        What is taken of it: its time and its channel.
+    ``array``: others have none. ``index``: what is taken of it: its time and its channel.
     """
     found = local_files(array)
     if found is None:
@@ -85,16 +80,9 @@ def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> Store
 class StoreIdentity:
     """What tells an array's files from others.
 
-    Attributes
-    ----------
-    path : str
-        The array's file or its folder.
-    samples : tuple of (str, str or None)
-        Names of some files in it, and digests of samples of them; ``None`` where there is none.
-    chunks : _Chunks, optional
-        How files of chunks are called, if there are any.
-    absent : frozenset of str, optional
-        Chunks that have no file; ``None`` where these are not known.
+    ``path``: the array's file or its folder. ``samples``: names of some files in it, and digests of
+    samples of them; ``None`` where there is none. ``chunks``: how files of chunks are called, if
+    there are any. ``absent``: chunks that have no file; ``None`` where these are not known.
     """
 
     path: str

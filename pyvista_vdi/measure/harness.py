@@ -331,18 +331,10 @@ class Bench:
     multisampling: ``vtk`` holds those that take part, by the keys of :data:`CANDIDATES`, and
     ``left_out`` the errors of those that cannot.
 
-    Parameters
-    ----------
-    volume, table : Volume, TransferFunction
-        The scalars, and how they look.
-    window_size : (int, int)
-        Of all frames, pixels.
-    device, vtk : optional
-        OpenCL device of ours, and whether VTK's mappers take part.
-    view : Camera, optional
-        V_O; the view that the volume fills unless given.
-    volume_property : vtkVolumeProperty, optional
-        How the volume looks to VTK; as `table` says unless given.
+    ``volume``, ``table``: the scalars, and how they look. ``window_size``: of all frames, pixels.
+    ``device``, ``vtk``: OpenCL device of ours, and whether VTK's mappers take part. ``view``: V_O;
+    the view that the volume fills unless given. ``volume_property``: how the volume looks to VTK;
+    as `table` says unless given.
     """
 
     def __init__(

@@ -21,22 +21,9 @@ MAX_WINDOW_EDGE = 65536
 def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
     """Return ``window_size`` as two positive Python ints.
 
-    Parameters
-    ----------
-    window_size : sequence of int
-        Width and height in pixels.
-    name : str
-        What to call it in an error.
-
-    Returns
-    -------
-    tuple of int
-        ``(width, height)``.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it is not two whole numbers between 1 and :data:`MAX_WINDOW_EDGE`.
+    ``window_size``: width and height in pixels. ``name``: what to call it in an error. Returns:
+    ``(width, height)``. Raises InvalidArgumentError if it is not two whole numbers between 1 and
+    :data:`MAX_WINDOW_EDGE`.
     """
     try:
         width, height = window_size

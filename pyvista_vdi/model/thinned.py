@@ -25,24 +25,12 @@ def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     A list stands for its neighbours, too. From the side a ray crosses a k-th of the lists, which
     is about what it costs. docs/decisions/any_view.md says what that loses.
 
-    Parameters
-    ----------
-    vdi : VDI
-        Of any precision, which stays.
-    along_x, along_y : int
-        Every how-manieth list is taken along the window's width and height.
-
-    Returns
-    -------
-    VDI
-        Without metadata. Its view is that of ``vdi``, stretched by its model transform, so that
-        the middles of the pixels are those of the lists that were taken. Of the window's right
-        and upper edge it may leave out less than half of one of its lists.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a step is not a whole number from 1 to the window's edge.
+    ``vdi``: of any precision, which stays. ``along_x``, ``along_y``: every how-manieth list is
+    taken along the window's width and height. Returns: Without metadata. Its view is that of
+    ``vdi``, stretched by its model transform, so that the middles of the pixels are those of the
+    lists that were taken. Of the window's right and upper edge it may leave out less than half of
+    one of its lists. Raises InvalidArgumentError if a step is not a whole number from 1 to the
+    window's edge.
     """
     camera = vdi.camera
     for step, edge in zip((along_x, along_y), vdi.window_size, strict=True):

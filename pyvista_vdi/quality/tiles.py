@@ -39,18 +39,10 @@ _EVEN_SHARE = 0.1
 class TileSample:
     """Tiles of a picture, and how the SSIM of the whole follows from theirs.
 
-    Attributes
-    ----------
-    corners : numpy.ndarray
-        int64 (k, 2): column and row of each tile's first pixel, from the top left.
-    size : (int, int)
-        Width and height of a tile, pixels.
-    chances, guess : numpy.ndarray
-        float64 (k,): probability of each tile to be chosen, and its guessed loss.
-    guessed : float
-        Sum of the guesses for all cells of the picture.
-    share : float
-        Of the picture's pixels that have an SSIM, in one cell.
+    ``corners``: int64 (k, 2): column and row of each tile's first pixel, from the top left.
+    ``size``: width and height of a tile, pixels. ``chances``, ``guess``: float64 (k,): probability
+    of each tile to be chosen, and its guessed loss. ``guessed``: sum of the guesses for all cells
+    of the picture. ``share``: of the picture's pixels that have an SSIM, in one cell.
     """
 
     corners: NDArray[np.int64]
@@ -115,12 +107,8 @@ class Region:
 class Cells:
     """A region of a window cut into cells, each the part of a tile whose SSIM the tile tells.
 
-    Attributes
-    ----------
-    corners : numpy.ndarray
-        int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling curve.
-    tile_size : (int, int)
-        Width and height of a tile, pixels.
+    ``corners``: int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling
+    curve. ``tile_size``: width and height of a tile, pixels.
     """
 
     def __init__(self, region: Region, size: tuple[int, int], edge: int) -> None:

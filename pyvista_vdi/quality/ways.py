@@ -61,16 +61,8 @@ class Ways:
     def took(self, way: Way, angle: float, pixels: float, seconds: float) -> None:
         """Note what a frame's rays have taken.
 
-        Parameters
-        ----------
-        way : {"vdi", "volume"}
-            What was drawn.
-        angle : float
-            Between the view and V_O, degrees.
-        pixels : float
-            Rays that may meet the volume.
-        seconds : float
-            What they took.
+        ``way`` ("vdi", "volume"): what was drawn. ``angle``: between the view and V_O, degrees.
+        ``pixels``: rays that may meet the volume. ``seconds``: what they took.
         """
         if not (pixels >= 1 and seconds > 0):
             return
@@ -100,25 +92,12 @@ class Ways:
     ) -> Way:
         """Return how the next frame is to be drawn.
 
-        Parameters
-        ----------
-        angle : float
-            Between the view and V_O, degrees.
-        pixels : float
-            Rays of the full frame that may meet the volume.
-        seconds : float or None
-            What its rays may take; ``None`` at rest, where all pixels are drawn.
-        ssim : float, optional
-            Estimate for the VDI from this view.
-        bound : float
-            Least SSIM that does at rest.
-
-        Returns
-        -------
-        {"vdi", "volume"}
-            The VDI until both have told what they take; afterwards the better picture, or at rest
-            the one that is there sooner. What was drawn last stays unless the other is better by
-            more than predictions are wrong by.
+        ``angle``: between the view and V_O, degrees. ``pixels``: rays of the full frame that may
+        meet the volume. ``seconds``: what its rays may take; ``None`` at rest, where all pixels are
+        drawn. ``ssim``: estimate for the VDI from this view. ``bound``: least SSIM that does at
+        rest. Returns: the VDI until both have told what they take; afterwards the
+        better picture, or at rest the one that is there sooner. What was drawn last stays unless
+        the other is better by more than predictions are wrong by.
         """
         own = _loss_of_vdi(angle, ssim)
         if seconds is None and own > 1 - bound:

@@ -267,36 +267,14 @@ def medium_at(
 ) -> tuple[Array, Array]:
     """Return colour and optical depth of steps whose midpoints have given grid coordinates.
 
-    Parameters
-    ----------
-    volume : Volume
-        What to sample.
-    transfer_function : TransferFunction
-        Classification and interpolation.
-    position : numpy.ndarray
-        Grid coordinates (x, y, z), in points, float64 (n, 3); transparent outside
-        [0, dimensions - 1].
-    length : numpy.ndarray
-        Of each step, float64 (n,), model units.
-    camera : Camera, optional
-        The view; a shaded volume needs one.
-    lights : Lights, optional
-        What a shaded volume is lit by; one headlight by default.
-    occlusion : NodeOcclusion, optional
-        What :func:`node_occlusion` returned.
-
-    Returns
-    -------
-    color : numpy.ndarray
-        Straight RGB, float64 (n, 3).
-    optical_depth : numpy.ndarray
-        float64 (n,): ``-log1p(-a) length / U``; where a is 1, no less than 30. A gradient opacity
-        g makes of the opacity alpha of this g alpha.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the volume is shaded and there is no camera.
+    ``volume``: what to sample. ``transfer_function``: classification and interpolation.
+    ``position``: grid coordinates (x, y, z), in points, float64 (n, 3); transparent outside [0,
+    dimensions - 1]. ``length``: of each step, float64 (n,), model units. ``camera``: the view; a
+    shaded volume needs one. ``lights``: what a shaded volume is lit by; one headlight by default.
+    ``occlusion``: what :func:`node_occlusion` returned. Returns: ``color``, straight RGB, float64
+    (n, 3). Returns: ``optical_depth``, float64 (n,): ``-log1p(-a) length / U``; where a is 1, no
+    less than 30. A gradient opacity g makes of the opacity alpha of this g alpha. Raises
+    InvalidArgumentError if the volume is shaded and there is no camera.
     """
     top = np.array(volume.dimensions) - 1
     outside = ((position < -GRID_TOLERANCE) | (position > top + GRID_TOLERANCE)).any(axis=1)
@@ -338,14 +316,9 @@ def node_occlusion(
 ) -> NodeOcclusion | None:
     """Return the occlusion on a coarse grid, as the device computes it; ``None`` for none.
 
-    Parameters
-    ----------
-    volume, transfer_function
-        What is occluded, by itself.
-    ambient_occlusion : AmbientOcclusion, optional
-        Radius, directions and strength.
-    sample_distance : float, optional
-        Length of the volume's own steps, model units; half the smallest spacing by default.
+    ``volume``, ``transfer_function``: what is occluded, by itself. ``ambient_occlusion``: radius,
+    directions and strength. ``sample_distance``: length of the volume's own steps, model units;
+    half the smallest spacing by default.
     """
     if ambient_occlusion is None:
         return None

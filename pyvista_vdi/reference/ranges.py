@@ -203,21 +203,9 @@ class _ListSpace:
     def crossing(self, line: Line, axis: int, size: float, draw: Array) -> Array:
         """Return displacements of both ends in U or V that cross the nearest border at a depth.
 
-        Parameters
-        ----------
-        line : Line
-            The ray.
-        axis : int
-            0 for U, 1 for V.
-        size : float
-            Half the box, in half windows.
-        draw : numpy.ndarray
-            Two numbers in [0, 1]: which share of the ray's length, and how steeply.
-
-        Returns
-        -------
-        numpy.ndarray
-            float64 (2,), each in -1 to 1; random where no border is near enough.
+        ``line``: the ray. ``axis``: 0 for U, 1 for V. ``size``: half the box, in half windows.
+        ``draw``: two numbers in [0, 1]: which share of the ray's length, and how steeply. Returns:
+        float64 (2,), each in -1 to 1; random where no border is near enough.
         """
         at = line.t0 + draw[0] * (line.t1 - line.t0)
         first, here, last = (

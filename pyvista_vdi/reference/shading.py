@@ -18,14 +18,9 @@ def gradient_factors(
 ) -> Array:
     """Return the factor of each sample's opacity, float64 (n,), 1 without gradient opacity.
 
-    Parameters
-    ----------
-    volume : Volume
-        Its spacing and its range of scalars.
-    transfer_function : TransferFunction
-        With or without gradient opacities.
-    differences : numpy.ndarray
-        Of the scalar, from a voxel behind to a voxel ahead along x, y and z; float64 (n, 3).
+    ``volume``: its spacing and its range of scalars. ``transfer_function``: with or without
+    gradient opacities. ``differences``: of the scalar, from a voxel behind to a voxel ahead along
+    x, y and z; float64 (n, 3).
     """
     factors, limits = transfer_function.gradient_opacities, transfer_function.gradient_range
     if factors is None or limits is None:
@@ -49,18 +44,10 @@ def lit_colors(
 ) -> Array:
     """Return the colours that samples send to the eye, float64 (n, 3), clamped to [0, 1].
 
-    Parameters
-    ----------
-    volume, camera : Volume and Camera
-        Where the samples, the eye and the lights are.
-    shading, lights : Shading and Lights
-        What reflects what; without any light everything is black.
-    position : numpy.ndarray
-        Grid coordinates (x, y, z) in points, float64 (n, 3).
-    differences : numpy.ndarray
-        As for :func:`gradient_factors`.
-    color : numpy.ndarray
-        From the transfer function, float64 (n, 3).
+    ``volume``, ``camera``: where the samples, the eye and the lights are. ``shading``, ``lights``:
+    what reflects what; without any light everything is black. ``position``: grid coordinates (x, y,
+    z) in points, float64 (n, 3). ``differences``: as for :func:`gradient_factors`. ``color``: from
+    the transfer function, float64 (n, 3).
     """
     to_model = volume.index_to_model
     to_world = camera.model_transform @ to_model

@@ -31,10 +31,7 @@ def describe(vdi: VDI, version: int) -> dict[str, Any]:
 def to_json(description: dict[str, Any]) -> str:
     """Return a description as ASCII text; float64 come back from it to the last bit.
 
-    Raises
-    ------
-    VDIFileError
-        If the metadata hold what JSON cannot, or are too long.
+    Raises VDIFileError if the metadata hold what JSON cannot, or are too long.
     """
     try:
         text = json.dumps(description, allow_nan=False, default=_plain_number)

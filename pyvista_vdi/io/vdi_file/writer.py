@@ -53,22 +53,14 @@ def write(
 ) -> Path:
     """Write a VDI to a file, exactly or packed: see :func:`pyvista_vdi.io.write`.
 
-    Parameters
-    ----------
-    vdi, path
-        As there; the name ends in ``.vdi``.
-    compression : {"lz4", "zstd", "deflate", "none"}
-        ``"lz4"`` is the fastest to write and to read, ``"zstd"`` makes files a few percent
-        smaller, ``"deflate"`` is for pages: browsers decode it, and draw a coarse level that it
-        begins with while they read the rest. ``"none"`` leaves plain little-endian arrays.
-    level : int, optional
-        Effort of the compressor, 1 to 9; 9 for lz4, 6 for deflate and 1 for zstd by default. Higher
-        levels are slower to write, not to read.
-    precision : {"exact", "16-byte", "8-byte"}, optional
-        Bytes of a supersegment before they are compressed, as for
-        :meth:`pyvista_vdi.VDI.with_precision`; the VDI's own by default.
-    progress : callable, optional
-        As for :func:`pyvista_vdi.io.write`.
+    ``vdi``, ``path``: as there; the name ends in ``.vdi``. ``compression`` ("lz4", "zstd",
+    "deflate", "none"): ``"lz4"`` is the fastest to write and to read, ``"zstd"`` makes files a few
+    percent smaller, ``"deflate"`` is for pages: browsers decode it, and draw a coarse level that it
+    begins with while they read the rest. ``"none"`` leaves plain little-endian arrays. ``level``:
+    effort of the compressor, 1 to 9; 9 for lz4, 6 for deflate and 1 for zstd by default. Higher
+    levels are slower to write, not to read. ``precision`` ("exact", "16-byte", "8-byte"): bytes of
+    a supersegment before they are compressed, as for :meth:`pyvista_vdi.VDI.with_precision`; the
+    VDI's own by default. ``progress``: as for :func:`pyvista_vdi.io.write`.
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
     with whole_file(path) as stream:
@@ -87,14 +79,9 @@ def write_to(
 ) -> None:
     """Write a .vdi file to a stream that can be sought in.
 
-    Parameters
-    ----------
-    stream : file-like
-        Takes the bytes.
-    vdi, compression, level, progress
-        As for :func:`write`; the VDI has the precision to write.
-    coarse : bool
-        Whether a file of version 4 begins with a coarse level.
+    ``stream``: takes the bytes. ``vdi``, ``compression``, ``level``, ``progress``: as for
+    :func:`write`; the VDI has the precision to write. ``coarse``: whether a file of version 4
+    begins with a coarse level.
     """
     counts = smallest(np.diff(vdi.offsets))
     arrays = layouts(
