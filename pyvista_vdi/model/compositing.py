@@ -1,8 +1,8 @@
 """Over, opacity over a length, split and merge of homogeneous segments, in float64 NumPy.
 
-The laws of DESIGN section 3, "A supersegment is a homogeneous medium" and "Merging samples into a
-supersegment". A *segment* is a homogeneous medium between two depths; what it absorbs is its
-optical depth tau, never its opacity: opacity rounds to 1 and then no longer says how much.
+The laws of docs/conventions.md#a-supersegment-is-a-homogeneous-medium and
+docs/conventions.md#merging-samples-into-a-supersegment. A *segment* is a homogeneous medium between
+two depths; what it absorbs is its optical depth tau, never its opacity, which rounds to 1.
 Colours are straight RGB in segments and premultiplied in images.
 """
 
@@ -35,7 +35,7 @@ class Segment(NamedTuple):
 
 
 def opacity(optical_depth: ArrayLike) -> Array:
-    """Return the opacity of a medium, alpha = 1 - exp(-tau) (DESIGN section 3).
+    """Return the opacity of a medium, alpha = 1 - exp(-tau).
 
     ``optical_depth``: tau >= 0, any shape; infinity is opaque. Returns: float64, 0 to 1, of the
     same shape; exact for small tau, where 1 - exp would cancel.

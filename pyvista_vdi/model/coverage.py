@@ -45,9 +45,9 @@ def covering_view(
     closer than a thousandth of the corners' diagonal: no window can cover them. Raises
     InvalidArgumentError if the window size or the limit is out of range.
 
-    With t the tangents of the half angles and c the window centre (DESIGN section 3), the pixel
-    rectangle [x0, x1) of width w in a window of width W has t' = t w / W and
-    c' t' = t (c + (x0 + x1) / W - 1); the same in y, and with s for t in parallel projection.
+    With t the tangents of the half angles and c the window centre, the pixel rectangle [x0, x1) of
+    width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
+    in y, and with s for t in parallel projection (docs/conventions.md#list-coordinates).
     """
     camera = Camera.from_any(camera)
     size = np.asarray(check_window_size(window_size), dtype=np.float64)

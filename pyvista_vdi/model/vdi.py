@@ -1,4 +1,4 @@
-"""The Volumetric Depth Image: its arrays and their rules (DESIGN section 2)."""
+"""The Volumetric Depth Image: arrays and rules (docs/conventions.md#the-arrays-of-a-vdi)."""
 
 from __future__ import annotations
 

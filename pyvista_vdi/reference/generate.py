@@ -1,4 +1,4 @@
-"""From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3)."""
+"""From a volume to samples, to an image and to a plain VDI, in float64."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def samples(
     """Yield the samples of every pixel's ray.
 
     Samples lie at the midpoints of steps of model length ``sample_distance`` from where the ray
-    enters the grid, the last step being shorter (DESIGN section 3, "From volume to medium"), so
-    that the steps' lengths add up to the ray's length in the grid whatever its directions are.
+    enters the grid, the last step being shorter, so that the steps' lengths add up to the ray's
+    length in the grid whatever its directions are: docs/conventions.md#from-a-volume-to-the-medium.
     In perspective a ray begins no earlier than at the eye.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What float32 arithmetic may make of a ray: the oracle's range (DESIGN section 3, "Borders")."""
+"""What float32 may make of a ray: the oracle's range (docs/conventions.md#borders)."""
 
 from __future__ import annotations
 

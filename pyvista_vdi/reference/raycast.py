@@ -1,4 +1,4 @@
-"""The exact image of any VDI from any view, in float64 (DESIGN section 3): the oracle.
+"""The exact image of any VDI from any view, in float64: the oracle (docs/conventions.md).
 
 A VDI's medium is piecewise constant, so nothing is sampled: a ray is cut where it crosses from one
 list to the next, each piece is intersected with every supersegment of its list by a linear scan,
@@ -25,7 +25,7 @@ from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, inside_
 Array = NDArray[np.float64]
 
 #: Nearest view depth of V_O, in diagonals of the bounds, that a ray is followed to in perspective:
-#: list coordinates are undefined at the eye (DESIGN section 3, "Lengths").
+#: list coordinates are undefined at the eye (docs/conventions.md#lengths).
 NEAR_LIMIT = 1e-6
 
 
@@ -79,8 +79,8 @@ def centre_ray_scale(vdi: VDI) -> Array:
     """Return the model length of one world unit of view depth along each list's centre ray.
 
     Returns: float64 (H, W), bottom row first; for the identity as model transform ``sqrt(1 + (u_c
-    t_x)^2 + (v_c t_y)^2)``, in parallel projection 1 (DESIGN section 3, "A supersegment is a
-    homogeneous medium").
+    t_x)^2 + (v_c t_y)^2)``, in parallel projection 1
+    (docs/conventions.md#a-supersegment-is-a-homogeneous-medium).
     """
     width, height = vdi.window_size
     scale = np.empty((height, width))
@@ -384,7 +384,7 @@ def _list_crossings(
 def _list_of(at: Array, slope: Array, t: Array, window_size: tuple[int, int]) -> NDArray[np.int64]:
     """Return the list that holds the line at each t; -1 outside the viewport.
 
-    A border belongs to the higher index (DESIGN section 3, "Borders").
+    A border belongs to the higher index (docs/conventions.md#borders).
     """
     width, height = window_size
     d = at[3] + t * slope[3]
