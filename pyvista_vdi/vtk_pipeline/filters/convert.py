@@ -388,7 +388,7 @@ def vdi_from_image(image: Any) -> VDI:
         kind = type(image).__name__
         raise InvalidVDIError(
             f"this {kind} is not a VDI: it has no field string {DESCRIPTION!r}; a volume becomes "
-            "a VDI by pyvista_vdi.generate or VDISource, and a dense form by vdi_from_dense_image"
+            "a VDI by pyvista_vdi.generate or VDISource"
         )
     field = image.GetFieldData()
     about = view_from_description(image, DESCRIPTION)

@@ -21,8 +21,6 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_from_image,
     vdi_to_image,
 )
-from pyvista_vdi.vtk_pipeline.filters.dense import DESCRIPTION as DENSE_DESCRIPTION
-from pyvista_vdi.vtk_pipeline.filters.dense import is_dense_image, vdi_from_dense_image
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkOutputWindow,
     vtkStringOutputWindow,
@@ -67,10 +65,10 @@ def write(
 
 
 def read(path: str | os.PathLike[str]) -> VDI:
-    """Read a VDI from a ``.vti`` file that holds its canonical or its dense form."""
+    """Read a VDI from a ``.vti`` file that holds its canonical form."""
     image = _image(path)
     try:
-        return vdi_from_dense_image(image) if is_dense_image(image) else vdi_from_image(image)
+        return vdi_from_image(image)
     except InvalidVDIError as error:
         raise VDIFileError(f"{path}: {error}") from error
 
@@ -97,8 +95,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
 
 def holds_vdi(path: str | os.PathLike[str]) -> bool:
     """Whether a ``.vti`` file's header names the arrays of a VDI; False where there is no file."""
-    names = f"{DESCRIPTION}|{DENSE_DESCRIPTION}".encode()
-    wanted = re.compile(rb'<AppendedData|<Array type="String" Name="(?:%b)"' % names)
+    wanted = re.compile(rb'<AppendedData|<Array type="String" Name="%b"' % DESCRIPTION.encode())
     try:
         # Not read: it may be a volume of any size
         with Path(path).open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
