@@ -204,11 +204,8 @@ def _digest(file: Path, name: str) -> str | None:
             return hashlib.sha256(file.read_bytes()).hexdigest()
         except (FileNotFoundError, NotADirectoryError):
             return None
-    return _sampled(file, _OF_CHUNK if name else _OF_FILE)
-
-
-def _sampled(file: Path, pieces: int) -> str | None:
-    """Return a digest of a file's length and of some pieces of it; ``None`` if it is not there."""
+    # Find a digest of a file's length and of some pieces of it; None if it is not there
+    pieces = _OF_CHUNK if name else _OF_FILE
     try:
         with file.open("rb") as stream:
             size = stream.seek(0, os.SEEK_END)

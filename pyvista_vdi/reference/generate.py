@@ -245,7 +245,32 @@ def build_vdi(
             else 0.0
         )
         lists.append(_cut(runs, criterion, max_supersegments, per_reference, weighting))
-    return _vdi_from(lists, camera, window_size, volume.bounds, depth_origin, criterion)
+    # Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint
+    bounds = volume.bounds
+    front, back = [], []
+    for segments in lists:
+        end = np.float32(-np.inf)
+        for segment in segments:
+            begin = max(np.float32(segment.front - depth_origin), end)
+            end = max(
+                np.float32(segment.back - depth_origin), np.nextafter(begin, np.float32(np.inf))
+            )
+            front.append(begin)
+            back.append(end)
+    flat = [segment for segments in lists for segment in segments]
+    return VDI(
+        camera,
+        window_size,
+        np.concatenate(([0], np.cumsum([len(segments) for segments in lists]))).astype(np.uint64),
+        np.array(front, dtype=np.float32),
+        np.array(back, dtype=np.float32),
+        # Means of colours in [0, 1] may round beyond it
+        np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
+        np.array([segment.optical_depth for segment in flat]),
+        bounds,
+        depth_origin=depth_origin,
+        metadata={"criterion": f"reference: {criterion}"},
+    )
 
 
 def near_depth(bounds: Sequence[float], camera: Camera) -> float:
@@ -472,11 +497,7 @@ def _cut(
         return cut_at_equal_transmittance(runs, budget, weighting)
     if criterion == "optical-depth":
         return cut_at_equal_optical_depths(runs, budget, weighting)
-    return _within_budget(runs, budget, weighting)
-
-
-def _within_budget(runs: list[Segment], budget: int, weighting: str) -> list[Segment]:
-    """Merge neighbours at least cost until there are no more than ``budget``."""
+    # Merge neighbours at least cost until there are no more than budget
     merged = list(runs)
     parts = [[run] for run in runs]  # what each was made of
     costs = [_merge_cost(a + b) for a, b in itertools.pairwise(parts)]
@@ -499,38 +520,3 @@ def _merge_cost(parts: list[Segment]) -> float:
     mean = amount.sum(axis=0) / whole
     gap = max(0.0, whole - float(length.sum()))
     return float(np.abs(amount - length[:, None] * mean).sum() + gap * mean.sum())
-
-
-def _vdi_from(
-    lists: list[list[Segment]],
-    camera: Camera,
-    window_size: Sequence[int],
-    bounds: Sequence[float],
-    depth_origin: float,
-    criterion: str,
-) -> VDI:
-    """Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint."""
-    front, back = [], []
-    for segments in lists:
-        end = np.float32(-np.inf)
-        for segment in segments:
-            begin = max(np.float32(segment.front - depth_origin), end)
-            end = max(
-                np.float32(segment.back - depth_origin), np.nextafter(begin, np.float32(np.inf))
-            )
-            front.append(begin)
-            back.append(end)
-    flat = [segment for segments in lists for segment in segments]
-    return VDI(
-        camera,
-        window_size,
-        np.concatenate(([0], np.cumsum([len(segments) for segments in lists]))).astype(np.uint64),
-        np.array(front, dtype=np.float32),
-        np.array(back, dtype=np.float32),
-        # Means of colours in [0, 1] may round beyond it
-        np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
-        np.array([segment.optical_depth for segment in flat]),
-        bounds,
-        depth_origin=depth_origin,
-        metadata={"criterion": f"reference: {criterion}"},
-    )

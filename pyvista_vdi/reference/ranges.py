@@ -187,7 +187,11 @@ class _ListSpace:
         self.half_window = np.array(vdi.window_size) / 2
         self.depth_origin = vdi.depth_origin
         self.parallel = vdi.camera.parallel_projection
-        near, far = _depths_of_bounds(vdi)
+        # Find the smallest and largest view depth of the bounds' corners in V_O; world units
+        corners = np.array(list(itertools.product(*np.reshape(vdi.bounds, (3, 2)))))
+        matrix = vdi.camera.model_to_view
+        depth = corners @ matrix[2, :3] + matrix[2, 3]
+        near, far = max(float(depth.min()), near_limit(vdi)), float(depth.max())
         self.deep = not self.parallel and (far > DEEP_RATIO * near or self.depth_origin == 0)
 
     def moved(self, line: Line, move: _Move, size: float) -> Line:
@@ -254,11 +258,3 @@ class _ListSpace:
             z = self.depth_origin / (1 - q[2])
         at = np.append(1.0, q[:2] / self.half_window)
         return np.asarray(at @ self.ray_origin + z * (at @ self.ray_direction))
-
-
-def _depths_of_bounds(vdi: VDI) -> tuple[float, float]:
-    """Return the smallest and largest view depth of the bounds' corners in V_O; world units."""
-    corners = np.array(list(itertools.product(*np.reshape(vdi.bounds, (3, 2)))))
-    matrix = vdi.camera.model_to_view
-    depth = corners @ matrix[2, :3] + matrix[2, 3]
-    return max(float(depth.min()), near_limit(vdi)), float(depth.max())

@@ -52,33 +52,21 @@ def lit_colors(
     to_model = volume.index_to_model
     to_world = camera.model_transform @ to_model
     if lights.headlight_only:
-        sent = _by_headlight(camera, shading, lights, to_model, position, differences, color)
+        # Angles are those of the model frame, whatever the actor's matrix does to them
+        (light,) = lights.lights
+        eye = np.linalg.inv(camera.model_transform) @ np.append(camera.position, 1.0)
+        view = _unit(position @ to_model[:3, :3].T + to_model[:3, 3] - eye[:3])
+        facing = (_normals(to_model, differences) * view).sum(axis=1)
+        reflected = np.maximum(2 * facing**2 - 1, 0)
+        if lights.two_sided:
+            facing = np.abs(facing)
+        diffuse = shading.diffuse * facing[:, None] * np.array(light.diffuse) * color
+        highlight = np.where(reflected > 0, reflected**shading.specular_power, 0.0)
+        specular = shading.specular * highlight[:, None] * np.array(light.specular)
+        sent = shading.ambient * color + np.where(facing[:, None] > 0, diffuse + specular, 0.0)
     else:
         sent = _by_lights(camera, shading, lights, to_world, position, differences, color)
     return np.clip(sent, 0.0, 1.0)
-
-
-def _by_headlight(
-    camera: Camera,
-    shading: Shading,
-    lights: Lights,
-    to_model: Array,
-    position: Array,
-    differences: Array,
-    color: Array,
-) -> Array:
-    """Angles are those of the model frame, whatever the actor's matrix does to them."""
-    (light,) = lights.lights
-    eye = np.linalg.inv(camera.model_transform) @ np.append(camera.position, 1.0)
-    view = _unit(position @ to_model[:3, :3].T + to_model[:3, 3] - eye[:3])
-    facing = (_normals(to_model, differences) * view).sum(axis=1)
-    reflected = np.maximum(2 * facing**2 - 1, 0)
-    if lights.two_sided:
-        facing = np.abs(facing)
-    diffuse = shading.diffuse * facing[:, None] * np.array(light.diffuse) * color
-    highlight = np.where(reflected > 0, reflected**shading.specular_power, 0.0)
-    specular = shading.specular * highlight[:, None] * np.array(light.specular)
-    return shading.ambient * color + np.where(facing[:, None] > 0, diffuse + specular, 0.0)
 
 
 def _by_lights(

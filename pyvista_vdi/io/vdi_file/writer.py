@@ -149,7 +149,27 @@ def _encoder(
     name: str, layout: Layout, vdi: VDI, counts: NDArray[Any]
 ) -> Callable[[int, int], NDArray[Any]]:
     if isinstance(vdi.packing, Packed8) and name != "counts":
-        return _code_encoder(name, layout, vdi)
+        # Encode an array of the 8-byte form
+        packed = vdi.packing
+        assert isinstance(packed, Packed8)
+
+        def encoded(first: int, last: int) -> NDArray[Any]:
+            rows: NDArray[Any]
+            if name in ("front", "back"):
+                rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
+            elif name == "color":
+                rows = packed.colors(first, last)
+                if layout.filter == "channel-difference":
+                    rows = channel_differences(rows)
+            elif name == "optical_depth":
+                rows = packed.tau_codes(first, last)
+            elif name == "origin":
+                rows = packed.origins[first:last]
+            else:
+                rows = packed.strides[first:last]
+            return np.ascontiguousarray(rows, dtype=layout.dtype)
+
+        return encoded
     if layout.filter == "difference":
         encode = {"front": _gaps, "back": _thicknesses}[name]
         front, back = vdi.front.view(np.uint32), vdi.back.view(np.uint32)
@@ -158,30 +178,6 @@ def _encoder(
     if isinstance(vdi.packing, Packed16) and name == "color":
         array = vdi.packing.color
     return lambda first, last: np.ascontiguousarray(array[first:last], dtype=layout.dtype)
-
-
-def _code_encoder(name: str, layout: Layout, vdi: VDI) -> Callable[[int, int], NDArray[Any]]:
-    """Encode an array of the 8-byte form."""
-    packed = vdi.packing
-    assert isinstance(packed, Packed8)
-
-    def encoded(first: int, last: int) -> NDArray[Any]:
-        rows: NDArray[Any]
-        if name in ("front", "back"):
-            rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
-        elif name == "color":
-            rows = packed.colors(first, last)
-            if layout.filter == "channel-difference":
-                rows = channel_differences(rows)
-        elif name == "optical_depth":
-            rows = packed.tau_codes(first, last)
-        elif name == "origin":
-            rows = packed.origins[first:last]
-        else:
-            rows = packed.strides[first:last]
-        return np.ascontiguousarray(rows, dtype=layout.dtype)
-
-    return encoded
 
 
 def _gaps(front: NDArray[np.uint32], back: NDArray[np.uint32]) -> NDArray[Any]:

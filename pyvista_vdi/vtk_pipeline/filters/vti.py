@@ -114,19 +114,7 @@ def _image(path: Any) -> Any:
         raise VDIFileError(
             f"{path} cannot be read: {getattr(error, 'strerror', None) or error}"
         ) from error
-    _check_header(content, file)
-    reader = vtkXMLImageDataReader()
-    reader.ReadFromInputStringOn()
-    reader.SetInputString(content)
-    with _messages() as messages:
-        reader.Update()
-    if messages.GetOutput() or reader.GetErrorCode():
-        raise VDIFileError(f"{file} is damaged: {_first_line(messages)}")
-    return reader.GetOutput()
-
-
-def _check_header(content: bytes, file: Path) -> None:
-    """Refuse what is no VTK image, or declares more than its bytes could hold: VTK believes it."""
+    # Refuse what is no VTK image, or declares more than its bytes could hold: VTK believes it
     head = content.partition(b"<AppendedData")[0]
     if not re.search(rb"<VTKFile[^>]*type=[\"']ImageData[\"']", head):
         raise VDIFileError(f"{file} is not a VTK image file (.vti): it has no such header")
@@ -140,6 +128,14 @@ def _check_header(content: bytes, file: Path) -> None:
             f"{file} is damaged: {len(content)} bytes cannot hold the {max(declared)} values that "
             "they declare"
         )
+    reader = vtkXMLImageDataReader()
+    reader.ReadFromInputStringOn()
+    reader.SetInputString(content)
+    with _messages() as messages:
+        reader.Update()
+    if messages.GetOutput() or reader.GetErrorCode():
+        raise VDIFileError(f"{file} is damaged: {_first_line(messages)}")
+    return reader.GetOutput()
 
 
 def _codec(file: Path) -> str:
