@@ -12,7 +12,7 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarnin
 from pyvista_vdi.quality import probe as dial_measurement
 from pyvista_vdi.quality.background import BackgroundGeneration
 from pyvista_vdi.quality.dial import LADDER, Dial
-from pyvista_vdi.quality.when_anew import REGENERATE_BELOW
+from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 

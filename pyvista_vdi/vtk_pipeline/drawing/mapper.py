@@ -17,8 +17,8 @@ from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.regeneration_policy import checked_bound
 from pyvista_vdi.quality.render_mode import checked_draw
-from pyvista_vdi.quality.when_anew import checked_bound
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
 from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
