@@ -275,7 +275,7 @@ class VDI:
     def thinned(self, along_x: int = 1, along_y: int = 1) -> VDI:
         """Return a VDI of every k-th list along the window's width and height.
 
-        See :func:`pyvista_vdi.model.thinned.thinned`.
+        See :func:`pyvista_vdi.model.list_subsampling.subsampled_lists`.
         """
         return provider("thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
 

@@ -1,4 +1,4 @@
-"""A VDI of every second list: what a picture of few pixels from the side needs."""
+"""List subsampling: a VDI of every k-th list, for pictures of few pixels from the side."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from pyvista_vdi.model.vdi import VDI
 _INNER = 0.5
 
 
-def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
+def subsampled_lists(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     """Return a VDI of every k-th list along each edge: the same lists, of the same rays.
 
     A list stands for its neighbours, too. From the side a ray crosses a k-th of the lists, which
     is about what it costs. docs/decisions/any_view.md says what that loses.
 
-    ``vdi``: of any precision, which stays. ``along_x``, ``along_y``: every how-manieth list is
+    ``vdi``: of any precision, which stays. ``along_x``, ``along_y``: every how many lists one is
     taken along the window's width and height. Returns: Without metadata. Its view is that of
     ``vdi``, stretched by its model transform, so that the middles of the pixels are those of the
     lists that were taken. Of the window's right and upper edge it may leave out less than half of
