@@ -213,19 +213,6 @@ def refusal(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-class Steps:
-    """Counts pieces of work and reports their share."""
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._total, self._done = progress, max(1, total), 0
-
-    def __call__(self, *doing: str) -> None:
-        """Say that a piece is finished, and what is being done now."""
-        self._done += 1
-        if self._progress is not None:
-            self._progress(min(1.0, self._done / self._total), *doing)
-
-
 class Latest(Generic[_Made]):
     """Keeps what was made for the latest key; for another it is closed, and made anew.
 
@@ -253,7 +240,7 @@ class Latest(Generic[_Made]):
         return self._found[0]
 
     def close(self) -> None:
-        """Give up what is kept, and close it if it can be closed."""
+        """Drop what is kept, and close it if it can be closed."""
         for one in self._found:
             getattr(one, "close", lambda: None)()
         self._found.clear()

@@ -286,7 +286,7 @@ class FrameRateController:
         return band + cost.error * samples
 
     def _leave_full(self, full: int) -> None:
-        """Give up full quality if it misses the aim."""
+        """Leave full quality if it misses the aim."""
         cost = self._cost()
         if cost.of(full) <= self._aim(cost) + self._slack(cost, full):
             return
