@@ -53,10 +53,11 @@ def coverage(session: nox.Session) -> None:
 
 @nox.session
 def lint(session: nox.Session) -> None:
-    """Check style and formatting, as pre-commit does."""
-    session.install("ruff>=0.15")
+    """Check style, formatting and spelling, as pre-commit does."""
+    session.install("ruff>=0.15", "codespell[toml]>=2.3")
     session.run("ruff", "check", "--no-cache", ".")
     session.run("ruff", "format", "--no-cache", "--check", ".")
+    session.run("codespell")
 
 
 @nox.session

@@ -67,12 +67,12 @@ def test_a_tiny_run_writes_what_the_schema_says(runtime, tmp_path):
     assert "Not measured" not in text
 
 
-@pytest.mark.parametrize(("tables", "whats"), [("1", ["vdi", "view"]), ("2", ["preview"])])
-def test_either_table_can_be_left_out(tables, whats, default_runtime, tmp_path):
+@pytest.mark.parametrize(("tables", "names"), [("1", ["vdi", "view"]), ("2", ["preview"])])
+def test_either_table_can_be_left_out(tables, names, default_runtime, tmp_path):
     run = (*TINY_RUN, "--angles", "5", "--no-vtk", "--tables", tables)
     assert benchmark(*run, "--out", tmp_path / "a.json") == 0
     found = [row["case"]["what"] for row in checked(tmp_path / "a.json").rows(volume=TINY)]
-    assert found == ["volume", *whats]
+    assert found == ["volume", *names]
 
 
 def test_frames_that_stay_on_the_device(default_runtime, tmp_path, monkeypatch):
