@@ -14,6 +14,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.compositing import Segment, composite, merge
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -24,7 +25,7 @@ from pyvista_vdi.reference.criteria import (
     cut_at_equal_transmittance,
     cut_where_unlike,
 )
-from pyvista_vdi.reference.occlusion import NodeOcclusion, mean_transmittance
+from pyvista_vdi.reference.occlusion import NodeOcclusion, mean_transmittance, trilinear
 from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, pixel_ray
 from pyvista_vdi.reference.shading import gradient_factors, lit_colors
 
@@ -239,14 +240,12 @@ def build_vdi(
             )
             if tau > 0
         ]
-        per_reference = (
-            float(ray.length[0] / (ray.end[0] - ray.begin[0])) / min(volume.spacing)
-            if runs
-            else 0.0
-        )
+        per_reference = 0.0  # voxels per unit of view depth
+        if runs:
+            per_depth = float(ray.length[0] / (ray.end[0] - ray.begin[0]))
+            per_reference = per_depth / min(volume.spacing)
         lists.append(_cut(runs, criterion, max_supersegments, per_reference, weighting))
     # Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint
-    bounds = volume.bounds
     front, back = [], []
     for segments in lists:
         end = np.float32(-np.inf)
@@ -267,7 +266,7 @@ def build_vdi(
         # Means of colours in [0, 1] may round beyond it
         np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
         np.array([segment.optical_depth for segment in flat]),
-        bounds,
+        volume.bounds,
         depth_origin=depth_origin,
         metadata={"criterion": f"reference: {criterion}"},
     )
@@ -275,9 +274,8 @@ def build_vdi(
 
 def near_depth(bounds: Sequence[float], camera: Camera) -> float:
     """Return the nearest view depth of axis-aligned bounds, 0 where the eye is not before them."""
-    corners = np.array(list(itertools.product(*np.reshape(bounds, (3, 2)))))
     matrix = camera.model_to_view
-    near = float((corners @ matrix[2, :3] + matrix[2, 3]).min())
+    near = float((bounds_corners(bounds) @ matrix[2, :3] + matrix[2, 3]).min())
     return near if near > 0 or camera.parallel_projection else 0.0
 
 
@@ -304,7 +302,7 @@ def medium_at(
     top = np.array(volume.dimensions) - 1
     outside = ((position < -GRID_TOLERANCE) | (position > top + GRID_TOLERANCE)).any(axis=1)
     inside = np.clip(position, 0, top)
-    interpolate = _linear if transfer_function.interpolation == "linear" else _nearest
+    interpolate = trilinear if transfer_function.interpolation == "linear" else _nearest
     scalar = interpolate(volume.scalars, inside)
     color, alpha = classify(transfer_function, scalar)
     if volume.rgba:
@@ -317,7 +315,13 @@ def medium_at(
     tau = np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, tau)
 
     if transfer_function.gradient_opacities is not None or transfer_function.shading is not None:
-        differences = _differences(volume.scalars, inside, interpolate)
+        # Take differences of the scalar from a voxel behind to a voxel ahead; with NaN they are 0
+        columns = []
+        for axis in np.eye(3):
+            ahead, behind = (np.clip(inside + s * axis, 0, top) for s in (1, -1))
+            columns.append(interpolate(volume.scalars, ahead) - interpolate(volume.scalars, behind))
+        differences = np.stack(columns, axis=1)
+        differences = np.where(np.isnan(differences), 0.0, differences)
         factor = gradient_factors(volume, transfer_function, differences)
         tau = np.where(factor < 1, -np.log1p(factor * np.expm1(-tau)), tau)
         if transfer_function.shading is not None:
@@ -329,7 +333,13 @@ def medium_at(
             )
     if occlusion is not None:
         color = color * occlusion.factors(inside)[:, None]
-    unseen = outside | np.isnan(scalar) | _blank(volume, inside)
+    unseen = outside | np.isnan(scalar)
+    if volume.blanked is not None:
+        # Leave out what lies in blank octants
+        nearest = np.floor(inside + 0.5).astype(np.int64)
+        octant = (inside >= nearest) @ np.array([1, 2, 4])
+        x, y, z = nearest.T
+        unseen |= (volume.blanked[z, y, x] >> octant & 1).astype(bool)
     return color, np.where(unseen, 0.0, tau)
 
 
@@ -424,47 +434,6 @@ def classify(transfer_function: TransferFunction, scalar: Array) -> tuple[Array,
 def _nearest(array: NDArray[np.generic], position: Array) -> Array:
     x, y, z = np.floor(position + 0.5).astype(np.int64).T
     return np.asarray(array[z, y, x], dtype=np.float64)
-
-
-def _blank(volume: Volume, position: Array) -> NDArray[np.bool_]:
-    """Return whether positions lie in blank octants."""
-    if volume.blanked is None:
-        return np.zeros(len(position), dtype=bool)
-    nearest = np.floor(position + 0.5).astype(np.int64)
-    octant = (position >= nearest) @ np.array([1, 2, 4])
-    x, y, z = nearest.T
-    return (volume.blanked[z, y, x] >> octant & 1).astype(bool)
-
-
-def _linear(array: NDArray[np.generic], position: Array) -> Array:
-    """Trilinear; NaN wherever a corner of the cell is NaN."""
-    top = np.array(array.shape[::-1]) - 1
-    cell = np.minimum(np.floor(position).astype(np.int64), top - 1)
-    share = position - cell
-    total = np.zeros(len(position))
-    for corner in itertools.product((0, 1), repeat=3):
-        weight = np.where(corner, share, 1 - share).prod(axis=1)
-        x, y, z = (cell + corner).T
-        total += weight * np.asarray(array[z, y, x], dtype=np.float64)
-    return total
-
-
-def _differences(
-    array: NDArray[np.generic],
-    position: Array,
-    interpolate: Callable[[NDArray[np.generic], Array], Array],
-) -> Array:
-    """Return differences of the scalar from a voxel behind to a voxel ahead, float64 (n, 3).
-
-    Beyond the grid it is what it is on its border; a difference with NaN is 0.
-    """
-    top = np.array(array.shape[::-1]) - 1
-    columns = []
-    for axis in np.eye(3):
-        ahead, behind = (np.clip(position + s * axis, 0, top) for s in (1, -1))
-        columns.append(interpolate(array, ahead) - interpolate(array, behind))
-    differences = np.stack(columns, axis=1)
-    return np.where(np.isnan(differences), 0.0, differences)
 
 
 def _steps(start: Array, slope: Array, volume: Volume, parallel: bool, stride: float) -> Array:

@@ -26,7 +26,7 @@ from pyvista_vdi.reference.ranges import (
     _Move,
     _window_nudges,
 )
-from pyvista_vdi.reference.raycast import Line, Lists, crossings, lines_of_pixel
+from pyvista_vdi.reference.raycast import Line, Lists, Rays, crossings
 
 Array = NDArray[np.float64]
 
@@ -107,20 +107,13 @@ def render_joint(
         float64 (H, W, 4), premultiplied RGBA, top row first.
     """
     width, height = window_size
-    scene = _Scene(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
+    views = _views(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
     media = [
-        Lists(vdi, m) for vdi, m in zip(vdis, _each(opacity_multiplier, vdis, 1.0), strict=True)
+        Lists(vdi, m) for vdi, m in zip(vdis, opacity_multiplier or [1.0] * len(vdis), strict=True)
     ]
     image = np.zeros((height, width, 4))
     for row, x in itertools.product(range(height), range(width)):
-        rays = scene.rays((x, height - 1 - row))
-        image[row, x] = composite_segments(
-            [
-                segments_of(lists, line)
-                for lists, ray in zip(media, rays, strict=True)
-                for line in ray
-            ]
-        )
+        image[row, x] = _seen(media, [view.lines((x, height - 1 - row)) for view in views])
     return image
 
 
@@ -163,28 +156,19 @@ def render_joint_range(
         float64 (len(pixels), 4) each, premultiplied RGBA.
     """
     rng = np.random.default_rng(seed)
-    scene = _Scene(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
+    views = _views(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
     movers = [
         _Mover(Lists(vdi, m), k * ROUNDOFF)
-        for vdi, m in zip(vdis, _each(opacity_multiplier, vdis, 1.0), strict=True)
+        for vdi, m in zip(vdis, opacity_multiplier or [1.0] * len(vdis), strict=True)
     ]
+    media = [mover.media[0] for mover in movers]
     nudges = _window_nudges(window_size, k)
     low = np.empty((len(pixels), 4))
     high = np.empty((len(pixels), 4))
     for n, pixel in enumerate(pixels):
-        seen = []
-        for nudge in [(0.0, 0.0), *nudges]:
-            rays = scene.rays(pixel, nudge)
-            seen.append(
-                composite_segments(
-                    [
-                        segments_of(m.media[0], line)
-                        for m, ray in zip(movers, rays, strict=True)
-                        for line in ray
-                    ]
-                )
-            )
-        rays = scene.rays(pixel)
+        rays = [view.lines(pixel) for view in views]
+        seen = [_seen(media, rays)]
+        seen += [_seen(media, [view.lines(pixel, nudge) for view in views]) for nudge in nudges]
         depths = [depth for ray in rays for line in ray for depth in line[2:4]]
         reach = k * ROUNDOFF * float(np.ptp(depths)) if depths else 0.0
         for moves in _moves(rng, n_random, movers, rays):
@@ -199,41 +183,18 @@ def render_joint_range(
     return low, high
 
 
-class _Scene(NamedTuple):
-    """What rays through a window meet; each VDI's clipping planes and cropping."""
-
-    vdis: Sequence[VDI]
-    cameras: Sequence[Camera]
-    window_size: tuple[int, int]
-    opaque_depth: ArrayLike | None
-    clipping_planes: Sequence[ArrayLike | None] | None
-    cropping: Sequence[Any] | None
-
-    def rays(
-        self, pixel: tuple[int, int], nudge: tuple[float, float] = (0.0, 0.0)
-    ) -> list[list[Line]]:
-        """Return the parts of a pixel's ray that may meet each VDI."""
-        planes = _each(self.clipping_planes, self.vdis, None)
-        croppings = _each(self.cropping, self.vdis, None)
-        return [
-            lines_of_pixel(
-                vdi,
-                camera,
-                self.window_size,
-                pixel,
-                nudge=nudge,
-                opaque_depth=self.opaque_depth,
-                clipping_planes=cut,
-                cropping=cropped,
-            )
-            for vdi, camera, cut, cropped in zip(
-                self.vdis, self.cameras, planes, croppings, strict=True
-            )
-        ]
-
-
-def _each(values: Sequence[Any] | None, vdis: Sequence[VDI], default: Any) -> Sequence[Any]:
-    return [default] * len(vdis) if values is None else values
+def _views(
+    vdis: Sequence[VDI],
+    cameras: Sequence[Camera],
+    window_size: tuple[int, int],
+    opaque_depth: ArrayLike | None,
+    clipping_planes: Sequence[ArrayLike | None] | None,
+    cropping: Sequence[Any] | None,
+) -> list[Rays]:
+    """Return the rays that may meet each VDI, cut by its own clipping planes and cropping."""
+    none = [None] * len(vdis)
+    each = zip(vdis, cameras, clipping_planes or none, cropping or none, strict=True)
+    return [Rays(v, seen, window_size, opaque_depth, cut, crop) for v, seen, cut, crop in each]
 
 
 def _seen(media: Sequence[Lists], rays: Sequence[Sequence[Line]]) -> Array:

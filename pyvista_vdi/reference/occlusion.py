@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,28 +71,25 @@ class NodeOcclusion:
         tau = optical_depth(position.reshape(-1, 3), sample_distance)
         opacity = -np.expm1(-tau * grid.step / sample_distance)
         opacity = opacity.reshape(*grid.nodes[::-1], len(around)).mean(axis=-1)
-        self.open = self._marched(opacity, grid)
-
-    def factors(self, position: Array) -> Array:
-        """Return the factor of the colour at grid coordinates, float64 (n,)."""
-        open_ = _trilinear(self.open, position / self._cell)
-        return open_ / (open_ + self._strength * (1 - open_))
-
-    @staticmethod
-    def _marched(opacity: Array, grid: OcclusionGrid) -> Array:
-        around = np.pad(opacity, [(m + 1, m + 1) for m in grid.margin[::-1]])
-        z, y, x = (axis.ravel() for axis in np.indices(opacity.shape))
+        # March from every node through the mean opacities of the nodes around it
+        padded = np.pad(opacity, [(m + 1, m + 1) for m in grid.margin[::-1]])
         node = np.stack([x, y, z], axis=1) + np.array(grid.margin) + 1
         total = np.zeros(len(node))
         for offsets in grid.offsets:
             transmittance = np.ones(len(node))
             for offset in offsets:
-                transmittance *= 1 - _trilinear(around, node + offset)
+                transmittance *= 1 - trilinear(padded, node + offset)
             total += transmittance
-        return (total / len(grid.offsets)).reshape(opacity.shape)
+        self.open = (total / len(grid.offsets)).reshape(opacity.shape)
+
+    def factors(self, position: Array) -> Array:
+        """Return the factor of the colour at grid coordinates, float64 (n,)."""
+        open_ = trilinear(self.open, position / self._cell)
+        return open_ / (open_ + self._strength * (1 - open_))
 
 
-def _trilinear(values: Array, position: Array) -> Array:
+def trilinear(values: NDArray[Any], position: Array) -> Array:
+    """Interpolate values at grid coordinates (x, y, z); NaN where a corner of the cell is NaN."""
     top = np.array(values.shape[::-1]) - 1
     cell = np.clip(np.floor(position).astype(np.int64), 0, top - 1)
     share = position - cell
@@ -100,5 +97,5 @@ def _trilinear(values: Array, position: Array) -> Array:
     for corner in itertools.product((0, 1), repeat=3):
         weight = np.where(corner, share, 1 - share).prod(axis=1)
         x, y, z = (cell + corner).T
-        total += weight * values[z, y, x]
+        total += weight * np.asarray(values[z, y, x], dtype=np.float64)
     return total

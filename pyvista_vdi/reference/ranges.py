@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.reference.raycast import Line, Lists, composite_lines, lines_of_pixel, near_limit
+from pyvista_vdi.reference.raycast import Line, Lists, Rays, composite_lines, near_limit
 
 Array = NDArray[np.float64]
 
@@ -103,33 +104,21 @@ def render_range(
     lists = Lists(vdi, opacity_multiplier)
     shift = FACE_ROUNDINGS * ROUNDOFF * space.face_sensitivity(lists)
     media = {0: lists, 1: lists.displaced(shift), -1: lists.displaced(-shift)}
-    nudges = [(0.0, 0.0), *_window_nudges(window_size, k)]
+    view = Rays(vdi, camera, window_size, opaque_depth, clipping_planes, cropping)
+    nudges = _window_nudges(window_size, k)
     rng = np.random.default_rng(seed)
     size = k * ROUNDOFF
 
     low = np.empty((len(pixels), 4))
     high = np.empty((len(pixels), 4))
     for n, pixel in enumerate(pixels):
-        rays = [
-            lines_of_pixel(
-                vdi,
-                camera,
-                window_size,
-                pixel,
-                nudge=nudge,
-                opaque_depth=opaque_depth,
-                clipping_planes=clipping_planes,
-                cropping=cropping,
-            )
-            for nudge in nudges
-        ]
-        seen = [composite_lines(lists, lines) for lines in rays]
-        if rays[0]:
-            for move in itertools.chain(
-                _corners(), _inside(rng, n_random, space, rays[0][0], size)
-            ):
+        lines = view.lines(pixel)
+        seen = [composite_lines(lists, lines)]
+        seen += [composite_lines(lists, view.lines(pixel, nudge)) for nudge in nudges]
+        if lines:
+            for move in itertools.chain(_corners(), _inside(rng, n_random, space, lines[0], size)):
                 # What cropping cuts out of a ray begins and ends at roundings of its own
-                moved = [space.moved(line, move, size) for line in rays[0]]
+                moved = [space.moved(line, move, size) for line in lines]
                 seen.append(composite_lines(media[move.faces], moved))
         low[n], high[n] = np.min(seen, axis=0), np.max(seen, axis=0)
     return low, high
@@ -188,9 +177,8 @@ class _ListSpace:
         self.depth_origin = vdi.depth_origin
         self.parallel = vdi.camera.parallel_projection
         # Find the smallest and largest view depth of the bounds' corners in V_O; world units
-        corners = np.array(list(itertools.product(*np.reshape(vdi.bounds, (3, 2)))))
         matrix = vdi.camera.model_to_view
-        depth = corners @ matrix[2, :3] + matrix[2, 3]
+        depth = bounds_corners(vdi.bounds) @ matrix[2, :3] + matrix[2, 3]
         near, far = max(float(depth.min()), near_limit(vdi)), float(depth.max())
         self.deep = not self.parallel and (far > DEEP_RATIO * near or self.depth_origin == 0)
 

@@ -8,7 +8,7 @@ and what is met is composited front to back.
 from __future__ import annotations
 
 import copy
-import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -100,13 +100,8 @@ def near_limit(vdi: VDI) -> float:
     :data:`NEAR_LIMIT` times the diagonal of the bounds, carried into the world by the model
     transform's largest stretch.
     """
-    return _near_limit(vdi.camera, vdi.bounds)
-
-
-@functools.lru_cache(64)
-def _near_limit(camera: Camera, bounds: tuple[float, ...]) -> float:
-    extent = np.subtract(bounds[1::2], bounds[::2])
-    stretch = float(np.linalg.norm(camera.model_transform[:3, :3], ord=2))
+    extent = np.subtract(vdi.bounds[1::2], vdi.bounds[::2])
+    stretch = float(np.linalg.norm(vdi.camera.model_transform[:3, :3], ord=2))
     return NEAR_LIMIT * stretch * float(np.linalg.norm(extent))
 
 
@@ -188,67 +183,64 @@ def render_pixels(
         float64 (len(pixels), 4), premultiplied RGBA.
     """
     lists = Lists(vdi, opacity_multiplier)
+    view = Rays(vdi, camera, window_size, opaque_depth, clipping_planes, cropping)
     colors = np.zeros((len(pixels), 4))
     for k, pixel in enumerate(pixels):
-        lines = lines_of_pixel(
-            vdi,
-            camera,
-            window_size,
-            pixel,
-            nudge=nudge,
-            opaque_depth=opaque_depth,
-            clipping_planes=clipping_planes,
-            cropping=cropping,
-        )
-        colors[k] = composite_lines(lists, lines)
+        colors[k] = composite_lines(lists, view.lines(pixel, nudge))
     return colors
 
 
-def lines_of_pixel(
-    vdi: VDI,
-    camera: Camera,
-    window_size: Sequence[int],
-    pixel: tuple[int, int],
-    *,
-    nudge: tuple[float, float] = (0.0, 0.0),
-    opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | None = None,
-    cropping: Any = None,
-) -> list[Line]:
-    """Return the parts of a pixel's ray that may meet the medium, in their order.
+class Rays(NamedTuple):
+    """The rays of a view that may meet a VDI, as :func:`render` is asked for them."""
 
-    There is one at most, unless something is cropped.
+    vdi: VDI
+    camera: Camera
+    window_size: Sequence[int]
+    opaque_depth: ArrayLike | None = None
+    clipping_planes: ArrayLike | None = None
+    cropping: Any = None
 
-    A ray begins at the viewer's eye in perspective; in parallel projection, whose eye is
-    infinitely far, it has no beginning: VTK too fits its near plane to what is drawn.
-    """
-    width, height = check_window_size(window_size)
-    x, y = pixel
-    ray = pixel_ray(camera, (width, height), x + nudge[0], y + nudge[1])
-    limits = inside_box(ray, vdi.bounds)
-    limits += inside_planes(ray, camera, clipping_planes)
-    if not camera.parallel_projection:
-        limits.append(HalfSpace(0.0, 1.0))
-    if opaque_depth is not None:
-        depth = np.asarray(opaque_depth, dtype=np.float64)
-        if depth.shape != (height, width):
-            raise InvalidArgumentError(
-                f"opaque_depth must have shape (H, W) = ({height}, {width}); got {depth.shape}"
+    def lines(self, pixel: tuple[int, int], nudge: tuple[float, float] = (0.0, 0.0)) -> list[Line]:
+        """Return the parts of a pixel's ray that may meet the medium, in their order.
+
+        There is one at most, unless something is cropped. A ray begins at the viewer's eye in
+        perspective; in parallel projection, whose eye is infinitely far, it has no beginning: VTK
+        too fits its near plane to what is drawn.
+        """
+        vdi, camera = self.vdi, self.camera
+        width, height = check_window_size(self.window_size)
+        x, y = pixel
+        ray = pixel_ray(camera, (width, height), x + nudge[0], y + nudge[1])
+        # Limit the ray by the bounds, the clipping planes, the viewer's eye and opaque depth
+        limits = inside_box(ray, vdi.bounds) + inside_planes(ray, camera, self.clipping_planes)
+        if not camera.parallel_projection:
+            limits.append(HalfSpace(0.0, 1.0))
+        if self.opaque_depth is not None:
+            depth = np.asarray(self.opaque_depth, dtype=np.float64)
+            if depth.shape != (height, width):
+                raise InvalidArgumentError(
+                    f"opaque_depth must have shape (H, W) = ({height}, {width}); got {depth.shape}"
+                )
+            end = float(depth[height - 1 - y, x])
+            if end < np.inf:
+                limits.append(HalfSpace(end, -1.0))
+        # Limit it by V_O's viewport, -d <= u d <= d, and in perspective by Z > 0
+        to_view, to_viewport = vdi.camera.model_to_view, vdi.camera.viewport_matrix(vdi.window_size)
+        origin = to_view[:3, :3] @ ray.origin + to_view[:3, 3]
+        direction = to_view[:3, :3] @ ray.direction
+        at, slope = to_viewport @ np.append(origin, 1.0), to_viewport @ np.append(direction, 0.0)
+        for axis, sign in itertools.product((0, 1), (1.0, -1.0)):
+            limits.append(
+                HalfSpace(float(at[3] + sign * at[axis]), float(slope[3] + sign * slope[axis]))
             )
-        end = float(depth[height - 1 - y, x])
-        if end < np.inf:
-            limits.append(HalfSpace(end, -1.0))
-
-    origin, direction = _in_view_space(vdi.camera, ray)
-    limits += _inside_frustum(vdi, origin, direction)
-    span = clip(limits)
-    if span is None:
-        return []
-    length = float(np.linalg.norm(ray.direction))
-    return [
-        Line(origin, direction, *part, length)
-        for part in kept_parts(ray, *span, Cropping.from_any(cropping))
-    ]
+        if not vdi.camera.parallel_projection:
+            limits.append(HalfSpace(float(at[2]) - near_limit(vdi), float(slope[2])))
+        span = clip(limits)
+        if span is None:
+            return []
+        length = float(np.linalg.norm(ray.direction))
+        parts = kept_parts(ray, *span, Cropping.from_any(self.cropping))
+        return [Line(origin, direction, *part, length) for part in parts]
 
 
 def kept_parts(
@@ -318,8 +310,24 @@ def crossings(lists: Lists, line: Line) -> Crossings:
     at = lists.viewport @ np.append(line.origin, 1.0)
     slope = lists.viewport @ np.append(line.direction, 0.0)
 
-    cuts = _list_crossings(at, slope, line.t0, line.t1, lists.vdi.window_size)
-    owner = _list_of(at, slope, (cuts[:-1] + cuts[1:]) / 2, lists.vdi.window_size)
+    # Cut it where it crosses a border between lists: u d = border d, with both linear in t
+    width, height = lists.vdi.window_size
+    found = [np.array([line.t0, line.t1])]
+    for axis, edge in enumerate((width, height)):
+        border = 2 * np.arange(edge + 1) / edge - 1
+        offset, rise = at[axis] - border * at[3], slope[axis] - border * slope[3]
+        with np.errstate(divide="ignore", invalid="ignore"):  # a border that is never reached
+            t = -offset / rise
+        found.append(t[(t > line.t0) & (t < line.t1)])
+    cuts = np.unique(np.concatenate(found))
+
+    # Find each piece's list; a border belongs to the higher index (docs/conventions.md#borders)
+    t = (cuts[:-1] + cuts[1:]) / 2
+    d = at[3] + t * slope[3]
+    x = np.floor(((at[0] + t * slope[0]) / d + 1) / 2 * width)
+    y = np.floor(((at[1] + t * slope[1]) / d + 1) / 2 * height)
+    within = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    owner = np.where(within, y * width + x, -1).astype(np.int64)
 
     # Every supersegment of every list that the line passes through, in the order it meets them
     inside = np.flatnonzero(owner >= 0)
@@ -343,55 +351,6 @@ def crossings(lists: Lists, line: Line) -> Crossings:
     before = np.clip(np.where(np.isfinite(before), before, 0.0), 0.0, 1.0 - share)
     first = cuts[piece] + before * whole
     return Crossings(member, share * whole * line.unit_length, first, first + share * whole)
-
-
-def _in_view_space(camera: Camera, ray: Ray) -> tuple[Array, Array]:
-    """Carry a ray from the model frame into the view space of ``camera``; t stays."""
-    matrix = camera.model_to_view
-    return matrix[:3, :3] @ ray.origin + matrix[:3, 3], matrix[:3, :3] @ ray.direction
-
-
-def _inside_frustum(vdi: VDI, origin: Array, direction: Array) -> list[HalfSpace]:
-    """Return the half spaces of V_O's viewport, -d <= u d <= d, and in perspective of Z > 0."""
-    matrix = vdi.camera.viewport_matrix(vdi.window_size)
-    at, slope = matrix @ np.append(origin, 1.0), matrix @ np.append(direction, 0.0)
-    planes = []
-    for axis in (0, 1):
-        for sign in (1.0, -1.0):
-            planes.append(
-                HalfSpace(float(at[3] + sign * at[axis]), float(slope[3] + sign * slope[axis]))
-            )
-    if not vdi.camera.parallel_projection:
-        planes.append(HalfSpace(float(at[2]) - near_limit(vdi), float(slope[2])))
-    return planes
-
-
-def _list_crossings(
-    at: Array, slope: Array, t0: float, t1: float, window_size: tuple[int, int]
-) -> Array:
-    """Return t0, every t between where the line crosses a border between lists, and t1; sorted."""
-    cuts = [np.array([t0, t1])]
-    for axis, edge in enumerate(window_size):
-        border = 2 * np.arange(edge + 1) / edge - 1
-        # u d = border d, with both sides linear in t
-        offset, rise = at[axis] - border * at[3], slope[axis] - border * slope[3]
-        with np.errstate(divide="ignore", invalid="ignore"):  # a border that is never reached
-            t = -offset / rise
-        cuts.append(t[(t > t0) & (t < t1)])
-    return np.unique(np.concatenate(cuts))
-
-
-def _list_of(at: Array, slope: Array, t: Array, window_size: tuple[int, int]) -> NDArray[np.int64]:
-    """Return the list that holds the line at each t; -1 outside the viewport.
-
-    A border belongs to the higher index (docs/conventions.md#borders).
-    """
-    width, height = window_size
-    d = at[3] + t * slope[3]
-    x = np.floor(((at[0] + t * slope[0]) / d + 1) / 2 * width)
-    y = np.floor(((at[1] + t * slope[1]) / d + 1) / 2 * height)
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    return np.where(inside, y * width + x, -1).astype(np.int64)
 
 
 def _share_between(first: Array, last: Array, front: Array, back: Array) -> Array:
