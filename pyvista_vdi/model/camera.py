@@ -116,20 +116,24 @@ class Camera:
         use_horizontal_view_angle: bool = False,
         model_transform: ArrayLike | None = None,
     ) -> None:
-        put = object.__setattr__
-        put(self, "position", _vector("position", position, 3))
-        put(self, "focal_point", _vector("focal_point", focal_point, 3))
-        put(self, "view_up", _vector("view_up", view_up, 3))
-        put(self, "view_angle", as_float(view_angle))
-        put(self, "parallel_projection", as_flag(parallel_projection, "parallel_projection"))
-        put(self, "parallel_scale", as_float(parallel_scale))
-        put(self, "window_center", _vector("window_center", window_center, 2))
         horizontal = as_flag(use_horizontal_view_angle, "use_horizontal_view_angle")
-        put(self, "use_horizontal_view_angle", horizontal)
-        put(self, "model_transform", _affine(model_transform))
-        put(self, "_key", self._make_key())
-        self._check()
-        put(self, "_axes", self._make_axes())
+        checked = {
+            "position": _vector("position", position, 3),
+            "focal_point": _vector("focal_point", focal_point, 3),
+            "view_up": _vector("view_up", view_up, 3),
+            "view_angle": as_float(view_angle),
+            "parallel_projection": as_flag(parallel_projection, "parallel_projection"),
+            "parallel_scale": as_float(parallel_scale),
+            "window_center": _vector("window_center", window_center, 2),
+            "use_horizontal_view_angle": horizontal,
+            "model_transform": _affine(model_transform),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        matrix = self.model_transform.tobytes()
+        key = tuple(matrix if name == "model_transform" else checked[name] for name in _STATE)
+        object.__setattr__(self, "_key", key)
+        object.__setattr__(self, "_axes", self._checked_axes())
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Camera cannot be changed (tried to set {name!r}): use replace()")
@@ -160,11 +164,8 @@ class Camera:
             transform: the optical model has no place for them.
         """
         if isinstance(camera, Camera):
-            return (
-                camera
-                if model_transform is None
-                else camera.replace(model_transform=model_transform)
-            )
+            given = model_transform is not None
+            return camera.replace(model_transform=model_transform) if given else camera
         if not hasattr(camera, "GetDirectionOfProjection"):
             raise InvalidCameraError(
                 f"expected a pyvista_vdi.Camera, a vtkCamera or a pyvista.Camera; "
@@ -350,12 +351,8 @@ class Camera:
         """
         half_width, half_height = self.half_extent(window_size)
         denominator = 3 if self.parallel_projection else 2
-        matrix = np.zeros((4, 4))
-        matrix[0, 0] = 1 / half_width
-        matrix[1, 1] = 1 / half_height
-        matrix[0, denominator] -= self.window_center[0]
-        matrix[1, denominator] -= self.window_center[1]
-        matrix[2, 2] = 1
+        matrix = np.diag([1 / half_width, 1 / half_height, 1.0, 0.0])
+        matrix[:2, denominator] -= self.window_center
         matrix[3, denominator] = 1
         return matrix
 
@@ -374,13 +371,8 @@ class Camera:
             t [1, u, v] @ direction``; its direction has Z = 1, so t is view depth.
         """
         half_width, half_height = self.half_extent(window_size)
-        slope = np.array(
-            [
-                [self.window_center[0] * half_width, self.window_center[1] * half_height, 0.0],
-                [half_width, 0.0, 0.0],
-                [0.0, half_height, 0.0],
-            ]
-        )
+        centre = [self.window_center[0] * half_width, self.window_center[1] * half_height, 0.0]
+        slope = np.array([centre, [half_width, 0.0, 0.0], [0.0, half_height, 0.0]])
         forward = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
         if self.parallel_projection:
             return slope, forward
@@ -405,23 +397,8 @@ class Camera:
             f"view_up={self.view_up}, {lens})"
         )
 
-    def _make_key(self) -> tuple[Any, ...]:
-        state = self.to_dict()
-        state["model_transform"] = self.model_transform.tobytes()
-        return tuple(tuple(v) if isinstance(v, list) else v for v in state.values())
-
-    def _make_axes(self) -> Matrix:
-        forward = np.subtract(self.focal_point, self.position)
-        # By a power of two, which rounds nothing: squares may overflow
-        forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
-        forward = forward / _length(forward)
-        right = _cross(forward, _unit(np.asarray(self.view_up)))
-        right /= _length(right)
-        axes = np.array([right, _cross(right, forward), forward])
-        axes.setflags(write=False)
-        return axes
-
-    def _check(self) -> None:
+    def _checked_axes(self) -> Matrix:
+        """Return the axes of a lens, an eye and a direction that make a view."""
         # In parallel projection the angle has no meaning, but it is a number
         any_angle = self.parallel_projection and math.isfinite(self.view_angle)
         if not (any_angle or 0 < self.view_angle < 180):
@@ -454,6 +431,14 @@ class Camera:
                 f"view_up {self.view_up} is parallel to the direction of projection "
                 f"{tuple(_unit(forward))}: choose another up direction"
             )
+        # By a power of two, which rounds nothing: squares may overflow
+        forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
+        forward = forward / _length(forward)
+        right = _cross(forward, _unit(np.asarray(self.view_up)))
+        right /= _length(right)
+        axes = np.array([right, _cross(right, forward), forward])
+        axes.setflags(write=False)
+        return axes
 
     def _turned(self, axis: Matrix, degrees: float) -> Camera:
         """Rotate the eye about ``axis`` through the focal point (Rodrigues' formula)."""

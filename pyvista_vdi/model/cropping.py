@@ -66,10 +66,28 @@ class Cropping:
     ALL: ClassVar[int] = 2**_N_REGIONS - 1
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "planes", _checked_planes(self.planes))
-        put(self, "regions", _checked_regions(self.regions))
-        put(self, "normals", _checked_normals(self.normals))
+        planes, normals = as_floats(self.planes), as_floats(self.normals)
+        if planes.shape != (6,) or np.isnan(planes).any():
+            raise InvalidArgumentError(
+                "cropping takes six planes, x_low, x_high, y_low, y_high, z_low, z_high in the "
+                "data's own coordinates, or a pair of those and the regions; got "
+                f"{self.planes!r}"
+            )
+        regions: Any = self.regions
+        flags = as_whole(PRESETS.get(regions, regions) if isinstance(regions, str) else regions)
+        if not 0 <= flags <= Cropping.ALL:
+            raise InvalidArgumentError(
+                f"the regions of cropping are 27 flags, 0 to {Cropping.ALL:#x}, or one of "
+                f"{', '.join(map(repr, PRESETS))}; got {self.regions!r}"
+            )
+        if normals.shape != (3, 3) or not np.isfinite(normals).all() or not np.linalg.det(normals):
+            raise InvalidArgumentError(
+                "the normals of cropping are three independent directions of the model frame, "
+                f"(3, 3) finite numbers; got {self.normals!r}"
+            )
+        object.__setattr__(self, "planes", tuple(planes.tolist()))
+        object.__setattr__(self, "regions", int(flags))
+        object.__setattr__(self, "normals", tuple(map(tuple, normals.tolist())))
 
     @classmethod
     def from_any(cls, cropping: Any) -> Cropping | None:
@@ -198,38 +216,6 @@ def checked_opacity_multiplier(multiplier: Any) -> float:
             f"1 for what was generated; got {multiplier!r}"
         )
     return factor
-
-
-def _checked_planes(planes: Any) -> tuple[float, ...]:
-    values = as_floats(planes)
-    if values.shape != (6,) or np.isnan(values).any():
-        raise InvalidArgumentError(
-            "cropping takes six planes, x_low, x_high, y_low, y_high, z_low, z_high in the data's "
-            f"own coordinates, or a pair of those and the regions; got {planes!r}"
-        )
-    return tuple(values.tolist())
-
-
-def _checked_regions(regions: Any) -> int:
-    if isinstance(regions, str) and regions in PRESETS:
-        return PRESETS[regions]
-    flags = as_whole(regions)
-    if not 0 <= flags <= Cropping.ALL:
-        raise InvalidArgumentError(
-            f"the regions of cropping are 27 flags, 0 to {Cropping.ALL:#x}, or one of "
-            f"{', '.join(map(repr, PRESETS))}; got {regions!r}"
-        )
-    return int(flags)
-
-
-def _checked_normals(normals: Any) -> tuple[tuple[float, ...], ...]:
-    values = as_floats(normals)
-    if values.shape != (3, 3) or not np.isfinite(values).all() or not np.linalg.det(values):
-        raise InvalidArgumentError(
-            "the normals of cropping are three independent directions of the model frame, (3, 3) "
-            f"finite numbers; got {normals!r}"
-        )
-    return tuple(map(tuple, values.tolist()))
 
 
 def _of_image(planes: Sequence[float], image: Any) -> tuple[Any, Any]:

@@ -48,21 +48,8 @@ def subsampled_lists(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     view = _stretched(camera, grown).replace(window_center=(camera.window_center + b) / a)
 
     taken = (y[:, np.newaxis] * vdi.window_size[0] + x).ravel()
-    counts = vdi.counts.reshape(-1)[taken]
-    offsets = np.concatenate([[0], np.cumsum(counts)])
-    rows = np.repeat(vdi.offsets.view(np.int64)[taken] - offsets[:-1], counts)
-    rows += np.arange(offsets[-1])
-    result = VDI(
-        view,
-        window,
-        offsets,
-        vdi.front[rows],
-        vdi.back[rows],
-        vdi.color[rows],
-        vdi.optical_depth[rows],
-        vdi.bounds,
-        depth_origin=vdi.depth_origin,
-    )
+    offsets, rows = _rows_of(vdi, taken, vdi.counts.reshape(-1)[taken])
+    result = _of_rows(vdi, view, window, offsets, rows, vdi.optical_depth[rows])
     packing = vdi.packing
     if isinstance(packing, Packed16):
         result.packing = replace(packing, color=packing.color[rows])
@@ -74,6 +61,40 @@ def subsampled_lists(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
             words=packing.words[rows],
         )
     return result
+
+
+def coarser(vdi: VDI, step: int = 4) -> VDI:
+    """Return a VDI of every ``step``-th list along each edge, of the same view.
+
+    A list of the result is the one of ``vdi`` that the middle of its pixel lies in. The medium of
+    its supersegments is the same, so their optical depths follow the length along the new middle.
+
+    ``vdi``: what it stands for. ``step``: lists along an edge that one takes the place of. Returns:
+    Of ⌈W / step⌉ by ⌈H / step⌉ lists, exact and without metadata.
+    """
+    camera, (width, height) = vdi.camera, vdi.window_size
+    window = (-(-width // step), -(-height // step))
+    # Middles of the new pixels in list coordinates of both; the viewports' shapes differ where
+    # the window is no multiple of the step
+    grown = np.divide(camera.half_extent(window), camera.half_extent(vdi.window_size))
+    new = [(2 * np.arange(n) + 1) / n - 1 for n in window]
+    places = [
+        np.floor(((middles + centre) * g - centre + 1) / 2 * n).astype(np.int64)
+        for middles, centre, g, n in zip(
+            new, camera.window_center, grown, vdi.window_size, strict=True
+        )
+    ]
+    inside = [(p >= 0) & (p < n) for p, n in zip(places, vdi.window_size, strict=True)]
+    x, y = (np.clip(p, 0, n - 1) for p, n in zip(places, vdi.window_size, strict=True))
+    taken = (y[:, np.newaxis] * width + x).ravel()
+    counts = np.where(np.outer(*inside[::-1]).ravel(), vdi.counts.reshape(-1)[taken], 0)
+    offsets, rows = _rows_of(vdi, taken, counts)
+    old = [(2 * p + 1) / n - 1 for p, n in zip((x, y), vdi.window_size, strict=True)]
+    stretch = _length_per_depth(camera, window, *new) / _length_per_depth(
+        camera, vdi.window_size, *old
+    )
+    tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
+    return _of_rows(vdi, camera, window, offsets, rows, tau.astype(np.float32))
 
 
 def lists_crossed(vdi: VDI, camera: Camera) -> NDArray[np.float64]:
@@ -102,6 +123,41 @@ def lists_crossed(vdi: VDI, camera: Camera) -> NDArray[np.float64]:
     first, last = (place[seen, :2] / place[seen, 3:] for place in places)
     crossed: Any = np.abs(last - first).mean(axis=0) * np.asarray(vdi.window_size) / 2
     return np.asarray(crossed, dtype=np.float64)
+
+
+def _rows_of(
+    vdi: VDI, lists: NDArray[np.int64], counts: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return offsets of some lists one after the other, and which supersegments are theirs."""
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    rows = np.repeat(vdi.offsets.view(np.int64)[lists] - offsets[:-1], counts)
+    return offsets, rows + np.arange(offsets[-1])
+
+
+def _of_rows(
+    vdi: VDI,
+    view: Camera,
+    window: tuple[int, int],
+    offsets: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    optical_depth: NDArray[np.float32],
+) -> VDI:
+    """Return the VDI of some supersegments, without metadata."""
+    arrays: dict[str, Any] = {name: getattr(vdi, name)[rows] for name in ("front", "back", "color")}
+    arrays |= {"bounds": vdi.bounds, "depth_origin": vdi.depth_origin}
+    return VDI(view, window, offsets, optical_depth=optical_depth, **arrays)
+
+
+def _length_per_depth(
+    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
+    constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
+        np.linalg.inv(camera.model_to_view)[:3, :3].T
+    )
+    return np.linalg.norm(
+        constant + u[:, np.newaxis] * along_u + v[:, np.newaxis, np.newaxis] * along_v, axis=-1
+    )
 
 
 def _stretched(camera: Camera, factors: NDArray[np.float64]) -> Camera:

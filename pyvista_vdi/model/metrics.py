@@ -1,7 +1,6 @@
 """How far one image is from another: SSIM, PSNR, worst pixel, brightness; and edges along lists.
 
-The definitions are those of the design's section 7, so that a figure means the same everywhere:
-RGB over a background, clipped to 0..1, not quantised.
+A figure means the same everywhere: RGB over a background, clipped to 0..1, not quantised.
 """
 
 from __future__ import annotations
@@ -148,13 +147,15 @@ def compare_images(
     difference = np.abs(a - b)
     row, column, _ = np.unravel_index(int(difference.argmax()), difference.shape)
     mean_square = float(np.mean(np.square(difference)))
+    mean, reference_mean = float(a.mean()), float(b.mean())
+    both_black = 1.0 if mean == 0 else math.inf
     return Comparison(
         ssim=_ssim(a, b),
         psnr=math.inf if mean_square == 0 else -10 * math.log10(mean_square),
         # Rounded to a millionth of a step: what float64 leaves of a whole number of steps
         worst_pixel=round(float(difference.max()) * 255, 6),
         worst_position=(int(column), int(row)),
-        mean_brightness_ratio=_ratio(float(a.mean()), float(b.mean())),
+        mean_brightness_ratio=mean / reference_mean if reference_mean else both_black,
     )
 
 
@@ -289,9 +290,3 @@ def _ssim(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
         math.prod(edge - SSIM_WINDOW + 1 for edge in image.shape[:2]) for image in (a[near], a)
     )
     return 1 - (1 - there) * (middles / of_all)
-
-
-def _ratio(mean: float, reference: float) -> float:
-    if reference == 0:
-        return 1.0 if mean == 0 else math.inf
-    return mean / reference

@@ -112,24 +112,26 @@ class TransferFunction:
                 f"shading must be a pyvista_vdi.Shading; got {type(shading).__name__}"
             )
         self.shading = shading
-        self.gradient_opacities, self.gradient_range = _gradient(gradient_opacities, gradient_range)
+        if (gradient_opacities is None) != (gradient_range is None):
+            raise InvalidArgumentError(
+                "gradient_opacities and gradient_range belong together: give both or neither"
+            )
+        self.gradient_opacities = self.gradient_range = None
+        if gradient_opacities is not None and gradient_range is not None:
+            low, high = as_range(gradient_range)
+            if not (np.isfinite(low) and np.isfinite(high) and 0 <= low < high):
+                raise InvalidArgumentError(
+                    "gradient_range must be two magnitudes, 0 <= low < high; got "
+                    f"{gradient_range!r}"
+                )
+            self.gradient_opacities = _table("gradient_opacities", gradient_opacities, ())
+            self.gradient_range = (low, high)
 
     def replace(self, **changes: Any) -> TransferFunction:
         """Return a copy with some arguments of the constructor changed."""
-        names: tuple[str, ...] = (
-            "colors",
-            "opacities",
-            "scalar_range",
-            "unit_distance",
-            "interpolation",
-            "shading",
-            "gradient_opacities",
-            "gradient_range",
-        )
-        unknown = sorted(set(changes) - set(names))
-        if unknown:
+        if unknown := sorted(set(changes) - set(vars(self))):
             raise InvalidArgumentError(f"a TransferFunction has no {', '.join(unknown)}")
-        return TransferFunction(**{**{name: getattr(self, name) for name in names}, **changes})
+        return TransferFunction(**{**vars(self), **changes})
 
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON: the whole table and its range."""
@@ -192,23 +194,6 @@ class TransferFunction:
             + ("" if self.gradient_opacities is None else ", with gradient opacity")
             + ")"
         )
-
-
-def _gradient(
-    opacities: ArrayLike | None, gradient_range: tuple[float, float] | None
-) -> tuple[NDArray[np.float32] | None, tuple[float, float] | None]:
-    if (opacities is None) != (gradient_range is None):
-        raise InvalidArgumentError(
-            "gradient_opacities and gradient_range belong together: give both or neither"
-        )
-    if opacities is None or gradient_range is None:
-        return None, None
-    low, high = as_range(gradient_range)
-    if not (np.isfinite(low) and np.isfinite(high) and 0 <= low < high):
-        raise InvalidArgumentError(
-            f"gradient_range must be two magnitudes, 0 <= low < high; got {gradient_range!r}"
-        )
-    return _table("gradient_opacities", opacities, ()), (low, high)
 
 
 def _table(name: str, values: ArrayLike, item: tuple[int, ...]) -> NDArray[np.float32]:

@@ -90,14 +90,12 @@ class VDI:
     ) -> None:
         self.camera = Camera.from_any(camera)
         self.window_size = check_window_size(window_size)
-        self.depth_origin = _checked_depth_origin(depth_origin)
-        self.metadata = _checked_metadata(metadata)
+        self._set_frame(bounds, depth_origin, metadata)
         self.offsets = _array("offsets", offsets, np.uint64, ())
         self.front = _array("front", front, np.float32, ())
         self.back = _array("back", back, np.float32, ())
         self.color = _array("color", color, np.float32, (3,))
         self.optical_depth = _array("optical_depth", optical_depth, np.float32, ())
-        self.bounds = _checked_bounds(bounds)
         self.packing = None
         # Check that the lists' offsets and the arrays' lengths fit together
         width, height = self.window_size
@@ -140,10 +138,8 @@ class VDI:
         """Return a VDI of 8-byte supersegments that are valid; arrays are made when asked for."""
         vdi = cls.__new__(cls)
         vdi.camera, vdi.window_size = camera, window_size
-        vdi.depth_origin = _checked_depth_origin(depth_origin)
-        vdi.metadata = _checked_metadata(metadata)
+        vdi._set_frame(bounds, depth_origin, metadata)
         vdi.offsets = _array("offsets", offsets, np.uint64, ())
-        vdi.bounds = _checked_bounds(bounds)
         vdi.packing = packing
         occupied = np.flatnonzero(vdi.counts)
         if occupied.size and not camera.parallel_projection:
@@ -151,6 +147,20 @@ class VDI:
             if not first.min() >= np.float64(-vdi.depth_origin):
                 vdi._check_media()  # says which
         return vdi
+
+    def _set_frame(self, bounds: ArrayLike, depth_origin: Any, metadata: Any) -> None:
+        origin, box = as_number(depth_origin), as_floats(bounds)
+        if not math.isfinite(origin):
+            raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
+        if not isinstance(metadata, Mapping | None):
+            raise InvalidVDIError(f"metadata must be a dictionary; got {type(metadata).__name__}")
+        if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
+            raise InvalidVDIError(
+                f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
+            )
+        x0, x1, y0, y1, z0, z1 = box.tolist()
+        self.bounds, self.depth_origin = (x0, x1, y0, y1, z0, z1), origin
+        self.metadata = dict(metadata or {})
 
     def __getattr__(self, name: str) -> Any:
         """Make the arrays of a packed VDI."""
@@ -257,18 +267,10 @@ class VDI:
         return self._with_media(packing, packing.media(self.counts.reshape(-1)))
 
     def _with_media(self, packing: Packing | None, media: Mapping[str, Any]) -> VDI:
-        vdi = VDI(
-            self.camera,
-            self.window_size,
-            self.offsets,
-            media.get("front", self.front),
-            media.get("back", self.back),
-            media.get("color", self.color),
-            media.get("optical_depth", self.optical_depth),
-            self.bounds,
-            depth_origin=self.depth_origin,
-            metadata=self.metadata,
-        )
+        arrays: dict[str, Any] = {name: media.get(name, getattr(self, name)) for name in _MEDIA}
+        about = {"depth_origin": self.depth_origin, "metadata": self.metadata}
+        arrays |= {"offsets": self.offsets, "bounds": self.bounds, **about}
+        vdi = VDI(self.camera, self.window_size, **arrays)
         vdi.packing = packing
         return vdi
 
@@ -396,29 +398,6 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
     view = array.view()  # the caller's own array stays writable
     view.setflags(write=False)
     return view
-
-
-def _checked_depth_origin(depth_origin: Any) -> float:
-    origin = as_number(depth_origin)
-    if not math.isfinite(origin):
-        raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
-    return origin
-
-
-def _checked_metadata(metadata: Any) -> dict[str, Any]:
-    if not isinstance(metadata, Mapping | None):
-        raise InvalidVDIError(f"metadata must be a dictionary; got {type(metadata).__name__}")
-    return dict(metadata or {})
-
-
-def _checked_bounds(bounds: ArrayLike) -> tuple[float, float, float, float, float, float]:
-    box = as_floats(bounds)
-    if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
-        raise InvalidVDIError(
-            f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
-        )
-    x0, x1, y0, y1, z0, z1 = box.tolist()
-    return x0, x1, y0, y1, z0, z1
 
 
 def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> tuple[int, int]:

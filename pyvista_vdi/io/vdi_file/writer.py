@@ -28,7 +28,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     version_of,
 )
 from pyvista_vdi.io.whole_file import whole_file
-from pyvista_vdi.model.coarser import coarser
+from pyvista_vdi.model.list_subsampling import coarser
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
     Packed8,
