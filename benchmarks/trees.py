@@ -184,7 +184,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
         if "refused" in row:
             continue
         case, times = row["case"], row["times"]
-        chance = rank_sum_chance(times["this"]["cpu"], times["other"]["cpu"])
+        chance = rank_sum_chance(*(tuple(times[who]["cpu"]) for who in ("this", "other")))
         cells = [case["what"], case["volume"], case.get("look", ""), case.get("angle", "")]
         cells += [f"{ratio(row, clock):.3f}" for clock in CLOCKS]
         rows.append([*cells, f"{chance:.1%}", "the same" if row["same"] else "**differ**"])

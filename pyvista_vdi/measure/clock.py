@@ -80,17 +80,13 @@ def ratios(ours: Sequence[float], theirs: Sequence[float]) -> list[float]:
     return [a / b for a, b in zip(ours, theirs, strict=True)]
 
 
-def rank_sum_chance(a: Sequence[float], b: Sequence[float]) -> float:
+@lru_cache(maxsize=2**16)  # fronts compare the same samples again and again
+def rank_sum_chance(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     """Return the chance, 0 to 1, that samples of one distribution are as separated as these.
 
     Wilcoxon's rank sum test, two-sided: exact, and by the normal distribution where both have more
     than :data:`EXACT` samples.
     """
-    return _rank_sum_chance(tuple(a), tuple(b))
-
-
-@lru_cache(maxsize=2**16)  # fronts compare the same samples again and again
-def _rank_sum_chance(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     from scipy.stats import mannwhitneyu  # takes a second to load
 
     method = "exact" if min(len(a), len(b)) <= EXACT else "asymptotic"

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import statistics
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
@@ -236,7 +236,7 @@ def measure(
     ) as bench:
         for error in bench.left_out.values():
             raise error
-        vdi, times = _generated(bench, settings)
+        vdi, generation, full_raycast = _generated(bench, settings)
         done()
         images, seconds = {}, {}
         for angle in settings.angles:
@@ -248,10 +248,42 @@ def measure(
         system = describe_system(settings.device)
         if bench.opengl is not None:
             system["opengl"] = bench.opengl
-        case = {**_case(bench, settings), "classification": looks.describe()}
-        results = [_judged(angle, images[angle], seconds[angle]) for angle in settings.angles]
-        sizes = _sizes(bench, vdi, settings)
-        return Report(case, system, sizes, *times, results, begun), vdi, images
+        lists = math.prod(settings.window_size)
+        case = {
+            "name": settings.name,
+            "dimensions": list(volume.dimensions),
+            "spacing": list(volume.spacing),
+            "dtype": str(volume.array.dtype),
+            "window_size": list(settings.window_size),
+            "max_supersegments": settings.max_supersegments,
+            "precision": settings.precision,
+            "sample_distance": bench.step,
+            "timing_sample_distance": bench.voxel,
+            "repeats": settings.repeats,
+            "camera": bench.view.to_dict(),
+            "classification": looks.describe(),
+        }
+        sizes = {
+            "volume_bytes": volume.array.nbytes,
+            "supersegments": vdi.n_supersegments,
+            "occupied_lists": int(np.count_nonzero(vdi.counts)),
+            "lists": lists,
+            "vdi_bytes": vdi.nbytes,
+            "device_bytes": prepared_vdi(bench.runtime, vdi).list_bytes,
+            "dense_bytes": lists * settings.max_supersegments * _DENSE_BYTES,
+        }
+        results = [
+            AngleResult(
+                angle,
+                compare_images(found["vdi"], found["raycaster"]),
+                compare_images(found["raycaster"], found["gpu"]) if settings.vtk else None,
+                compare_images(found["fixed_point"], found["gpu"]) if settings.vtk else None,
+                seconds[angle],
+            )
+            for angle, found in images.items()
+        ]
+        report = Report(case, system, sizes, generation, full_raycast, results, begun)
+        return report, vdi, images
 
 
 def _property(volume: Volume, settings: Settings) -> Any:
@@ -272,17 +304,17 @@ def _property(volume: Volume, settings: Settings) -> Any:
     return arguments.get("volume_property") or add_volume_property(volume, arguments)
 
 
-def _generated(bench: Bench, settings: Settings) -> tuple[VDI, tuple[Timing | None, Timing | None]]:
+def _generated(bench: Bench, settings: Settings) -> tuple[VDI, Timing | None, Timing | None]:
     """Generate the VDI, in turn with a full raycast at the same step where that is timed."""
     limit, precision = settings.max_supersegments, settings.precision
     options: dict[str, Any] = {"max_supersegments": limit, "precision": precision}
     if settings.repeats == 0:
-        return bench.generate(**options), (None, None)
+        return bench.generate(**options), None, None
     # Without skipping: the plain baseline that the paper compares with
     whole = partial(bench.raycast, bench.view, skip_empty=False, transmittance_cutoff=0.0)
     whole(window_size=WARM_UP_SIZE)
     made, taken = bench.timed_generation(settings.repeats, before={"raycast": whole}, **options)
-    return made["exact"], (Timing.of(taken["generate"]), Timing.of(taken["raycast"]))
+    return made["exact"], Timing.of(taken["generate"]), Timing.of(taken["raycast"])
 
 
 def _images(bench: Bench, vdi: VDI, angle: float) -> Images:
@@ -312,92 +344,48 @@ def _frame_times(bench: Bench, vdi: VDI, angle: float, repeats: int) -> dict[str
     return {name: Timing.of(times) for name, times in taken.items()}
 
 
-def _case(bench: Bench, settings: Settings) -> dict[str, Any]:
-    return {
-        "name": settings.name,
-        "dimensions": list(bench.volume.dimensions),
-        "spacing": list(bench.volume.spacing),
-        "dtype": str(bench.volume.array.dtype),
-        "window_size": list(settings.window_size),
-        "max_supersegments": settings.max_supersegments,
-        "precision": settings.precision,
-        "sample_distance": bench.step,
-        "timing_sample_distance": bench.voxel,
-        "repeats": settings.repeats,
-        "camera": bench.view.to_dict(),
-    }
-
-
-def _sizes(bench: Bench, vdi: VDI, settings: Settings) -> dict[str, int]:
-    lists = math.prod(settings.window_size)
-    return {
-        "volume_bytes": bench.volume.array.nbytes,
-        "supersegments": vdi.n_supersegments,
-        "occupied_lists": int(np.count_nonzero(vdi.counts)),
-        "lists": lists,
-        "vdi_bytes": vdi.nbytes,
-        "device_bytes": prepared_vdi(bench.runtime, vdi).list_bytes,
-        "dense_bytes": lists * settings.max_supersegments * _DENSE_BYTES,
-    }
-
-
-def _judged(angle: float, images: Images, seconds: dict[str, Timing]) -> AngleResult:
-    def compared(one: str, other: str) -> Comparison | None:
-        both = one in images and other in images
-        return compare_images(images[one], images[other]) if both else None
-
-    vdi_to_raycaster = compare_images(images["vdi"], images["raycaster"])
-    to_gpu = compared("raycaster", "gpu"), compared("fixed_point", "gpu")
-    return AngleResult(angle, vdi_to_raycaster, *to_gpu, seconds)
-
-
 def table(report: Report) -> str:
     """Return what :func:`measure` found as text of fixed width, without a newline at the end."""
-    return "\n".join(_lines(report))
-
-
-def _lines(report: Report) -> Iterator[str]:
     case = report.case
     width, height = case["window_size"]
     dimensions = " x ".join(str(n) for n in case["dimensions"])
-    yield f"{case['name']}: {dimensions} {case['dtype']}, {width} x {height} lists"
-    yield f"at most {case['max_supersegments']} supersegments ({case['precision']})"
-    yield f"step: {case['sample_distance']:g} model units"
-    yield from (f"{name}: {value}" for name, value in report.system.items())
-    yield from ("", "Pictures                   degrees      SSIM   PSNR dB  worst/255  brightness")
+    lines = [
+        f"{case['name']}: {dimensions} {case['dtype']}, {width} x {height} lists",
+        f"at most {case['max_supersegments']} supersegments ({case['precision']})",
+        f"step: {case['sample_distance']:g} model units",
+        *(f"{name}: {value}" for name, value in report.system.items()),
+        *("", "Pictures                   degrees      SSIM   PSNR dB  worst/255  brightness"),
+    ]
     for name, label in _PAIRS.items():
-        for result in report.angles:
-            if (near := getattr(result, name)) is not None:
-                yield (
-                    f"{label:<26} {result.angle:7g}  {near.ssim:8.5f}  {near.psnr:8.2f}  "
-                    f"{near.worst_pixel:9.2f}  {near.mean_brightness_ratio:10.4f}"
-                )
+        lines += [
+            f"{label:<26} {result.angle:7g}  {near.ssim:8.5f}  {near.psnr:8.2f}  "
+            f"{near.worst_pixel:9.2f}  {near.mean_brightness_ratio:10.4f}"
+            for result in report.angles
+            if (near := getattr(result, name)) is not None
+        ]
     if case["repeats"]:
-        yield from _timing_lines(report)
+        names = [name for name in NAMES if name in report.angles[0].seconds]
+        lines += ["", f"Frames, ms (median of {case['repeats']}; steps of one voxel)"]
+        lines += ["degrees" + "  ".join(f"{NAMES[n]:>22}" for n in names) + "   VDI / VTK"]
+        for result in report.angles:
+            times = "  ".join(f"{result.seconds[n].median * 1e3:22.1f}" for n in names)
+            ratio = result.ratio_to_vtk
+            over = "-" if ratio is None else f"{ratio:9.2f}"
+            lines += [f"{result.angle:7g}{times}   {over}"]
+        lines += ["VDI / VTK: the VDI's frame time over that of the faster of VTK's two mappers"]
+        if report.generation_seconds is not None:
+            against = f"{report.generation_ratio:.2f} x our raycaster"
+            lines += ["", f"Generation {report.generation_seconds.median:.2f} s"]
+            lines += [f"that is {against}, same step, no early termination"]
     sizes = {name: f"{n / 2**20:.1f} MiB" for name, n in report.sizes.items() if "bytes" in name}
     saved = f", file {sizes['file_bytes']}" if "file_bytes" in sizes else ""
-    yield ""
-    yield (
-        f"Sizes: volume {sizes['volume_bytes']}, VDI {sizes['vdi_bytes']} in memory, "
+    about_lists = f"{report.sizes['occupied_lists']} of {report.sizes['lists']} lists"
+    lines += ["", f"Sizes: volume {sizes['volume_bytes']}, VDI {sizes['vdi_bytes']} in memory, "]
+    lines[-1] += (
         f"{sizes['device_bytes']} on the device ({report.sizes['supersegments']} supersegments in "
-        f"{report.sizes['occupied_lists']} of {report.sizes['lists']} lists), dense form "
-        f"{sizes['dense_bytes']}{saved}"
+        f"{about_lists}), dense form {sizes['dense_bytes']}{saved}"
     )
-
-
-def _timing_lines(report: Report) -> Iterator[str]:
-    names = [name for name in NAMES if name in report.angles[0].seconds]
-    yield from ("", f"Frames, ms (median of {report.case['repeats']}; steps of one voxel)")
-    yield "degrees" + "  ".join(f"{NAMES[n]:>22}" for n in names) + "   VDI / VTK"
-    for result in report.angles:
-        times = "  ".join(f"{result.seconds[n].median * 1e3:22.1f}" for n in names)
-        ratio = result.ratio_to_vtk
-        yield f"{result.angle:7g}{times}   {'-' if ratio is None else f'{ratio:9.2f}'}"
-    yield "VDI / VTK: the VDI's frame time over that of the faster of VTK's two mappers"
-    if report.generation_seconds is not None:
-        yield from ("", f"Generation {report.generation_seconds.median:.2f} s")
-        against = f"{report.generation_ratio:.2f} x our raycaster"
-        yield f"that is {against}, same step, no early termination"
+    return "\n".join(lines)
 
 
 def contact_sheet(report: Report, images: Mapping[float, Images]) -> NDArray[np.uint8]:

@@ -22,7 +22,7 @@ from pyvista_vdi.measure.paper import (
     paper_cell,
 )
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
-from pyvista_vdi.measure.paper.published import paper_tables, paper_targets
+from pyvista_vdi.measure.paper.report import paper_tables, paper_targets
 from pyvista_vdi.measure.results import Results
 
 #: Of our raycaster to VTK's GPU mapper, soft: that of test_real_volumes.

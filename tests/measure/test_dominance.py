@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.tradeoff import Figure, dominates, find_dominated, front
-from pyvista_vdi.measure.tradeoff.dominance import told_apart
+from pyvista_vdi.measure.tradeoff.findings import told_apart
 
 #: What does not count in the exact figures below, whose values are whole numbers.
 NOTHING = 0.25

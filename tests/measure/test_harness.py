@@ -184,11 +184,11 @@ def test_the_latest_is_kept_and_the_former_closed():
 @pytest.mark.fast
 def test_the_chance_of_a_separation():
     # All of n samples below all of m: 2 of the orders of n and m
-    assert rank_sum_chance([1, 2, 3, 4, 5], [6, 7, 8, 9, 10]) == pytest.approx(2 / 252)
-    assert rank_sum_chance([3], [1, 2, 4]) == 1
+    assert rank_sum_chance((1, 2, 3, 4, 5), (6, 7, 8, 9, 10)) == pytest.approx(2 / 252)
+    assert rank_sum_chance((3,), (1, 2, 4)) == 1
     few = [-1.0, -2.0, -3.0]
-    assert rank_sum_chance(few, np.arange(1000)) == pytest.approx(2 / math.comb(1003, 3))
+    assert rank_sum_chance(tuple(few), tuple(range(1000))) == pytest.approx(2 / math.comb(1003, 3))
     # As many as may be asked for: 1 + 2 + ... + 929 wins of 10^6, by the normal distribution
     far = (5e5 - 929 * 930 / 2 - 0.5) / math.sqrt(1e6 * 2001 / 12)
-    chance = rank_sum_chance(np.arange(1000), np.arange(1000) + 70.5)
+    chance = rank_sum_chance(tuple(range(1000)), tuple(np.arange(1000) + 70.5))
     assert chance == pytest.approx(2 * NormalDist().cdf(-far))

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from pyvista_vdi.measure.paper.benchmark import PROFILES, Plan, open_results, run
 from pyvista_vdi.measure.paper.datasets import DEFAULT_SEED, Dataset, find_dataset
-from pyvista_vdi.measure.paper.published import PaperCell, paper_cell
-from pyvista_vdi.measure.paper.report import describe
+from pyvista_vdi.measure.paper.report import PaperCell, describe, paper_cell
 from pyvista_vdi.measure.results import Results
 
 __all__ = [

@@ -37,7 +37,7 @@ from pyvista_vdi.measure.paper.datasets import (
     label_of,
     require_allocation,
 )
-from pyvista_vdi.measure.paper.published import paper_targets
+from pyvista_vdi.measure.paper.report import paper_targets
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.options import check_max_supersegments
 from pyvista_vdi.model.vdi import VDI

@@ -1,14 +1,17 @@
-"""The results as Markdown, Table 1, what each VDI takes and Table 2."""
+"""The results as Markdown, Table 1, what each VDI takes and Table 2, beside the paper's figures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from typing import Any
 
 from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import Times, median, spread
 from pyvista_vdi.measure.harness import CANDIDATES
-from pyvista_vdi.measure.paper.published import PaperCell, paper_cell, paper_tables
 from pyvista_vdi.measure.report import across, milliseconds, number, ratio, section, table
 from pyvista_vdi.measure.results import Results
 
@@ -26,6 +29,61 @@ _TAKEN = (
     *("lists not empty", "per list", "longest", "raw MiB", "saved MiB"),
     *("generation s", "by events s", "saving s"),
 )
+
+
+@dataclass(frozen=True)
+class PaperCell:
+    """One cell of the paper's Table 1: frames per second, and SSIM to volume rendering.
+
+    ``volume_fps`` are the paper's volume rendering's at this angle, ``fps`` and ``fps_skipping``
+    the VDI's without and with skipping of empty space.
+    """
+
+    volume_fps: float
+    fps: float
+    fps_skipping: float
+    ssim: float
+
+    @property
+    def speed_up(self) -> float:
+        """Speed of the VDI without skipping over the paper's volume rendering."""
+        return self.fps / self.volume_fps
+
+    @property
+    def speed_up_skipping(self) -> float:
+        """Speed of the VDI with skipping over the paper's volume rendering."""
+        return self.fps_skipping / self.volume_fps
+
+
+@cache
+def paper_tables() -> dict[str, Any]:
+    """Return the data file: ``source``, ``device``, ``table1`` and ``table2``."""
+    file = resources.files("pyvista_vdi.measure.paper") / "paper_tables.json"
+    tables: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return tables
+
+
+def paper_cell(
+    dataset: str | None, window_size: Sequence[int], max_supersegments: int, angle: float
+) -> PaperCell | None:
+    """Return what the paper measured, or None where it has no such cell.
+
+    ``dataset`` is ``"kingsnake"``, ``"beechnut"`` or ``"richtmyer_meshkov"``, ``max_supersegments``
+    its N_S, ``angle`` in degrees from V_O.
+    """
+    for row in paper_tables()["table1"]:
+        if (row["dataset"], row["window_size"]) == (dataset, list(window_size)):
+            for cell in row["vdi"]:
+                if (cell["max_supersegments"], cell["angle"]) == (max_supersegments, angle):
+                    figures = (cell[name] for name in ("fps", "fps_skipping", "ssim"))
+                    return PaperCell(row["volume_fps"][str(cell["angle"])], *figures)
+    return None
+
+
+def paper_targets() -> list[tuple[float, float]]:
+    """Return Table 2: each target rate as a multiple of the full frame's rate, and the SSIM."""
+    table = paper_tables()["table2"]
+    return [(target["fps"] / table["full_fps"], target["ssim"]) for target in table["targets"]]
 
 
 def describe(data: dict[str, Any]) -> str:

@@ -5,8 +5,7 @@ Everything runs without VTK and PyVista; where VTK is installed its mappers are 
 
 from __future__ import annotations
 
-from pyvista_vdi.measure.tradeoff.dominance import Figure, dominates, find_dominated, front
-from pyvista_vdi.measure.tradeoff.findings import Point
+from pyvista_vdi.measure.tradeoff.findings import Figure, Point, dominates, find_dominated, front
 from pyvista_vdi.measure.tradeoff.settings import AXES, Setting, sweep
 from pyvista_vdi.measure.tradeoff.tradeoff import Tradeoff, measure_tradeoff
 
