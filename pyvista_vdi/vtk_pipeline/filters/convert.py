@@ -197,24 +197,18 @@ def _blanked(image: vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
     for kind, marks in ghosts_of(image).items():
         cells = kind == "cell" and of_cells
         texels = np.pad(marks > 0, (0, 1)) if kind == "cell" and not cells else marks > 0
-        octants = _octants_of(texels, cells)
+        points = [n + cells for n in texels.shape]
+        texels = np.pad(texels, 1, mode="edge")
+        octants = np.zeros(points, np.uint8)
+        for octant, above in enumerate(itertools.product((0, 1), repeat=3)):  # z, y, x
+            at = [up if cells else 1 for up in above]
+            beside = [1 - up if cells else 2 * up for up in above]
+            marked = np.zeros(points, bool)
+            for first in (at, *([*at[:k], beside[k], *at[k + 1 :]] for k in range(3))):
+                marked |= texels[tuple(slice(f, f + n) for f, n in zip(first, points, strict=True))]
+            octants |= marked.astype(np.uint8) << octant
         blanked = octants if blanked is None else blanked | octants
     return blanked
-
-
-def _octants_of(texels: NDArray[np.bool_], cells: bool) -> NDArray[np.uint8]:
-    """Return the octants that marked texels, of points or of cells, blank."""
-    points = [n + cells for n in texels.shape]
-    texels = np.pad(texels, 1, mode="edge")
-    octants = np.zeros(points, np.uint8)
-    for octant, above in enumerate(itertools.product((0, 1), repeat=3)):  # z, y, x
-        at = [up if cells else 1 for up in above]
-        beside = [1 - up if cells else 2 * up for up in above]
-        marked = np.zeros(points, bool)
-        for first in (at, *([*at[:k], beside[k], *at[k + 1 :]] for k in range(3))):
-            marked |= texels[tuple(slice(f, f + n) for f, n in zip(first, points, strict=True))]
-        octants |= marked.astype(np.uint8) << octant
-    return octants
 
 
 def scalars_of(image: vtkImageData, name: str | None, preference: str = "point") -> vtkDataArray:
@@ -265,12 +259,8 @@ def as_numpy(array: vtkDataArray) -> NDArray[Any]:
     values: NDArray[Any] = vtk_to_numpy(array)
     # NumPy's own array rather than one that keeps VTK's, which has an attribute: see Held
     lent = getattr(array, "_numpy_reference", values)
-    same = (lent.dtype, lent.size, lent.ctypes.data) == (
-        values.dtype,
-        values.size,
-        values.ctypes.data,
-    )
-    return lent.reshape(values.shape) if same else values
+    theirs, ours = ((a.dtype, a.size, a.ctypes.data) for a in (lent, values))
+    return lent.reshape(values.shape) if theirs == ours else values
 
 
 def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,11 +102,11 @@ def transfer_function_from_property(
         reflected = (prop.GetAmbient(), prop.GetDiffuse(), prop.GetSpecular())
         shading = Shading(*reflected, prop.GetSpecularPower())
     interpolation = _INTERPOLATION[prop.GetInterpolationType()]
-    color = _Function("colour", color_function(prop))
-    opacity = _Function("opacity", prop.GetScalarOpacity())
-    (colors, opacities), scalar_range = _tabulate(
-        [color, opacity], volume, interpolation == "nearest"
-    )
+    functions = [
+        _Function("colour", color_function(prop)),
+        _Function("opacity", prop.GetScalarOpacity()),
+    ]
+    (colors, opacities), scalar_range = _tabulate(functions, volume, interpolation == "nearest")
     return TransferFunction(
         np.broadcast_to(colors, (len(colors), 3)),  # a grey function has one column
         opacities[:, 0],
@@ -125,19 +125,6 @@ def check_property(prop: Any, *, rgba: bool = False) -> None:
         raise InvalidArgumentError(
             f"volume_property must be a vtkVolumeProperty; got {type(prop).__name__}"
         )
-    _refuse_unsupported(prop, rgba)
-
-
-def color_function(prop: vtkVolumeProperty) -> Any:
-    """Return the function that colours: RGB or grey.
-
-    Asking a grey property for its RGB function would make it one of colour.
-    """
-    grey = prop.GetColorChannels() == 1
-    return prop.GetGrayTransferFunction() if grey else prop.GetRGBTransferFunction()
-
-
-def _refuse_unsupported(prop: vtkVolumeProperty, rgba: bool) -> None:
     reasons = []
     if rgba and prop.GetIndependentComponents():
         reasons.append("independent components of an RGBA volume (IndependentComponentsOff())")
@@ -155,6 +142,15 @@ def _refuse_unsupported(prop: vtkVolumeProperty, rgba: bool) -> None:
         raise UnsupportedError(
             f"the volume property has {' and '.join(reasons)}, which a VDI cannot honour"
         )
+
+
+def color_function(prop: vtkVolumeProperty) -> Any:
+    """Return the function that colours: RGB or grey.
+
+    Asking a grey property for its RGB function would make it one of colour.
+    """
+    grey = prop.GetColorChannels() == 1
+    return prop.GetGrayTransferFunction() if grey else prop.GetRGBTransferFunction()
 
 
 def _gradient_opacity(prop: vtkVolumeProperty, volume: Any) -> dict[str, Any]:
@@ -320,12 +316,9 @@ class _Function:
         return colors
 
 
-_Tables: TypeAlias = list[NDArray[np.float64]]
-
-
 def _tabulate(
     functions: Sequence[_Function], volume: Any, nearest: bool
-) -> tuple[_Tables, tuple[float, float]]:
+) -> tuple[list[NDArray[np.float64]], tuple[float, float]]:
     """Return the functions' values at the same equidistant scalars, and the range of these."""
     linear = all(function.linear for function in functions)
     x = np.unique(np.concatenate([function.x for function in functions]))
@@ -333,7 +326,19 @@ def _tabulate(
         grid = _common_grid(x, SAMPLED_ENTRIES)
         if grid is not None:
             return [function.exact(grid) for function in functions], (x[0], x[-1])
-    low, high = _domain(functions, volume)
+    # Find the scalars between which functions vary, no wider than those of the volume
+    nodes = np.concatenate([function.varying for function in functions])
+    low, high = float(nodes.min()), float(nodes.max())
+    if any(function.ends for function in functions):  # what is beyond has an entry, too
+        beyond = (high - low) / SAMPLED_ENTRIES or 1e-6 * max(1.0, abs(low))
+        low, high = low - beyond, high + beyond
+    # Where chunks would have to be read for it, only if a table might not show all that there is
+    chunks = getattr(volume, "chunks", None)
+    apart = min(np.diff(function.varying).min(initial=np.inf) for function in functions)
+    plain = linear and apart >= 64 * (high - low) / SAMPLED_ENTRIES
+    if volume is not None and not (plain and chunks is not None and chunks.ranges() is None):
+        least, largest = _data_range(volume)
+        low, high = min(max(low, least), largest), max(min(high, largest), least)
     whole = nearest and volume is not None and volume.array.dtype.kind in "iu"
     grid = None
     if whole:
@@ -350,31 +355,6 @@ def _tabulate(
     if grid is None:
         return [function.resolved(low, high) for function in functions], (low, high)
     return [function.exact(grid) for function in functions], (low, high)
-
-
-def _domain(functions: Sequence[_Function], volume: Any) -> tuple[float, float]:
-    """Return the scalars between which functions vary, no wider than those of the volume."""
-    nodes = np.concatenate([function.varying for function in functions])
-    low, high = float(nodes.min()), float(nodes.max())
-    if any(function.ends for function in functions):  # what is beyond has an entry, too
-        beyond = (high - low) / SAMPLED_ENTRIES or 1e-6 * max(1.0, abs(low))
-        low, high = low - beyond, high + beyond
-    if volume is None or (_is_unread(volume) and _are_plain(functions, low, high)):
-        return low, high
-    least, largest = _data_range(volume)
-    return min(max(low, least), largest), max(min(high, largest), least)
-
-
-def _is_unread(volume: Any) -> bool:
-    """Whether the volume's range would have to be found chunk by chunk."""
-    chunks = getattr(volume, "chunks", None)
-    return chunks is not None and chunks.ranges() is None
-
-
-def _are_plain(functions: Sequence[_Function], low: float, high: float) -> bool:
-    """Whether a sampled table shows the functions well wherever the data lie."""
-    apart = min(np.diff(function.varying).min(initial=np.inf) for function in functions)
-    return all(f.linear for f in functions) and apart >= 64 * (high - low) / SAMPLED_ENTRIES
 
 
 def _data_range(volume: Any) -> tuple[float, float]:

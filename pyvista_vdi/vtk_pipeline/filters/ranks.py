@@ -16,11 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import (
-    InvalidVolumeError,
-    UnsupportedError,
-    VDIError,
-)
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError
 from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi, mpi, require_same, together
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.grid import Grid
@@ -163,7 +159,12 @@ class RanksVDISource(VDISource):
                 information.Set(pipeline.UPDATE_PIECE_NUMBER(), 0)
                 information.Set(pipeline.UPDATE_NUMBER_OF_PIECES(), 1)
                 information.Set(pipeline.UPDATE_NUMBER_OF_GHOST_LEVELS(), 0)
-                information.Set(pipeline.UPDATE_EXTENT(), _widened(own, whole), 6)
+                # The block and a point around it: by that, values of cells become right
+                extent: list[int] = []
+                for axis, (begin, end) in enumerate(own[::-1]):
+                    low, high = whole[2 * axis : 2 * axis + 2]
+                    extent += [max(low + begin - 1, low), min(low + end, high)]
+                information.Set(pipeline.UPDATE_EXTENT(), extent, 6)
         return 1
 
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
@@ -268,15 +269,6 @@ def _boxes(points: Any, ranks: int) -> list[Box]:
 def _points(whole: Any) -> tuple[int, ...]:
     """Return the points along z, y and x of an extent."""
     return tuple(whole[k + 1] - whole[k] + 1 for k in (4, 2, 0))
-
-
-def _widened(box: Box, whole: Any) -> list[int]:
-    """Return VTK's extent of a box and a point around it: by that, values of cells become right."""
-    extent: list[int] = []
-    for axis, (begin, end) in enumerate(box[::-1]):
-        low, high = whole[2 * axis : 2 * axis + 2]
-        extent += [max(low + begin - 1, low), min(low + end, high)]
-    return extent
 
 
 @dataclass(frozen=True)

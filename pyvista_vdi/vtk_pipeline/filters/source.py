@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.errors import (
     Cancelled,
@@ -292,21 +291,22 @@ class VDISource(SourceSettings):
         *,
         warn: bool,
     ) -> Request:
-        missing = [
-            f"{what} ({setter})"
-            for what, setter, value in (
-                ("camera", "SetCamera", camera),
-                ("window size", "SetWindowSize", window_size),
-                ("volume property", "SetVolumeProperty", self.GetVolumeProperty()),
-            )
-            if value is None
-        ]
-        if missing:
+        prop = self.GetVolumeProperty()
+        needed = {
+            "camera (SetCamera)": camera,
+            "window size (SetWindowSize)": window_size,
+            "volume property (SetVolumeProperty)": prop,
+        }
+        missing = [what for what, value in needed.items() if value is None]
+        if camera is None or window_size is None or prop is None:
             raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
-        assert camera is not None
-        assert window_size is not None
         volume = self._read(image)
-        table = self._classify(volume, self.GetVolumeProperty())
+        # Take the property's functions over the volume's scalars, the same until they change
+        key = (self._volume_key, prop.GetMTime())
+        if self._table is None or key != self._table_key:
+            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
+            self._table_key = key
+        table = self._table
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self._options, lights=lights)
         return Request(
@@ -336,20 +336,16 @@ class VDISource(SourceSettings):
             self._volume_key = key
         return self._volume
 
-    def _classify(self, volume: Volume, prop: Any) -> TransferFunction:
-        """Return the property's functions over the volume's scalars, the same until they change."""
-        key = (self._volume_key, prop.GetMTime())
-        if self._table is None or key != self._table_key:
-            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
-            self._table_key = key
-        return self._table
-
     def _view(
         self, grid: vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool
     ) -> tuple[Camera, tuple[int, int]]:
         """Return the generating view and its window, after coverage."""
         if self._coverage == "bounds":
-            wide = covering_view(camera, window_size, _corners(grid))
+            # The corners of the box of points, model frame: tighter than bounds if rotated
+            corners = np.zeros((8, 3))
+            for at, corner in zip(bounds_corners(grid.GetExtent()).tolist(), corners, strict=True):
+                grid.TransformIndexToPhysicalPoint(*map(int, at), corner)
+            wide = covering_view(camera, window_size, corners)
             if wide is not None:
                 return wide
             if warn:
@@ -409,13 +405,3 @@ def _end_abort(source: Any, event: str) -> None:
     """
     if source.GetAbortOutput():
         source.SetAbortExecute(0)
-
-
-def _corners(grid: vtkImageData) -> NDArray[np.float64]:
-    """Return the corners of the box of points, model frame: tighter than bounds if rotated."""
-    out: list[list[float]] = []
-    for i, j, k in bounds_corners(grid.GetExtent()).astype(int):
-        point = [0.0, 0.0, 0.0]
-        grid.TransformIndexToPhysicalPoint(int(i), int(j), int(k), point)
-        out.append(point)
-    return np.array(out)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -18,13 +17,23 @@ def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
     ``source``: what announces times (``TIME_STEPS``), or is a reader of PyVista with
     ``time_values``. Raises InvalidArgumentError if it has no times.
     """
-    read: Callable[[int], Any]
-    if hasattr(source, "time_values"):
-        times, read = tuple(source.time_values), partial(_read_point, source)
+    of_pyvista = hasattr(source, "time_values")
+    if of_pyvista:
+        times = tuple(source.time_values)
     else:
         source.UpdateInformation()
         times = announced_times(source.GetOutputInformation(0))
-        read = partial(_update_to, source, times)
+
+    def read(i: int) -> Any:
+        if of_pyvista:
+            source.set_active_time_point(i)
+            return _only_block(source.read())
+        source.UpdateTimeStep(times[i])
+        data = _only_block(source.GetOutputDataObject(0))
+        step = data.NewInstance()
+        step.ShallowCopy(data)  # the output is another one at another time
+        return step
+
     if not times:
         raise InvalidArgumentError(
             f"{type(source).__name__} announces no time steps, which a series is made of: use what "
@@ -51,19 +60,6 @@ class Steps(Sequence[Any]):
             return [self[i] for i in range(self._n)[index]]
         with self._lock:
             return self._read(range(self._n)[index])
-
-
-def _read_point(reader: Any, i: int) -> Any:
-    reader.set_active_time_point(i)
-    return _only_block(reader.read())
-
-
-def _update_to(algorithm: Any, times: Sequence[float], i: int) -> Any:
-    algorithm.UpdateTimeStep(times[i])
-    data = _only_block(algorithm.GetOutputDataObject(0))
-    step = data.NewInstance()
-    step.ShallowCopy(data)  # the output is another one at another time
-    return step
 
 
 def _only_block(data: Any) -> Any:
