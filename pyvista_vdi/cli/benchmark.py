@@ -15,7 +15,6 @@ from pyvista_vdi.io import check_writable
 from pyvista_vdi.measure.paper import (
     PROFILES,
     Plan,
-    Results,
     describe,
     find_dataset,
     open_results,
@@ -26,8 +25,16 @@ from pyvista_vdi.measure.report import write_text
 
 def benchmark(options: argparse.Namespace) -> int:
     """Measure and write."""
-    plan = _plan(options)
-    results = _results(options, plan)
+    plan, path = _plan(options), Path(options.out)
+    # Refuse now what cannot be written later
+    if path.suffix.lower() != ".json":
+        raise InvalidArgumentError(
+            f"--out must name a .json file (the tables go beside it); got {options.out!r}"
+        )
+    require_new(path, options)
+    check_writable(path)
+    results = open_results(plan, path, options.device, resume=options.resume)
+    results.save()
     try:
         with measuring("benchmark", results.path) as bar:
             run(plan, results, options.device, bar)
@@ -63,17 +70,7 @@ def _plan(options: argparse.Namespace) -> Plan:
         for name, value in changes.items()
         if value is not None
     }
-    chosen["preview"] = _preview(chosen)
-    if options.tables is not None:
-        if 2 not in options.tables:
-            chosen["preview"] = None
-        if 1 not in options.tables:
-            chosen["datasets"] = ()
-    return Plan(profile=options.profile, vtk=has_vtk(options), **chosen)
-
-
-def _preview(chosen: dict[str, Any]) -> tuple[str, tuple[int, int], int, float]:
-    """Return the profile's case of Table 2, or the one nearest to it that was chosen."""
+    # Take the profile's case of Table 2, or the one nearest to it that was chosen
     dataset, size, limit, angle = chosen["preview"]
     datasets, sizes = chosen["datasets"], chosen.get("sizes", (size,))
     limits = chosen.get("limits", (limit,))
@@ -81,23 +78,11 @@ def _preview(chosen: dict[str, Any]) -> tuple[str, tuple[int, int], int, float]:
         seed = chosen.get("seed", 0)
         stands = [name for name in datasets if find_dataset(name, seed).paper == "beechnut"]
         dataset = [*stands, *datasets][0]
-    return (
-        dataset,
-        size if size in sizes else sizes[-1],
-        limit if limit in limits else limits[0],
-        angle,
-    )
-
-
-def _results(options: argparse.Namespace, plan: Plan) -> Results:
-    """Return the file to write to, refused now if that cannot be done."""
-    path = Path(options.out)
-    if path.suffix.lower() != ".json":
-        raise InvalidArgumentError(
-            f"--out must name a .json file (the tables go beside it); got {options.out!r}"
-        )
-    require_new(path, options)
-    check_writable(path)
-    results = open_results(plan, path, options.device, resume=options.resume)
-    results.save()
-    return results
+    size, limit = (x if x in xs else xs[k] for x, xs, k in ((size, sizes, -1), (limit, limits, 0)))
+    chosen["preview"] = (dataset, size, limit, angle)
+    if options.tables is not None:
+        if 2 not in options.tables:
+            chosen["preview"] = None
+        if 1 not in options.tables:
+            chosen["datasets"] = ()
+    return Plan(profile=options.profile, vtk=has_vtk(options), **chosen)

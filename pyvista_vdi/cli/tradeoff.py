@@ -25,7 +25,6 @@ from pyvista_vdi.measure.tradeoff import AXES, Setting, measure_tradeoff, sweep
 from pyvista_vdi.measure.tradeoff.report import summary
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, QUICK_AXES
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.volume import Volume
 
 #: Frames and views, without and with ``--quick``.
 _SIZES = ((640, 360), (320, 180))
@@ -45,6 +44,11 @@ def tradeoff(options: argparse.Namespace) -> int:
     if Path(name).name != name:
         raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
     volume = read_volume(options)
+    if not set(arguments) - {"interpolation"} and not volume.rgba:
+        # By default the same without PyVista
+        interpolation = arguments.get("interpolation", "nearest")
+        table = look(_DEFAULT_LOOK, volume.finite_range(), interpolation)
+        arguments = {"transfer_function": table}
     vtk = has_vtk(options)
     with (
         output_files(options, f"tradeoff-{name}", "json", "md", "png") as files,
@@ -64,7 +68,7 @@ def tradeoff(options: argparse.Namespace) -> int:
             resume=options.resume,
             device=options.device,
             progress=bar,
-            **_looks(arguments, volume),
+            **arguments,
         )
     print(summary(found.points))
     write_text(files["md"], found.table())
@@ -95,25 +99,13 @@ def _axis(text: str, usual: Mapping[str, tuple[Any, ...]]) -> tuple[str, tuple[A
         raise InvalidArgumentError(f"--sweep knows no {given!r}: known are {known}")
     if not equals:
         return name, usual[name]
-    return name, tuple(_value(name, value) for value in values.split(","))
-
-
-def _value(name: str, text: str) -> Any:
-    kind = type(getattr(Setting(), name))
-    try:
-        if kind is bool:
-            return {"on": True, "off": False}[text]
-        return kind(text)
-    except (KeyError, ValueError) as error:
-        expected = {bool: "on or off", int: "a whole number", float: "a number"}[kind]
-        raise InvalidArgumentError(
-            f"--sweep {name.replace('_', '-')} takes {expected}; got {text!r}"
-        ) from error
-
-
-def _looks(arguments: dict[str, Any], volume: Volume) -> dict[str, Any]:
-    """Return the classification; by default one that is the same without PyVista."""
-    if set(arguments) - {"interpolation"} or volume.rgba:
-        return arguments
-    interpolation = arguments.get("interpolation", "nearest")
-    return {"transfer_function": look(_DEFAULT_LOOK, volume.finite_range(), interpolation)}
+    kind, chosen = type(getattr(Setting(), name)), []
+    for value in values.split(","):
+        try:
+            chosen.append({"on": True, "off": False}[value] if kind is bool else kind(value))
+        except (KeyError, ValueError) as error:
+            expected = {bool: "on or off", int: "a whole number", float: "a number"}[kind]
+            raise InvalidArgumentError(
+                f"--sweep {name.replace('_', '-')} takes {expected}; got {value!r}"
+            ) from error
+    return name, tuple(chosen)

@@ -44,7 +44,14 @@ def read_stack(files: list[Path]) -> Volume:
     folder = files[0].parent
     if len(files) < 2:
         raise InvalidVolumeError(f"the folder {folder} holds one slice: a volume needs two")
-    _warn_of_gaps(files)
+    found = [re.findall(r"\d+", file.stem) for file in files]
+    numbers = [int(each[-1]) for each in found if each]
+    if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
+        warn_external(
+            f"the numbers of the slices in the folder {folder} are not evenly spaced "
+            f"({files[0].name} to {files[-1].name}, {len(files)} files), and are taken as if: are "
+            "some missing?"
+        )
     first = _read(files[0])
     require_free_memory(
         first.nbytes * len(files), f"the {len(files)} slices in {folder}", "take fewer of them"
@@ -67,17 +74,6 @@ def _is_dicom(file: Path) -> bool:
             return stream.read(_DICOM_AT + len(_DICOM))[_DICOM_AT:] == _DICOM
     except OSError:
         return False
-
-
-def _warn_of_gaps(files: list[Path]) -> None:
-    found = [re.findall(r"\d+", file.stem) for file in files]
-    numbers = [int(each[-1]) for each in found if each]
-    if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
-        warn_external(
-            f"the numbers of the slices in the folder {files[0].parent} are not evenly spaced "
-            f"({files[0].name} to {files[-1].name}, {len(files)} files), and are taken as if: are "
-            "some missing?"
-        )
 
 
 def _read(file: Path) -> NDArray[Any]:

@@ -449,8 +449,17 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
     kinds = {"time": "t", "channel": "c"}
     axes = tuple(kinds.get(axis.get("type"), axis["name"]) for axis in image["axes"])
     _check_axes(path, axes)
+    # Bring lengths along z, y, x to one unit, that along x
     units = [axis.get("unit") for axis in image["axes"][-3:]]
-    factors, unit = _to_one_unit(path, units)
+    factors = np.ones(3)
+    if len(set(units)) > 1:
+        if any(name not in _UNITS for name in units):
+            raise UnsupportedError(
+                f"{path} has lengths in {', '.join(map(str, units))} along z, y, x, of which one "
+                "is not known: write them in one unit"
+            )
+        lengths = np.array([_UNITS[str(name)] for name in units])
+        factors = lengths / lengths[-1]
     levels, clock = [], (1.0, 0.0)
     for entry in image["datasets"]:
         array = group[entry["path"]]
@@ -466,25 +475,11 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
         path,
         tuple(levels),
         axes,
-        unit,
+        units[-1] or "",
         tuple(str(name) for name in names) if all(names) else (),
         f"OME-Zarr {version}",
         clock,
     )
-
-
-def _to_one_unit(path: str, units: Sequence[str | None]) -> tuple[Any, str]:
-    """Return what lengths along z, y, x are multiplied by, and the unit that they then have."""
-    unit = units[-1] or ""
-    if len(set(units)) == 1:
-        return np.ones(3), unit
-    if any(name not in _UNITS for name in units):
-        raise UnsupportedError(
-            f"{path} has lengths in {', '.join(map(str, units))} along z, y, x, of which one is "
-            "not known: write them in one unit"
-        )
-    lengths = np.array([_UNITS[str(name)] for name in units])
-    return lengths / lengths[-1], unit
 
 
 def _placed(

@@ -37,7 +37,13 @@ def read_file(file: Path, by_pyvista: Callable[[Path], Any] | None = None) -> An
             return image_stack.read_stack(slices)
     suffix = file.suffix.lower()
     if lists_steps(file):
-        return read_file(_only_step(file), by_pyvista)
+        steps = listed_steps(file)
+        if len(steps) > 1:
+            raise InvalidVolumeError(
+                f"{file} lists {len(steps)} time steps, and one volume is asked for: name the file "
+                f"of one, such as {steps[0][0]}, or make a series of all (pyvista-vdi series)"
+            )
+        return read_file(steps[0][0], by_pyvista)
     if suffix == ".raw":
         # Read bare scalars, little-endian, whose name says what they are
         found = re.search(r"_(\d+)x(\d+)x(\d+)_([a-z]+\d+)\.raw$", file.name, re.IGNORECASE)
@@ -60,7 +66,16 @@ def read_file(file: Path, by_pyvista: Callable[[Path], Any] | None = None) -> An
         array: NDArray[Any] = np.fromfile(file, dtype).reshape(nz, ny, nx)
         return Volume(array.astype(dtype.newbyteorder("="), copy=False))
     if suffix == ".npy":
-        return _read_npy(file)
+        try:
+            # In place: a header's claims are held against the file's size, objects are refused
+            array = np.lib.format.open_memmap(file, mode="r")
+        except OSError as error:
+            raise InvalidVolumeError(f"{file} cannot be read: {error.strerror or error}") from error
+        except _BAD_ARRAY as error:
+            raise InvalidVolumeError(
+                f"{file} cannot be read as an array ({error}): write one by numpy.save"
+            ) from error
+        return Volume(array)
     if suffix in (".nrrd", ".nhdr"):
         # By pynrrd: VTK takes the first axis for components in files that do not say what their
         # axes are
@@ -73,27 +88,3 @@ def needs_pyvista(file: Path) -> bool:
     known = (".raw", ".npy", ".nrrd", ".nhdr")
     folder = os.path.isdir(file)  # noqa: PTH112 - pathlib's raises for a name that is too long
     return not folder and file.suffix.lower() not in known
-
-
-def _only_step(file: Path) -> Path:
-    """Return the file that a list of time steps has, if it is one."""
-    steps = listed_steps(file)
-    if len(steps) > 1:
-        raise InvalidVolumeError(
-            f"{file} lists {len(steps)} time steps, and one volume is asked for: name the file of "
-            f"one, such as {steps[0][0]}, or make a series of all (pyvista-vdi series)"
-        )
-    return steps[0][0]
-
-
-def _read_npy(file: Path) -> Volume:
-    try:
-        # In place: what a header declares is held against the file's size, and objects are refused
-        array = np.lib.format.open_memmap(file, mode="r")
-    except OSError as error:
-        raise InvalidVolumeError(f"{file} cannot be read: {error.strerror or error}") from error
-    except _BAD_ARRAY as error:
-        raise InvalidVolumeError(
-            f"{file} cannot be read as an array ({error}): write one by numpy.save"
-        ) from error
-    return Volume(array)

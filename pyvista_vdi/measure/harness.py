@@ -202,15 +202,10 @@ def run(
         try:
             figures = measure(case)
         except refused as error:
-            figures = {"refused": refusal(error)}
+            figures = {"refused": f"{type(error).__name__}: {error}"}
         results.add(case.to_dict(), **figures)
     if progress is not None:
         progress(1.0)
-
-
-def refusal(error: BaseException) -> str:
-    """Return why something was not measured."""
-    return f"{type(error).__name__}: {error}"
 
 
 class Latest(Generic[_Made]):
@@ -347,8 +342,29 @@ class Bench:
         self._references: dict[Camera, Image] = {}
         self._near: dict[Camera, dict[str, float]] = {}
         self._open = ExitStack()
-        if vtk:
-            self._open_vtk(volume_property)
+        if not vtk:
+            return
+        from pyvista_vdi.measure.vtk_baselines import (
+            MAPPERS,
+            VTKBaseline,
+            property_from_transfer_function,
+        )
+
+        for mapper in MAPPERS:
+            try:
+                if mapper == "gpu":
+                    require_free_memory(
+                        _VTK_COPIES * volume.array.nbytes,
+                        f"the volume {volume.name!r} in VTK's GPU mapper as well, beside ours,",
+                        "take a smaller one, or a machine with more memory",
+                    )
+                prop = volume_property or property_from_transfer_function(volume, table)
+                baseline = VTKBaseline(volume, prop, window_size, mapper, self.voxel)
+            except VDIError as error:
+                self.left_out[f"vtk_{mapper}"] = error
+                continue
+            self._open.callback(baseline.close)
+            self.vtk[f"vtk_{mapper}"] = baseline
 
     @property
     def opengl(self) -> str | None:
@@ -502,30 +518,6 @@ class Bench:
             medium = DeviceVolume(*given, sample_distance=step, skip_empty=skip_empty)
             self._media[step, skip_empty] = medium
         return self._media[step, skip_empty]
-
-    def _open_vtk(self, volume_property: Any) -> None:
-        from pyvista_vdi.measure.vtk_baselines import (
-            MAPPERS,
-            VTKBaseline,
-            property_from_transfer_function,
-        )
-
-        volume = self.volume
-        for mapper in MAPPERS:
-            try:
-                if mapper == "gpu":
-                    require_free_memory(
-                        _VTK_COPIES * volume.array.nbytes,
-                        f"the volume {volume.name!r} in VTK's GPU mapper as well, beside ours,",
-                        "take a smaller one, or a machine with more memory",
-                    )
-                prop = volume_property or property_from_transfer_function(volume, self.table)
-                baseline = VTKBaseline(volume, prop, self.size, mapper, self.voxel)
-            except VDIError as error:
-                self.left_out[f"vtk_{mapper}"] = error
-                continue
-            self._open.callback(baseline.close)
-            self.vtk[f"vtk_{mapper}"] = baseline
 
     def close(self) -> None:
         """Release VTK's windows, and what lies on the device."""

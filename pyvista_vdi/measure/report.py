@@ -47,18 +47,14 @@ def describe_system(device: Any = None) -> dict[str, str]:
     return described
 
 
-def system_line(system: Mapping[str, str]) -> str:
-    """Return in one line what a figure depends on."""
-    return ", ".join(f"{name} {value}" for name, value in system.items())
-
-
 def closing(data: Mapping[str, Any]) -> list[str]:
     """Return the last lines of a report: when it was measured, of what code, and on what."""
     commit = data["measured"]["commit"]
     code = f", commit {commit}" if commit else ""
     part = " of a sample of the cases" if data["extent"] == "sample" else ""
     times = f"Measured from {data['begun']} to {data['changed']}{part}{code}"
-    return ["", f"{times} on: {system_line(data['system'])}."]
+    system = ", ".join(f"{name} {value}" for name, value in data["system"].items())
+    return ["", f"{times} on: {system}."]
 
 
 def section(title: str, *paragraphs: str) -> Iterator[str]:
@@ -69,11 +65,8 @@ def section(title: str, *paragraphs: str) -> Iterator[str]:
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
     """Return the lines of a Markdown table."""
-    return [_row(heads), "|" + "---|" * len(heads), *map(_row, rows)]
-
-
-def _row(cells: Sequence[object]) -> str:
-    return f"| {' | '.join(map(str, cells))} |"
+    lines = [f"| {' | '.join(map(str, cells))} |" for cells in (heads, *rows)]
+    return [lines[0], "|" + "---|" * len(heads), *lines[1:]]
 
 
 def number(value: float | None, form: str) -> str:
@@ -88,9 +81,8 @@ def ratio(of: float | None, to: float | None) -> str:
 
 def milliseconds(seconds: float | None) -> str:
     """Return a time in milliseconds, to three digits or whole."""
-    return number(
-        None if seconds is None else seconds * 1e3, ".0f" if (seconds or 0) >= 0.1 else ".3g"
-    )
+    form = ".0f" if (seconds or 0) >= 0.1 else ".3g"
+    return number(None if seconds is None else seconds * 1e3, form)
 
 
 def mebibytes(n: float | None) -> str:

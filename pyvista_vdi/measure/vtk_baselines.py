@@ -59,7 +59,13 @@ class OffScreenVolume:
 
     def render(self, camera: Camera) -> None:
         """Draw a frame and wait until it is finished; nothing is read back."""
-        self._look(camera)
+        from pyvista_vdi.vtk_pipeline.filters.view import aim
+
+        aim(self._renderer.GetActiveCamera(), camera)
+        matrix = vtk.vtkMatrix4x4()
+        matrix.DeepCopy(camera.model_transform.ravel().tolist())
+        self._volume.SetUserMatrix(matrix)
+        self._renderer.ResetCameraClippingRange()
         self._window.Render()
         self._window.WaitForCompletion()
 
@@ -87,15 +93,6 @@ class OffScreenVolume:
         self._window.RemoveRenderer(self._renderer)
         self._window.Finalize()
 
-    def _look(self, camera: Camera) -> None:
-        from pyvista_vdi.vtk_pipeline.filters.view import aim
-
-        aim(self._renderer.GetActiveCamera(), camera)
-        matrix = vtk.vtkMatrix4x4()
-        matrix.DeepCopy(camera.model_transform.ravel().tolist())
-        self._volume.SetUserMatrix(matrix)
-        self._renderer.ResetCameraClippingRange()
-
 
 class VTKBaseline(OffScreenVolume):
     """One volume in one of VTK's mappers, "gpu" or "fixed_point", in an off-screen window.
@@ -115,10 +112,18 @@ class VTKBaseline(OffScreenVolume):
     ) -> None:
         if mapper not in MAPPERS:
             raise InvalidArgumentError(f"mapper must be one of {MAPPERS}; got {mapper!r}")
-        actor = vtk.vtkVolume()
         from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 
-        self._mapper = _make_mapper(mapper)
+        actor = vtk.vtkVolume()
+        opengl = vtk.vtkRenderingVolumeOpenGL2  # without it the other mapper crashes, too
+        if mapper == "gpu":
+            self._mapper = opengl.vtkOpenGLGPUVolumeRayCastMapper()
+            self._mapper.SetUseJittering(False)
+        else:
+            self._mapper = vtk.vtkFixedPointVolumeRayCastMapper()
+        self._mapper.SetAutoAdjustSampleDistances(False)
+        self._mapper.SetLockSampleDistanceToInputSpacing(False)
+        self.set_image_sample_distance(1.0)
         self._mapper.SetInputData(volume_to_image(volume))
         self.set_sample_distance(sample_distance)
         actor.SetMapper(self._mapper)
@@ -169,19 +174,6 @@ def add_volume_property(volume: Volume, arguments: Mapping[str, Any]) -> Any:
         plotter.close()
     prop.SetInterpolationType(interpolation == "linear")  # VTK_NEAREST_INTERPOLATION is 0
     return prop
-
-
-def _make_mapper(name: str) -> Any:
-    opengl = vtk.vtkRenderingVolumeOpenGL2  # without it the other mapper crashes, too
-    if name == "gpu":
-        mapper = opengl.vtkOpenGLGPUVolumeRayCastMapper()
-        mapper.SetUseJittering(False)
-    else:
-        mapper = vtk.vtkFixedPointVolumeRayCastMapper()
-    mapper.SetAutoAdjustSampleDistances(False)
-    mapper.SetLockSampleDistanceToInputSpacing(False)
-    mapper.SetImageSampleDistance(1.0)
-    return mapper
 
 
 def _off_screen_window(size: tuple[int, int]) -> Any:

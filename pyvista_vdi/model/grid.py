@@ -14,6 +14,7 @@ class Geometry:
     spacing: tuple[float, float, float]
     origin: tuple[float, float, float]
     direction: NDArray[np.float64]
+    #: Number of points along x, y and z.
     dimensions: tuple[int, int, int]
     #: What the opacity unit distance is by default, if not that of these points: a level of a
     #: multi-scale store has the finest level's, so that all levels look the same; model units.

@@ -18,100 +18,67 @@ from pyvista_vdi.errors import InvalidArgumentError
 _ENTRIES = 256
 
 
-class _Points(NamedTuple):
-    """Control points of one look: (value, colour as #rrggbb, opacity of a voxel), values rising."""
+class _Look(NamedTuple):
+    """What one look shows, and its control points: value, colour, opacity of a voxel."""
 
     shows: str
-    points: tuple[tuple[float, str, float], ...]
     in_hounsfield: bool
+    points: str
+
+    @property
+    def nodes(self) -> list[tuple[float, str, float]]:
+        """The control points, values rising."""
+        found = (point.split() for point in self.points.split(", "))
+        return [(float(value), color, float(opacity)) for value, color, opacity in found]
 
 
-_POINTS = {
-    "ct-bone": _Points(
+_LOOKS = {
+    "ct-bone": _Look(
         "bone alone",
-        ((150, "#a0522d", 0), (300, "#d9a577", 0.1), (700, "#f2e3c6", 0.5), (1600, "#ffffff", 0.9)),
         True,
+        "150 #a0522d 0, 300 #d9a577 0.1, 700 #f2e3c6 0.5, 1600 #ffffff 0.9",
     ),
-    "ct-skin": _Points(
+    "ct-skin": _Look(
         "the surface against air",
-        (
-            (-500, "#8a5a44", 0),
-            (-250, "#d9a184", 0.2),
-            (0, "#eec0a4", 0.5),
-            (400, "#f7ead9", 0.7),
-            (1500, "#ffffff", 0.9),
-        ),
         True,
+        "-500 #8a5a44 0, -250 #d9a184 0.2, 0 #eec0a4 0.5, 400 #f7ead9 0.7, 1500 #ffffff 0.9",
     ),
-    "ct-muscle": _Points(
+    "ct-muscle": _Look(
         "muscle, faintly, around bone",
-        (
-            (-20, "#7a2a20", 0),
-            (30, "#b5493a", 0.1),
-            (80, "#cf6a55", 0.16),
-            (180, "#dfa97c", 0.12),
-            (600, "#f2e3c6", 0.5),
-            (1500, "#ffffff", 0.9),
-        ),
         True,
+        "-20 #7a2a20 0, 30 #b5493a 0.1, 80 #cf6a55 0.16, "
+        "180 #dfa97c 0.12, 600 #f2e3c6 0.5, 1500 #ffffff 0.9",
     ),
-    "ct-angiography": _Points(
+    "ct-angiography": _Look(
         "vessels filled with contrast medium, and bone",
-        (
-            (130, "#5c0a0a", 0),
-            (220, "#b01818", 0.15),
-            (350, "#e8442e", 0.5),
-            (600, "#f2d7b8", 0.4),
-            (1500, "#ffffff", 0.7),
-        ),
         True,
+        "130 #5c0a0a 0, 220 #b01818 0.15, 350 #e8442e 0.5, 600 #f2d7b8 0.4, 1500 #ffffff 0.7",
     ),
-    "mri-brain": _Points(
+    "mri-brain": _Look(
         "a brain whose skull has been removed",
-        (
-            (0.25, "#5e3c3a", 0),
-            (0.4, "#a67f78", 0.15),
-            (0.6, "#d8bfb4", 0.5),
-            (1.0, "#fff6ec", 0.9),
-        ),
         False,
+        "0.25 #5e3c3a 0, 0.4 #a67f78 0.15, 0.6 #d8bfb4 0.5, 1 #fff6ec 0.9",
     ),
-    "mri-skin": _Points(
+    "mri-skin": _Look(
         "the surface of whatever gives signal",
-        (
-            (0.08, "#7a4b3a", 0),
-            (0.2, "#c98e74", 0.35),
-            (0.5, "#eec0a4", 0.7),
-            (1.0, "#fff4ea", 0.9),
-        ),
         False,
+        "0.08 #7a4b3a 0, 0.2 #c98e74 0.35, 0.5 #eec0a4 0.7, 1 #fff4ea 0.9",
     ),
-    "mri-muscle": _Points(
+    "mri-muscle": _Look(
         "tissue of middling signal, translucent",
-        (
-            (0.15, "#4a1512", 0),
-            (0.35, "#93372b", 0.05),
-            (0.55, "#c4604a", 0.1),
-            (0.75, "#e6b59c", 0.03),
-            (1.0, "#fff4ea", 0.02),
-        ),
         False,
+        "0.15 #4a1512 0, 0.35 #93372b 0.05, 0.55 #c4604a 0.1, 0.75 #e6b59c 0.03, 1 #fff4ea 0.02",
     ),
-    "mri-angiography": _Points(
+    "mri-angiography": _Look(
         "the brightest signal: blood that flows, in time-of-flight scans",
-        (
-            (0.55, "#5c0a0a", 0),
-            (0.7, "#c02020", 0.2),
-            (0.85, "#f06040", 0.6),
-            (1.0, "#ffd9b8", 0.9),
-        ),
         False,
+        "0.55 #5c0a0a 0, 0.7 #c02020 0.2, 0.85 #f06040 0.6, 1 #ffd9b8 0.9",
     ),
 }
 
 
-def _arguments(look: _Points) -> dict[str, Any]:
-    values, colors, opacities = zip(*look.points, strict=True)
+def _arguments(look: _Look) -> dict[str, Any]:
+    values, colors, opacities = zip(*look.nodes, strict=True)
     rgb = [[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in colors]
     first = values[0] if look.in_hounsfield else 0.0
     at = np.linspace(first, values[-1], _ENTRIES)
@@ -142,32 +109,29 @@ class Presets(Mapping[str, dict[str, Any]]):
 
     def __getitem__(self, name: str) -> dict[str, Any]:
         try:
-            return _arguments(_POINTS[name])
+            return _arguments(_LOOKS[name])
         except (KeyError, TypeError):
-            near = difflib.get_close_matches(str(name), _POINTS, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_POINTS)}"
+            near = difflib.get_close_matches(str(name), _LOOKS, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_LOOKS)}"
             raise InvalidArgumentError(f"no preset is called {name!r}: {hint}") from None
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and name in _POINTS
+        return isinstance(name, str) and name in _LOOKS
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_POINTS)
+        return iter(_LOOKS)
 
     def __len__(self) -> int:
-        return len(_POINTS)
+        return len(_LOOKS)
 
     def __repr__(self) -> str:
-        width = max(map(len, _POINTS))
+        width = max(map(len, _LOOKS))
         lines = []
-        for name, look in _POINTS.items():
-            low, high = look.points[0][0], look.points[-1][0]
-            unit = (
-                f"{low:g} to {high:g} HU"
-                if look.in_hounsfield
-                else f"from {low:.0%} of the range of values"
-            )
-            lines.append(f"{name:{width}}  {look.shows}; {unit}")
+        for name, look in _LOOKS.items():
+            low, high = look.nodes[0][0], look.nodes[-1][0]
+            share = f"from {low:.0%} of the range of values"
+            values = f"{low:g} to {high:g} HU" if look.in_hounsfield else share
+            lines.append(f"{name:{width}}  {look.shows}; {values}")
         return "\n".join(lines)
 
 

@@ -82,6 +82,8 @@ class Volume(Geometry):
         blanked: ArrayLike | None = None,
     ) -> None:
         self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
+        nz, ny, nx = self.array.shape[:3]
+        self.dimensions = nx, ny, nz
         self.spacing = _checked_vector("spacing", spacing)
         self.origin = _checked_vector("origin", origin)
         matrix = np.eye(3) if direction is None else as_floats(direction)
@@ -113,12 +115,6 @@ class Volume(Geometry):
                 "apart: pictures are off by that share of a voxel; move its origin, and the "
                 "camera with it, towards 0"
             )
-
-    @property
-    def dimensions(self) -> tuple[int, int, int]:  # type: ignore[override]
-        """Number of points along x, y and z."""
-        nz, ny, nx = self.array.shape[:3]
-        return nx, ny, nz
 
     @property
     def rgba(self) -> bool:

@@ -131,13 +131,11 @@ def _messages_of(reader: Any) -> list[str]:
     def note(_reader: Any, _event: str, message: str) -> None:
         messages.append(message)
 
-    def pass_over(_reader: Any, _event: str) -> None:
-        """Warnings are about what is set right here."""
-
     note.CallDataType = "string0"  # type: ignore[attr-defined]
     for source in (reader, reader.GetExecutive()):
         source.AddObserver("ErrorEvent", note)
-        source.AddObserver("WarningEvent", pass_over)
+        # Warnings are about what is set right here
+        source.AddObserver("WarningEvent", lambda _reader, _event: None)
     return messages
 
 
@@ -150,21 +148,19 @@ def _read_whole(reader: Any, file: Path) -> pv.ImageData:
     """Read by a reader of VTK, and raise what it would only print."""
     messages = _messages_of(reader)
     reader.Update()
-    if messages or reader.GetErrorCode():
-        raise _refusal(messages[0] if messages else _code(reader), file)
+    if code := reader.GetErrorCode():
+        try:
+            from pyvista_vdi.vtk_pipeline.vtk import vtkErrorCode
+
+            messages.append(str(vtkErrorCode.GetStringFromErrorCode(code)))
+        except ImportError:  # as in cvista
+            messages.append(f"VTK's error {code}")
+    if messages:
+        raise _refusal(messages[0], file)
     data = pv.wrap(reader.GetOutput())
     if data.n_points == 0 or data.active_scalars is None:
         raise InvalidVolumeError(f"{file} holds no scalars that VTK could read")
     return data
-
-
-def _code(reader: Any) -> str:
-    code = reader.GetErrorCode()
-    try:
-        from pyvista_vdi.vtk_pipeline.vtk import vtkErrorCode
-    except ImportError:  # as in cvista
-        return f"VTK's error {code}"
-    return str(vtkErrorCode.GetStringFromErrorCode(code))
 
 
 def _place(data: pv.ImageData, to_world: NDArray[np.float64], file: Path) -> pv.ImageData:

@@ -232,19 +232,10 @@ class FrameRateController:
             return
         self._durations.append(max(work, seconds))
         self._trial = max(0, self._trial - 1)
-        self._learn(_Frame(samples, work, max(0.0, seconds - work)))
-
-    def rest(self) -> None:
-        """End the interaction: its rate is forgotten, what samples cost and the choice are not."""
-        self._durations.clear()
-        self._doubtful = None
-        self._full_excess, self._trial = 1.0, 0
-
-    def _learn(self, frame: _Frame) -> None:
-        """Keep the frames that tell what the next one will cost."""
+        frame = _Frame(samples, work, max(0.0, seconds - work))
         # Set a stall aside until the next frame confirms it
         if self._frames:
-            expected = self._cost().of(frame.samples)
+            expected = self._cost().of(samples)
             if not 1 / _STALL <= frame.seconds / expected <= _STALL:
                 before, self._doubtful = self._doubtful, frame
                 if before is None or (before.seconds > expected) != (frame.seconds > expected):
@@ -252,6 +243,12 @@ class FrameRateController:
                 self._frames = [before]
         self._doubtful = None
         self._frames = [*self._frames, frame][-_MEMORY:]
+
+    def rest(self) -> None:
+        """End the interaction: its rate is forgotten, what samples cost and the choice are not."""
+        self._durations.clear()
+        self._doubtful = None
+        self._full_excess, self._trial = 1.0, 0
 
     def _cost(self) -> _Cost:
         """Return what the next frame is expected to cost: a line's next point if there is one."""

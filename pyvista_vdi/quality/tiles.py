@@ -144,14 +144,31 @@ class Cells:
         The loss of the coarse pictures' own SSIM, and the root of the detail that is to be seen:
         contrast between neighbours in either picture, and the pictures' difference.
         """
+        from skimage.metrics import structural_similarity  # loads SciPy
+
         contrast = np.maximum(_contrast(old), _contrast(new))
         detail = contrast + _DIFFERENCE_WEIGHT * np.abs(old - new).max(axis=2)
-        return np.asarray(self._averages(_coarse_loss(old, new)) + np.sqrt(self._averages(detail)))
+        loss = np.zeros(old.shape[:2])
+        if min(loss.shape) >= _COARSE_WINDOW:
+            _, ssim = structural_similarity(old, new, full=True, **_COARSE_SSIM)
+            loss = np.maximum(1.0 - ssim.mean(axis=2), 0.0)  # never below 0, but for rounding
+        return np.asarray(self._averages(loss) + np.sqrt(self._averages(detail)))
 
     def sample(self, guess: Floats, tiles: int) -> TileSample:
         """Return ``tiles`` of them, or all, the likelier the more of the loss a cell is guessed."""
-        n = len(self.corners)
-        chances = _chances(guess, min(tiles, n))
+        n, mean = len(self.corners), guess.mean()
+        # Give each cell a chance in proportion to its weight; what is beyond 1 is certain
+        weight = _EVEN_SHARE + (1 - _EVEN_SHARE) * guess / mean if mean > 0 else np.ones(n)
+        chances, certain = np.ones(n), np.zeros(n, dtype=bool)
+        while not certain.all():
+            left = min(tiles, n) - np.count_nonzero(certain)
+            chances[~certain] = left * weight[~certain] / weight[~certain].sum()
+            beyond = ~certain & (chances >= 1)
+            if not beyond.any():
+                break
+            chances[beyond] = 1.0
+            certain |= beyond
+        # Sample systematically along the curve
         turns = np.floor(np.concatenate([[0.0], np.cumsum(chances)]) + 0.5)
         chosen = np.flatnonzero(np.diff(turns) > 0)
         return TileSample(
@@ -165,13 +182,16 @@ class Cells:
 
     def _averages(self, coarse: Floats) -> Floats:
         """Mean over each cell of values at coarse pixels of the region, float64 (n,)."""
-        across, down = (
-            _overlaps(*along)
-            for along in zip(
-                self._starts, self._edges, self._region.first, coarse.shape[::-1], strict=True
-            )
-        )
-        column, row = self._order.T
+        # Find the shares of coarse pixels in cells along each axis; those of a cell add up to 1
+        shares = []
+        axes = zip(self._starts, self._edges, self._region.first, coarse.shape[::-1], strict=True)
+        for starts, edge, first, count in axes:
+            begin = first + COARSE * np.arange(count)
+            low = np.maximum(begin[None], starts[:, None])
+            high = np.minimum(begin[None] + COARSE, starts[:, None] + edge)
+            share = np.maximum(high - low, 0.0)
+            shares.append(share / share.sum(axis=1, keepdims=True))
+        (across, down), (column, row) = shares, self._order.T
         return np.asarray((down @ coarse @ across.T)[row, column])
 
 
@@ -239,15 +259,6 @@ def _along_curve(columns: int, rows: int) -> NDArray[np.int64]:
     return np.asarray(cells[np.argsort(place)])
 
 
-def _overlaps(starts: NDArray[np.int64], edge: int, first: int, count: int) -> Floats:
-    """Shares of coarse pixels in cells along one axis, float64 (cells, count), rows sum to 1."""
-    begin = first + COARSE * np.arange(count)
-    low = np.maximum(begin[None], starts[:, None])
-    high = np.minimum(begin[None] + COARSE, starts[:, None] + edge)
-    share = np.maximum(high - low, 0.0)
-    return np.asarray(share / share.sum(axis=1, keepdims=True))
-
-
 def _contrast(picture: Floats) -> Floats:
     """Largest difference of a channel from the four neighbours, float64 (rows, columns)."""
     contrast = np.zeros(picture.shape[:2])
@@ -261,31 +272,3 @@ def _contrast(picture: Floats) -> Floats:
     ):
         np.maximum(part, difference, out=part)
     return contrast
-
-
-def _coarse_loss(old: Floats, new: Floats) -> Floats:
-    """1 - SSIM around each coarse pixel, float64 (rows, columns); 0 where there are too few."""
-    from skimage.metrics import structural_similarity  # loads SciPy
-
-    if min(old.shape[:2]) < _COARSE_WINDOW:
-        return np.zeros(old.shape[:2])
-    _, ssim = structural_similarity(old, new, full=True, **_COARSE_SSIM)
-    # SSIM is never above 1, but for rounding
-    return np.asarray(np.maximum(1.0 - ssim.mean(axis=2), 0.0))
-
-
-def _chances(guess: Floats, tiles: int) -> Floats:
-    """Probability of each cell to be chosen, float64 (n,), that add up to ``tiles``."""
-    mean = guess.mean()
-    weight = _EVEN_SHARE + (1 - _EVEN_SHARE) * guess / mean if mean > 0 else np.ones(len(guess))
-    chances = np.ones(len(guess))
-    certain = np.zeros(len(guess), dtype=bool)  # to be chosen
-    while not certain.all():
-        left = tiles - np.count_nonzero(certain)
-        chances[~certain] = left * weight[~certain] / weight[~certain].sum()
-        beyond = ~certain & (chances >= 1)
-        if not beyond.any():
-            break
-        chances[beyond] = 1.0
-        certain |= beyond
-    return chances

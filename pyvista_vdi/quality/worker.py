@@ -109,32 +109,29 @@ class Worker:
             thread.join()
 
     def _run(self) -> None:
-        while (job := self._next_job()) is not None:
+        """Do jobs as long as there is one that is still to be done."""
+        while True:
+            with self._lock:
+                self._working = self.running
+                job = self.job
+                if job is None or not self._working:
+                    return
             self._do(job)
 
-    def _next_job(self) -> Job | None:
-        """Return the job if it is still to be done; otherwise the thread ends."""
-        with self._lock:
-            self._working = self.running
-            return self.job if self._working else None
-
     def _do(self, job: Job) -> None:
+        made, failed = None, None
         try:
             made = job.done()
         except Cancelled:
             return
         except BaseException as error:  # take() raises it where somebody can act on it
             traceback.clear_frames(error.__traceback__)  # they hold buffers
-            self._lay_down(job, None, error)
-        else:
-            self._lay_down(job, made, None)
-
-    def _lay_down(self, job: Job, made: Any, error: BaseException | None) -> None:
-        """Keep what became of a job, unless it is out of date."""
+            failed = error
+        # Keep what became of the job, unless it is out of date
         with self._lock:
             if job is not self.job:
                 return
-            self._made, self._error = made, error
+            self._made, self._error = made, failed
         notify = self._notify()
         if notify is not None:
             notify()

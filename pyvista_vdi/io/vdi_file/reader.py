@@ -6,7 +6,6 @@ import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -347,11 +346,27 @@ class _OpenFile:
         # Where a CPU device uses them in place
         media = {name: aligned_empty(n, "<f4") for name in names}
         media["color"] = aligned_empty((n, *color.row_shape), color.dtype)
-        decode_depths = _DEPTHS[self.info.format_version]
 
         def decode(first: int, last: int) -> None:
             rows = {name: array[first:last] for name, array in media.items()}
-            decode_depths(packed, first, rows["front"], rows["back"])
+            front, back = rows["front"], rows["back"]
+            if self.info.format_version == 1:
+                # Decode (front, back), each bit pattern less the one before
+                depth = packed["depth"]
+                stored = np.empty((len(front), 2), depth.layout.dtype)
+                depth.read(first, stored)
+                if depth.layout.filter == "difference":
+                    np.cumsum(stored, dtype=np.uint32, out=stored.reshape(-1))
+                front[:], back[:] = stored.view(np.float32).T
+            else:
+                packed["front"].read(first, front)
+                packed["back"].read(first, back)
+                if packed["back"].layout.filter == "difference":
+                    # Decode fronts less the back before them, and backs less their own fronts
+                    gap, thickness = front.view(np.uint32), back.view(np.uint32).copy()
+                    gap += thickness
+                    np.cumsum(gap, dtype=np.uint32, out=back.view(np.uint32))
+                    np.subtract(back.view(np.uint32), thickness, out=gap)
             for name in ("color", "optical_depth"):
                 packed[name].read(first, rows[name])
 
@@ -387,36 +402,38 @@ class _OpenFile:
 
     def _packed(self) -> dict[str, PackedArray]:
         """Return the arrays as the file holds them, their chunks known and possible."""
-        if self.info.format_version == 1:
-            return {name: self._packed_whole(name) for name in self._layouts}
-        return self._packed_in_place()
-
-    def _packed_whole(self, name: str) -> PackedArray:
-        """Return an array of version 1, whose member is read and checked as a whole."""
-        layout, codec = self._layouts[name], self.info.codec
-        data = self._read_member(name, self.info.file_bytes)
-        view = memoryview(data)
-        try:
-            sizes = chunk_sizes(data, layout, codec)
-        except DamagedChunkError as error:
-            self._refuse(f"array {name!r}: {error}")
-        return PackedArray(
-            name, layout, codec, sizes, len(data), lambda _, begin, end: view[begin:end]
-        )
-
-    def _packed_in_place(self) -> dict[str, PackedArray]:
-        """Return the arrays of which every chunk is read from the file when it is decoded."""
+        info, packed = self.info, {}
+        if info.format_version == 1:
+            # Read and check each member as a whole; the chunks' own headers say how long they are
+            for name, layout in self._layouts.items():
+                data = self._read_member(name, info.file_bytes)
+                try:
+                    sizes = chunk_sizes(data, layout, info.codec)
+                except DamagedChunkError as error:
+                    self._refuse(f"array {name!r}: {error}")
+                cut = partial(lambda view, _, begin, end: view[begin:end], memoryview(data))
+                packed[name] = PackedArray(name, layout, info.codec, sizes, len(data), cut)
+            return packed
+        # Read the index; every chunk is read from the file when it is decoded
         n_chunks = sum(layout.n_chunks for layout in self._layouts.values())
-        content = self._read_member(INDEX, self.info.file_bytes)
+        content = self._read_member(INDEX, info.file_bytes)
         if len(content) != n_chunks * INDEX_DTYPE.itemsize:
             self._refuse(f"its member {INDEX!r} has {len(content)} bytes for {n_chunks} chunks")
-        index, packed, lock = np.frombuffer(content, INDEX_DTYPE), {}, Lock()
+        index, lock = np.frombuffer(content, INDEX_DTYPE), Lock()
         for name, layout in self._layouts.items():
             rows, index = index[: layout.n_chunks], index[layout.n_chunks :]
-            member = self._member(name, self.info.file_bytes)
-            fetch = partial(self._fetch, lock, self._data_start(member), rows["crc32"].tolist())
+            member = self._member(name, info.file_bytes)
+            # Find where its data begin: behind its local header, which must name it
+            self._stream.seek(member.header_offset)
+            header = self._stream.read(_LOCAL_HEADER.size).ljust(_LOCAL_HEADER.size, b"\0")
+            signature, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(header)
+            named = self._stream.read(name_bytes)
+            if signature != _SIGNATURE or named != member.filename.encode():
+                self._refuse(f"its member {member.filename!r} is not where its directory says")
+            start = self._stream.tell() + int(extra_bytes)
+            fetch = partial(self._fetch, lock, start, rows["crc32"].tolist())
             packed[name] = PackedArray(
-                name, layout, self.info.codec, rows["bytes"], member.file_size, fetch
+                name, layout, info.codec, rows["bytes"], member.file_size, fetch
             )
         return packed
 
@@ -430,18 +447,6 @@ class _OpenFile:
         if zlib.crc32(chunk) != checksums[k]:
             raise DamagedChunkError(f"chunk {k} is not what was written: its checksum differs")
         return chunk
-
-    def _data_start(self, member: zipfile.ZipInfo) -> int:
-        """Return where a member's data begin: behind its local header, which must name it."""
-        self._stream.seek(member.header_offset)
-        header = self._stream.read(_LOCAL_HEADER.size)
-        if len(header) < _LOCAL_HEADER.size:
-            self._refuse(f"its member {member.filename!r} is not where its directory says")
-        signature, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(header)
-        name = self._stream.read(name_bytes)
-        if signature != _SIGNATURE or name != member.filename.encode():
-            self._refuse(f"its member {member.filename!r} is not where its directory says")
-        return self._stream.tell() + int(extra_bytes)
 
     def _member(self, name: str, limit: int) -> zipfile.ZipInfo:
         """Return where a member is, which must be stored plainly and no longer than ``limit``."""
@@ -468,39 +473,3 @@ class _OpenFile:
 
     def _refuse(self, why: str) -> NoReturn:
         raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
-
-
-def _decode_depths_1(
-    packed: Mapping[str, PackedArray],
-    first: int,
-    front: NDArray[np.float32],
-    back: NDArray[np.float32],
-) -> None:
-    """Decode a chunk of version 1: (front, back), each bit pattern less the one before."""
-    depth = packed["depth"]
-    stored = np.empty((len(front), 2), depth.layout.dtype)
-    depth.read(first, stored)
-    if depth.layout.filter == "difference":
-        np.cumsum(stored, dtype=np.uint32, out=stored.reshape(-1))
-    pairs = stored.view(np.float32)
-    front[:], back[:] = pairs[:, 0], pairs[:, 1]
-
-
-def _decode_depths_2(
-    packed: Mapping[str, PackedArray],
-    first: int,
-    front: NDArray[np.float32],
-    back: NDArray[np.float32],
-) -> None:
-    """Decode a chunk of version 2: front less the back before it, back less its own front."""
-    packed["front"].read(first, front)
-    packed["back"].read(first, back)
-    if packed["back"].layout.filter == "difference":
-        gap, thickness = front.view(np.uint32), back.view(np.uint32).copy()
-        gap += thickness
-        np.cumsum(gap, dtype=np.uint32, out=back.view(np.uint32))
-        np.subtract(back.view(np.uint32), thickness, out=gap)
-
-
-#: How each version of the format stores the depths of a chunk.
-_DEPTHS = {1: _decode_depths_1, 2: _decode_depths_2, 3: _decode_depths_2, 4: _decode_depths_2}

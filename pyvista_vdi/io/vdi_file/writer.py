@@ -97,26 +97,18 @@ def write_to(
     done = Pieces(progress, sum(layout.n_chunks for layout in arrays.values()))
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_member(DESCRIPTION), description)
-        if coarse and compression == DEFLATE and _has_coarse(vdi):
-            archive.writestr(_member(COARSE), _coarse(vdi, effort))
+        shrinks = min(vdi.window_size) >= COARSE_STEP and int(vdi.counts.max()) <= DEPTH_CODES
+        if coarse and compression == DEFLATE and shrinks:
+            small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
+            few = io.BytesIO()
+            write_to(few, small, DEFLATE, effort, coarse=False)
+            archive.writestr(_member(COARSE), few.getvalue())
         index: list[tuple[int, int]] = []
         for name, layout in arrays.items():
             with archive.open(_member(name), "w", force_zip64=True) as member:
                 encoded = _encoder(name, layout, vdi, counts)
                 index += write_chunks(member, layout, compression, effort, encoded, done)
         archive.writestr(_member(INDEX), np.array(index, INDEX_DTYPE).tobytes())
-
-
-def _has_coarse(vdi: VDI) -> bool:
-    return min(vdi.window_size) >= COARSE_STEP and int(vdi.counts.max()) <= DEPTH_CODES
-
-
-def _coarse(vdi: VDI, level: int) -> bytes:
-    """Return the bytes of a file of fewer lists."""
-    stream = io.BytesIO()
-    small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
-    write_to(stream, small, DEFLATE, level, coarse=False)
-    return stream.getvalue()
 
 
 def _member(name: str) -> zipfile.ZipInfo:
@@ -171,25 +163,19 @@ def _encoder(
 
         return encoded
     if layout.filter == "difference":
-        encode = {"front": _gaps, "back": _thicknesses}[name]
+        # Bit patterns modulo 2**32, exact: of fronts less those of the backs before (the first as
+        # it stands, 0 where supersegments touch), and of backs less those of their fronts
         front, back = vdi.front.view(np.uint32), vdi.back.view(np.uint32)
-        return lambda first, last: encode(front[first:last], back[first:last])
+
+        def differences(first: int, last: int) -> NDArray[Any]:
+            if name == "back":
+                return np.subtract(back[first:last], front[first:last]).astype("<u4", copy=False)
+            gaps = front[first:last].astype("<u4")
+            gaps[1:] -= back[first : last - 1]
+            return gaps
+
+        return differences
     array = counts if name == "counts" else getattr(vdi, name)
     if isinstance(vdi.packing, Packed16) and name == "color":
         array = vdi.packing.color
     return lambda first, last: np.ascontiguousarray(array[first:last], dtype=layout.dtype)
-
-
-def _gaps(front: NDArray[np.uint32], back: NDArray[np.uint32]) -> NDArray[Any]:
-    """Return bit patterns of fronts less those of the backs before; 0 where supersegments touch.
-
-    Taken modulo 2**32 they are exact. The first stands as it is.
-    """
-    gaps = front.astype("<u4")
-    gaps[1:] -= back[:-1]
-    return gaps
-
-
-def _thicknesses(front: NDArray[np.uint32], back: NDArray[np.uint32]) -> NDArray[Any]:
-    """Return bit patterns of backs less those of their fronts, modulo 2**32."""
-    return np.subtract(back, front).astype("<u4", copy=False)

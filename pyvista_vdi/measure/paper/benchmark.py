@@ -13,6 +13,8 @@ from functools import partial
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure import harness
@@ -35,7 +37,6 @@ from pyvista_vdi.measure.paper.datasets import (
     Dataset,
     find_dataset,
     label_of,
-    require_allocation,
 )
 from pyvista_vdi.measure.paper.report import paper_targets
 from pyvista_vdi.measure.results import Results
@@ -220,9 +221,13 @@ class _Rows:
     def _load(self, name: str) -> tuple[Volume, float]:
         self._vdis.close()
         self._benches.close()  # two volumes at a time may be too many
-        require_allocation(self._runtime, self._datasets[name])
+        dataset = self._datasets[name]
+        if dataset.nbytes is not None:
+            # Refuse a volume that no buffer of the device can hold, before it is made
+            with self._runtime.buffer((dataset.nbytes,), np.uint8, f"volume {name!r}"):
+                pass
         begin = time.perf_counter()
-        return self._datasets[name].load(), time.perf_counter() - begin
+        return dataset.load(), time.perf_counter() - begin
 
     def _bench(self, name: str, size: tuple[int, int]) -> Bench:
         volume, _ = self._volumes(name)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi import examples
-from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
@@ -54,17 +53,14 @@ _LOOKS = {
 
 def look(name: str, scalar_range: tuple[float, float], interpolation: str) -> TransferFunction:
     """Return a transfer function by its name: a key of the opacities above."""
-    return TransferFunction(
-        np.stack([_resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1),
-        _resampled(_OPACITIES[name]),
-        scalar_range,
-        interpolation=interpolation,
-    )
 
+    def resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
+        at = np.linspace(0, len(nodes) - 1, _ENTRIES)
+        return np.interp(at, np.arange(len(nodes)), nodes)
 
-def _resampled(nodes: tuple[float, ...]) -> NDArray[np.float64]:
-    at = np.linspace(0, len(nodes) - 1, _ENTRIES)
-    return np.interp(at, np.arange(len(nodes)), nodes)
+    colors = np.stack([resampled(channel) for channel in zip(*_COLORS, strict=True)], axis=1)
+    opacities = resampled(_OPACITIES[name])
+    return TransferFunction(colors, opacities, scalar_range, interpolation=interpolation)
 
 
 @dataclass(frozen=True)
@@ -114,8 +110,27 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
     it along each edge; or a file, as ``FILE`` or as ``NAME=FILE``, where a NAME of ``kingsnake``,
     ``beechnut`` or ``richtmyer_meshkov`` says which of the paper's it is.
     """
-    if name.partition("@")[0] in PROCEDURAL:
-        return _procedural(name, seed)
+    base, at, text = name.partition("@")
+    if base in PROCEDURAL:
+        if at and not (text.isdecimal() and 1 <= int(text) <= 128):
+            raise InvalidArgumentError(
+                f"{name!r} does not say how much smaller: write a whole number from 1 to 128 "
+                "behind the @, as in kingsnake_like@4"
+            )
+        kind, factor = PROCEDURAL[base], int(text or 1)
+        nbytes = kind.nbytes(factor)
+
+        def create() -> Volume:
+            size = " x ".join(str(n) for n in kind.reduced(factor))
+            require_free_memory(
+                nbytes + _WORKING_BYTES,
+                f"making the volume {name!r}, {size} of {kind.dtype},",
+                f"take '{base}@{2 * factor}', half as large along each edge, or another machine",
+            )
+            return make(kind, factor, seed, name)
+
+        made, looks = f"{kind.description} (made from seed {seed})", _LOOKS[kind.paper]
+        return Dataset(name, "procedural", kind.paper, made, looks, nbytes, create)
     if name in examples.VOLUMES:
         described = examples.VOLUMES[name].description
         load = partial(examples.load_data, name, as_volume=True)
@@ -129,11 +144,10 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
         )
     paper = label if label in _LOOKS else None
     looks = _LOOKS.get(label, "ramp")
-
-    def read() -> Volume:
-        return as_volume(read_file(file), None, "point")
-
-    return Dataset(label, "file", paper, file.name, looks, None, read)
+    return Dataset(
+        *(label, "file", paper, file.name, looks, None),
+        lambda: as_volume(read_file(file), None, "point"),
+    )
 
 
 def label_of(name: str) -> str:
@@ -149,33 +163,3 @@ def _named_file(name: str) -> tuple[str, Path]:
     if not equals or os.path.exists(name):  # noqa: PTH110 - as above
         label, path = "", name
     return label or Path(path).name.split(".")[0], Path(path)
-
-
-def _procedural(name: str, seed: int) -> Dataset:
-    base, at, text = name.partition("@")
-    if at and not (text.isdecimal() and 1 <= int(text) <= 128):
-        raise InvalidArgumentError(
-            f"{name!r} does not say how much smaller: write a whole number from 1 to 128 behind "
-            "the @, as in kingsnake_like@4"
-        )
-    kind, factor = PROCEDURAL[base], int(text or 1)
-    nbytes = kind.nbytes(factor)
-    size = " x ".join(str(n) for n in kind.reduced(factor))
-
-    def load() -> Volume:
-        require_free_memory(
-            nbytes + _WORKING_BYTES,
-            f"making the volume {name!r}, {size} of {kind.dtype},",
-            f"take '{base}@{2 * factor}', half as large along each edge, or another machine",
-        )
-        return make(kind, factor, seed, name)
-
-    description = f"{kind.description} (made from seed {seed})"
-    return Dataset(name, "procedural", kind.paper, description, _LOOKS[kind.paper], nbytes, load)
-
-
-def require_allocation(runtime: Runtime, dataset: Dataset) -> None:
-    """Raise the engine's error for a volume that no buffer of the device can hold."""
-    if dataset.nbytes is not None:
-        with runtime.buffer((dataset.nbytes,), np.uint8, f"volume {dataset.name!r}"):
-            pass

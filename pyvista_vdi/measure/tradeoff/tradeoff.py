@@ -37,7 +37,6 @@ from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
@@ -288,7 +287,13 @@ class _Rows:
             tolerance=generated.tolerance,
             view_cone=generated.view_cone,
         )
-        sizes = {precision: _sizes(bench, made[precision]) for precision in precisions}
+        sizes: dict[str, dict[str, Any]] = {}
+        for precision in precisions:
+            vdi, told = made[precision], sizes_of(made[precision])
+            names = ("supersegments", "mean_length", "longest_list", "bytes_saved")
+            memory = prepared_vdi(bench.runtime, vdi).list_bytes
+            sizes[precision] = {"window_size": vdi.window_size, "bytes_memory": memory}
+            sizes[precision] |= {name: told[name] for name in names}
         found: dict[Setting, dict[str, Any]] = {
             setting: {
                 "vdi": sizes[setting.precision],
@@ -326,13 +331,6 @@ class _Rows:
                     }
                 )
         return found
-
-
-def _sizes(bench: Bench, vdi: VDI) -> dict[str, Any]:
-    names = ("supersegments", "mean_length", "longest_list", "bytes_saved")
-    found = {name: value for name, value in sizes_of(vdi).items() if name in names}
-    memory = prepared_vdi(bench.runtime, vdi).list_bytes
-    return {"window_size": vdi.window_size, "bytes_memory": memory, **found}
 
 
 def _share(size: tuple[int, int], edge: float) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.render_mode import RenderMode, rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
-from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
+from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Cost, WindowClock
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTK_FLOAT,
@@ -146,7 +146,7 @@ class Frame:
     def view(self) -> View:
         """The renderer's view, between the two eyes of a stereo pair if there are."""
         try:
-            return View.of(self.renderer, self.model_transform)
+            return renderer_view(self.renderer, self.model_transform)
         except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
             return View(self.camera, self.size)
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.model import view as model_view
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.view import View as View
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Held
 from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference
 
@@ -47,16 +46,11 @@ def camera_of(camera: Any, model_transform: ArrayLike | None = None) -> Camera:
     return view.replace(model_transform=on_top @ view.model_transform)
 
 
-@dataclass(frozen=True)
-class View(model_view.View):
-    """A view that a renderer shows."""
-
-    @classmethod
-    def of(cls, renderer: Any, model_transform: NDArray[np.float64]) -> View:
-        """Return what a renderer shows an actor from; UnsupportedError where no VDI can be."""
-        camera = camera_of(renderer.GetActiveCamera(), model_transform)
-        width, height = renderer.GetSize()
-        return cls(camera, (max(1, width), max(1, height)))
+def renderer_view(renderer: Any, model_transform: NDArray[np.float64]) -> View:
+    """Return what a renderer shows an actor from; UnsupportedError where no VDI can be."""
+    camera = camera_of(renderer.GetActiveCamera(), model_transform)
+    width, height = renderer.GetSize()
+    return View(camera, (max(1, width), max(1, height)))
 
 
 class TrackedCamera:
