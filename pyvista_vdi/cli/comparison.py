@@ -20,7 +20,7 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.io import write_png
 from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
-from pyvista_vdi.measure.front import Plan, left_out, measure_front, summary
+from pyvista_vdi.measure.front import FrontPlan, left_out, measure_front, summary
 from pyvista_vdi.measure.report import write_text
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -74,7 +74,7 @@ def _front(options: argparse.Namespace) -> int:
     from pyvista_vdi import examples
 
     more = {"window_size": options.size, "repeats": options.repeats}
-    plan = Plan.quick(**more) if options.quick else Plan(examples.WHOLE, **more)
+    plan = FrontPlan.quick(**more) if options.quick else FrontPlan(examples.WHOLE, **more)
     with (
         output_files(options, "front", "json", "md") as files,
         measuring("front", files["json"]) as bar,

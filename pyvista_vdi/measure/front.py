@@ -112,7 +112,7 @@ def cost_alone(points: Sequence[Point]) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Plan:
+class FrontPlan:
     """Which cases are measured: volumes and transfer functions by name, angles and zooms."""
 
     volumes: tuple[str, ...]
@@ -125,7 +125,7 @@ class Plan:
         check_count("repeats", self.repeats)
 
     @classmethod
-    def quick(cls, **more: Any) -> Plan:
+    def quick(cls, **more: Any) -> FrontPlan:
         """Return that of a short run."""
         return cls(QUICK_VOLUMES, views=QUICK_VIEWS, **more)
 
@@ -183,7 +183,7 @@ class OurVolume(OffScreenVolume):
 
 
 def measure_front(
-    plan: Plan,
+    plan: FrontPlan,
     path: str | os.PathLike[str] | None = None,
     *,
     resume: bool = False,
@@ -221,7 +221,7 @@ def measure_front(
 class _Everybody:
     """All who draw a volume with a transfer function."""
 
-    def __init__(self, volume: Volume, look: str, plan: Plan, device: Any) -> None:
+    def __init__(self, volume: Volume, look: str, plan: FrontPlan, device: Any) -> None:
         self._plan = plan
         self._voxel = voxel = min(volume.spacing)
         self._view = view = filling_camera(volume.bounds, plan.window_size)

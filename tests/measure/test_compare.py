@@ -178,7 +178,7 @@ def test_settings_are_checked(options, message, volume, default_runtime):
 
 
 def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monkeypatch):
-    from pyvista_vdi.measure.front import Plan, measure_front
+    from pyvista_vdi.measure.front import FrontPlan, measure_front
     from pyvista_vdi.measure.vtk_baselines import VTKBaseline
 
     take_opengl_away(monkeypatch)
@@ -188,7 +188,7 @@ def test_a_machine_without_opengl_names_the_packages(volume, peer_property, monk
     with pytest.raises(MissingDependencyError, match=message):
         measure(volume, Settings(LOOKS, SIZE))
     with pytest.raises(MissingDependencyError, match=message):
-        measure_front(Plan(("brain",), ("soft",), ((0.0, 1.0),), SIZE, 1))
+        measure_front(FrontPlan(("brain",), ("soft",), ((0.0, 1.0),), SIZE, 1))
 
 
 def take_opengl_away(monkeypatch):

@@ -10,7 +10,7 @@ from pyvista_vdi.measure.front import (
     DISTANCES,
     FULL_STEP,
     STEPS,
-    Plan,
+    FrontPlan,
     Point,
     cost_alone,
     front_of,
@@ -48,7 +48,7 @@ def test_gains_are_at_equal_ssim():
 
 @pytest.mark.gl
 def test_everybody_is_measured_and_resumed(tmp_path):
-    plan = Plan(("brain", "no_such"), ("soft",), ((0.0, 1.0), (30.0, 1.0)), (96, 54), 1)
+    plan = FrontPlan(("brain", "no_such"), ("soft",), ((0.0, 1.0), (30.0, 1.0)), (96, 54), 1)
     path, heard = tmp_path / "front.json", []
     found = measure_front(plan, path, progress=lambda share, *doing: heard.append(share))
     assert heard == sorted(heard)
@@ -78,11 +78,11 @@ def test_everybody_is_measured_and_resumed(tmp_path):
     assert len(list(left_out(again))) == 1
     assert [row for row in again.rows() if "refused" not in row] == rows
     with pytest.raises(InvalidArgumentError, match="give the same options to --resume"):
-        measure_front(Plan(("brain",)), path, resume=True)
+        measure_front(FrontPlan(("brain",)), path, resume=True)
     assert checked(path).data == again.data
 
 
 def test_a_short_run_has_24_cases():
-    assert len(list(Plan.quick().cases())) == 24
+    assert len(list(FrontPlan.quick().cases())) == 24
     with pytest.raises(InvalidArgumentError, match="repeats"):
-        Plan.quick(repeats=0)
+        FrontPlan.quick(repeats=0)
