@@ -12,7 +12,16 @@ from tqdm import tqdm
 
 from pyvista_vdi import Volume, examples
 from pyvista_vdi.cli.declare import parse_size
-from pyvista_vdi.measure.harness import ROOMS, Bench, Case, Estimate, Latest, estimate, run, sample
+from pyvista_vdi.measure.harness import (
+    ROOMS,
+    Bench,
+    Case,
+    Latest,
+    SampledMean,
+    estimate,
+    run,
+    sample,
+)
 from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.report import closing, write_text
 from pyvista_vdi.measure.results import Results
@@ -151,7 +160,7 @@ def benches(options: argparse.Namespace, *, vtk: bool = False) -> Latest[Bench]:
 
 def mean_of(
     results: Results, every: Sequence[Case], figure: Callable[[Any], float | None], **having: Any
-) -> Estimate | None:
+) -> SampledMean | None:
     """Return the mean of a figure over all cases with these values, and its error."""
     found = [figure(row) for row in results.rows(**having) if "refused" not in row]
     values = [value for value in found if value is not None]

@@ -142,7 +142,7 @@ def sample(
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SampledMean:
     """A mean over all cases from those that were measured, ``count`` of ``of``.
 
     Its standard ``error`` is 0 where all were.
@@ -159,7 +159,9 @@ class Estimate:
         return f"{self.mean:.3g} ± {self.error:.1g} ({self.count} of {self.of} cases)"
 
 
-def estimate(values: Mapping[Hashable, Sequence[float]], sizes: Mapping[Hashable, int]) -> Estimate:
+def estimate(
+    values: Mapping[Hashable, Sequence[float]], sizes: Mapping[Hashable, int]
+) -> SampledMean:
     """Return the mean of all cases by a stratified sample of them, with its standard error.
 
     ``values`` holds what was measured by stratum, ``sizes`` how many cases a stratum has; one of
@@ -177,7 +179,7 @@ def estimate(values: Mapping[Hashable, Sequence[float]], sizes: Mapping[Hashable
         if n < size:
             within = statistics.variance(found) if n > 1 else everywhere
             variance += (size / total) ** 2 * (1 - n / size) * within / n
-    return Estimate(mean, math.sqrt(variance), len(every), sum(sizes.values()))
+    return SampledMean(mean, math.sqrt(variance), len(every), sum(sizes.values()))
 
 
 def run(
