@@ -36,7 +36,7 @@ _DURATIONS = (1e-9, 1e6)
 _TRIAL = 2 * RECENT_FRAMES
 
 
-class _Frame(NamedTuple):
+class _FrameTimes(NamedTuple):
     samples: int
     work: float  # seconds
     overhead: float  # seconds
@@ -118,8 +118,8 @@ class FrameRateController:
                 f"floor must be a share of the full frame, above 0 and at most 1; got {floor!r}"
             )
         self._durations: deque[float] = deque(maxlen=RECENT_FRAMES)  # seconds, stalls included
-        self._frames: list[_Frame] = []  # what the estimate is made of, oldest first
-        self._doubtful: _Frame | None = None  # set aside until the next frame
+        self._frames: list[_FrameTimes] = []  # what the estimate is made of, oldest first
+        self._doubtful: _FrameTimes | None = None  # set aside until the next frame
         self._choice: int | None = None  # None: full
         self._full_excess = 1.0  # cost of a full frame's sample over that of a reduced one's
         self._cost_before_full = math.inf  # per sample, seconds, when full quality was last taken
@@ -232,7 +232,7 @@ class FrameRateController:
             return
         self._durations.append(max(work, seconds))
         self._trial = max(0, self._trial - 1)
-        frame = _Frame(samples, work, max(0.0, seconds - work))
+        frame = _FrameTimes(samples, work, max(0.0, seconds - work))
         # Set a stall aside until the next frame confirms it
         if self._frames:
             expected = self._cost().of(samples)

@@ -338,14 +338,14 @@ class ViewErrorEstimator:
         depth = _of_window("opaque_depth", opaque_depth, size[::-1])
         request = FrameRequest(camera, size, shown, depth, self._runtime)
         picture = _of_window("picture", picture, (*size[::-1], 4))
-        scene = _Scene(self._medium, vdi, request, picture, background, pause)
+        pair = _PicturePair(self._medium, vdi, request, picture, background, pause)
         where = (angle_from_generating_view(vdi, camera), magnification(vdi, camera, size))
         if min(size) < SSIM_WINDOW:
             return ViewError(math.nan, math.nan, *where, 0)
-        tiles = self._sample(scene)
+        tiles = self._sample(pair)
         if tiles is None:
             return ViewError(1.0, 0.0, *where, 0)
-        old, new = scene.tiles(tiles)
+        old, new = pair.tiles(tiles)
         ssim = tiles_ssim(old, new, background)
         contrast = contrast_ratio(old, new, 1 / tiles.chances, background)
         return ViewError(*tiles.infer(ssim), *where, len(ssim), contrast)
@@ -368,7 +368,7 @@ class ViewErrorEstimator:
             ``None`` where the volume is not in view.
         """
         request = FrameRequest(camera, window_size, device=self._runtime)
-        return self._sample(_Scene(self._medium, vdi, request))
+        return self._sample(_PicturePair(self._medium, vdi, request))
 
     def volume_tile(
         self,
@@ -382,20 +382,20 @@ class ViewErrorEstimator:
         frame = FrameRequest(lens, tile_size, shown or RenderOptions())
         return raycast_medium(self._medium, frame, lit_from=lit_from)
 
-    def _sample(self, scene: _Scene) -> TileSample | None:
-        camera, size = scene.request.camera, scene.request.size
-        region = seen_region(camera, size, (scene.vdi.bounds, self._medium.volume.bounds))
+    def _sample(self, pair: _PicturePair) -> TileSample | None:
+        camera, size = pair.request.camera, pair.request.size
+        region = seen_region(camera, size, (pair.vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
         cells = Cells(region, size, self._edge)
         n = len(cells.corners)
-        guess = cells.guess(*scene.coarse(region)) if n > self._tiles else np.ones(n)
+        guess = cells.guess(*pair.coarse(region)) if n > self._tiles else np.ones(n)
         return cells.sample(guess, self._tiles)
 
 
 @dataclass(frozen=True, eq=False)
-class _Scene:
-    """One view of both, of which parts are rendered."""
+class _PicturePair:
+    """One view of VDI and volume, of which parts are rendered."""
 
     medium: DeviceVolume
     vdi: VDI

@@ -22,7 +22,7 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     wanted_time,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image, vdi_to_image
-from pyvista_vdi.vtk_pipeline.filters.temporal import Steps, steps_and_times
+from pyvista_vdi.vtk_pipeline.filters.temporal import StepSequence, steps_and_times
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData
 
 
@@ -198,7 +198,7 @@ class VDIWriter(Algorithm):
         """
         if is_series_file(self._path) and self.GetNumberOfInputConnections(0):
             images, times = steps_and_times(self.GetInputAlgorithm(0, 0))
-            vdis = Steps(lambda i: vdi_from_image(images[i]), len(times))
+            vdis = StepSequence(lambda i: vdi_from_image(images[i]), len(times))
             options = {"precision": "8-byte", **self._options()}
             VDISeries(vdis, times).save(self._path or "", **options)
             return

@@ -39,10 +39,10 @@ def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
             f"{type(source).__name__} announces no time steps, which a series is made of: use what "
             "it gives as one volume, or one VDI"
         )
-    return Steps(read, len(times)), times
+    return StepSequence(read, len(times)), times
 
 
-class Steps(Sequence[Any]):
+class StepSequence(Sequence[Any]):
     """What a function returns for each step; called by one thread at a time: there is one source.
 
     ``read``: gets the step's index. ``n``: how many there are.
