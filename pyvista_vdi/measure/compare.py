@@ -223,11 +223,11 @@ def measure(
     InvalidArgumentError
         If the transfer function leaves nothing to see.
     """
-    looks = Classification(settings.classification, "compare")
+    classified = Classification(settings.classification, "compare")
     done, begun = Pieces(progress, 1 + 2 * len(settings.angles)), now()
     with Bench(
         volume,
-        looks.transfer_function(volume),
+        classified.transfer_function(volume),
         settings.window_size,
         device=settings.device,
         vtk=settings.vtk,
@@ -261,7 +261,7 @@ def measure(
             "timing_sample_distance": bench.voxel,
             "repeats": settings.repeats,
             "camera": bench.view.to_dict(),
-            "classification": looks.describe(),
+            "classification": classified.describe(),
         }
         sizes = {
             "volume_bytes": volume.array.nbytes,

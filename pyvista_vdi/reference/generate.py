@@ -233,7 +233,7 @@ def build_vdi(
         volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
     )
     for ray in rays:
-        runs = [
+        segments = [
             Segment(float(t0), float(t1), color, float(tau))
             for t0, t1, color, tau in zip(
                 ray.begin, ray.end, ray.color, ray.optical_depth, strict=True
@@ -241,10 +241,10 @@ def build_vdi(
             if tau > 0
         ]
         per_reference = 0.0  # voxels per unit of view depth
-        if runs:
+        if segments:
             per_depth = float(ray.length[0] / (ray.end[0] - ray.begin[0]))
             per_reference = per_depth / min(volume.spacing)
-        lists.append(_cut(runs, criterion, max_supersegments, per_reference, weighting))
+        lists.append(_cut(segments, criterion, max_supersegments, per_reference, weighting))
     # Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint
     front, back = [], []
     for segments in lists:
@@ -455,20 +455,20 @@ def _steps(start: Array, slope: Array, volume: Volume, parallel: bool, stride: f
 
 
 def _cut(
-    runs: list[Segment], criterion: str, budget: int, per_reference: float, weighting: str
+    segments: list[Segment], criterion: str, budget: int, per_reference: float, weighting: str
 ) -> list[Segment]:
-    """Bring a ray's runs to the budget; ``per_reference``: voxels per unit of view depth."""
+    """Bring a ray's segments to the budget; ``per_reference``: voxels per unit of view depth."""
     if criterion == "homogeneity":
-        return cut_where_unlike(runs, budget, per_reference, weighting)
+        return cut_where_unlike(segments, budget, per_reference, weighting)
     if criterion == "length":
-        return cut_at_equal_lengths(runs, budget, weighting)
+        return cut_at_equal_lengths(segments, budget, weighting)
     if criterion == "transmittance":
-        return cut_at_equal_transmittance(runs, budget, weighting)
+        return cut_at_equal_transmittance(segments, budget, weighting)
     if criterion == "optical-depth":
-        return cut_at_equal_optical_depths(runs, budget, weighting)
+        return cut_at_equal_optical_depths(segments, budget, weighting)
     # Merge neighbours at least cost until there are no more than budget
-    merged = list(runs)
-    parts = [[run] for run in runs]  # what each was made of
+    merged = list(segments)
+    parts = [[segment] for segment in segments]  # what each was made of
     costs = [_merge_cost(a + b) for a, b in itertools.pairwise(parts)]
     while len(merged) > budget:
         k = int(np.argmin(costs))
