@@ -211,7 +211,7 @@ class _Run:
         return self._merged(windows, pieces, lengths)
 
     def cancel(self) -> None:
-        """Give up what has not been done."""
+        """Cancel what has not been done."""
         self._client.cancel(self._futures, force=True)
 
     def _values(self, reads: Mapping[Indices, Read]) -> dict[Indices, Any]:

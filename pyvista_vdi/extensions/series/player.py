@@ -258,7 +258,7 @@ class Player:
         self._trim()
 
     def _trim(self) -> None:
-        """Let go of what memory is not enough for, from what is shown in the longest time on.
+        """Drop what memory is not enough for, first what is shown in the longest time.
 
         In a round that does not fit, the same steps are kept in each.
         """

@@ -248,7 +248,7 @@ class VDIActorMethods(PlayingMethods):
         return source.GetVDI()  # type: ignore[no-any-return]
 
     def _view_added(self: Any, vdi_set: VDISet, camera: Any) -> VDI:
-        """Have a set have a VDI of a view, by default of that which is shown."""
+        """Add a VDI of a view to the set, by default of the view that is shown."""
         renderer = self.GetMapper().painter.renderer()
         if camera is None and renderer is not None:
             camera = renderer.GetActiveCamera()
@@ -263,7 +263,7 @@ class VDIActorMethods(PlayingMethods):
         return vdi
 
     def _step_anew(self: Any, player: Player, camera: Any, window_size: Any) -> VDI:
-        """Have the step that is shown made for another view, and show that as long as it is."""
+        """Generate the step that is shown for another view, and show that while the step lasts."""
         renderer = self.GetMapper().painter.renderer()
         if camera is None and renderer is not None:
             camera = renderer.GetActiveCamera()

@@ -115,7 +115,7 @@ class ArrayChoiceMethods:
         self.choose_array()
 
     def take_array_choice(self: Any, other: ArrayChoiceMethods) -> None:
-        """Say of the chosen array what another mapper, of the same source, says."""
+        """Copy the choice of an array from another mapper of the same source."""
         theirs: Any = other
         self._note_array(theirs.GetArrayId())
         if theirs.GetArrayName() is not None:

@@ -45,7 +45,7 @@ class Box(Algorithm):
         return 1
 
     def show(self, shown: Input | None) -> None:
-        """Have the bounds of another input from now on."""
+        """Take the bounds of another input from now on."""
         self._shown = shown
         self.connect()
         if shown is not None and self.GetNumberOfInputConnections(0) == 0:
@@ -65,7 +65,7 @@ class Box(Algorithm):
         self._executed()  # what fails from the first has no bounds either
 
     def _executed(self) -> None:
-        """Have no bounds where what is before gives nothing, as if it fails: this is not asked."""
+        """Clear the bounds where what is before gives nothing, as if it fails."""
         connected = self.GetNumberOfInputConnections(0) > 0
         data = self.GetInputDataObject(0, 0) if connected else None
         if not self._stands and (
@@ -74,12 +74,12 @@ class Box(Algorithm):
             self.place(None)
 
     def give_components(self, components: int) -> None:
-        """Give the voxels components: VTK asks for four where they are dependent."""
+        """Set the voxels' components: VTK asks for four where they are dependent."""
         self.components = components
         self._allocate()
 
     def place(self, bounds: tuple[float, ...] | None) -> None:
-        """Have these bounds, model frame; ``None``: none."""
+        """Set the bounds, model frame; ``None``: none."""
         extent = _EMPTY if bounds is None else _EXTENT
         if self.image.GetExtent() != extent or self.image.GetPointData().GetScalars() is None:
             self.image.SetExtent(extent)
@@ -91,13 +91,13 @@ class Box(Algorithm):
             self.image.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
 
     def begin(self) -> None:
-        """Have points while a frame is drawn: VTK writes an error where there are none."""
+        """Add points while a frame is drawn: VTK writes an error where there are none."""
         self._stands = self.image.GetNumberOfPoints() == 0
         if self._stands:
             self.place((0, 1, 0, 1, 0, 1))
 
     def end(self) -> None:
-        """Have none again, if there are none."""
+        """Remove the points again, if there are no bounds."""
         if self._stands:
             self._stands = False
             self.place(None)

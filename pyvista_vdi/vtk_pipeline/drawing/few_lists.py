@@ -71,7 +71,7 @@ class FewLists:
             _log.debug("fewer lists cannot be had", exc_info=True)
 
     def clear(self) -> None:
-        """Let go of everything."""
+        """Drop everything that is kept."""
         self._worker.clear()
         self._worker.join()
         self._made.clear()

@@ -141,7 +141,7 @@ class Painter:
         return self.box.image
 
     def say_not_exported(self) -> None:
-        """Say once that a scene which is written for another renderer lacks the VDI.
+        """Warn once that a scene which is written for another renderer lacks the VDI.
 
         Not yet where trame has the scene at hand, and shows the pictures that are drawn here.
         """
@@ -257,7 +257,7 @@ class Painter:
         self.upkeep.tick(window)
 
     def end(self) -> None:
-        """Let go of the texture unit."""
+        """Release the texture unit."""
         if self._astray:
             self.box.Modified()  # it has its bounds again
         self._texture.let_go()

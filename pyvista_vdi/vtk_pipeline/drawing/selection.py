@@ -44,7 +44,7 @@ class Selection:
         self._seen: Frame | None = None
 
     def enter(self, actor: Any, selector: Any) -> None:
-        """Have an actor draw hits, with their depth, in the pass that begins."""
+        """Make an actor draw hits, with their depth, in the pass that begins."""
         show_first_hits(actor, selector.GetCurrentPass())
         keys = actor.GetPropertyKeys()
         if keys is None:
@@ -53,7 +53,7 @@ class Selection:
         keys.Set(vtkOpenGLActor.GLDepthMaskOverride(), 1)
 
     def leave(self, actor: Any, *, occluded: bool, peeled: bool) -> None:
-        """Have it draw its image, in the frame that begins, whatever was drawn last.
+        """Make it draw its image in the frame that begins, whatever was drawn last.
 
         ``occluded`` and ``peeled`` are for :func:`show_image`.
         """

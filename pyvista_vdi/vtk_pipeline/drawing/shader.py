@@ -123,7 +123,7 @@ _clear_vertex = vtkOpenGLShaderProperty.ClearVertexShaderReplacement
 
 
 def show_image(actor: Any, *, occluded: bool = False, peeled: bool = False) -> None:
-    """Have an actor's shader look its colours up in an image of the viewport.
+    """Make an actor's shader look its colours up in an image of the viewport.
 
     ``occluded`` says whether the frame has a pass of screen-space ambient occlusion, ``peeled``
     whether volumes are drawn by depth peeling.
@@ -141,7 +141,7 @@ def show_image(actor: Any, *, occluded: bool = False, peeled: bool = False) -> N
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
-    """Say in which texture unit the image is, and which viewport it fills, framebuffer pixels."""
+    """Set which texture unit the image is in, and which viewport it fills, framebuffer pixels."""
     place_texture(actor, unit)
     (x, y), (width, height) = origin, size
     place = (float(x), float(y + height), 1 / max(1, width), -1 / max(1, height))
@@ -149,7 +149,7 @@ def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int,
 
 
 def fill_viewport(actor: Any, edge: float | None) -> None:
-    """Have a cube about the origin, of that edge, fill the viewport; ``None``: boxes are boxes."""
+    """Fill the viewport with a cube about the origin, of that edge; ``None``: boxes are boxes."""
     shader = actor.GetShaderProperty()
     text = None if edge is None else _FILL.format(scale=2 / edge)
     if text == _replacement(shader, _POSITION):
@@ -161,12 +161,12 @@ def fill_viewport(actor: Any, edge: float | None) -> None:
 
 
 def place_texture(actor: Any, unit: int) -> None:
-    """Say in which texture unit the image is, in the frame that begins."""
+    """Set which texture unit the image is in, in the frame that begins."""
     actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniformi("vdiImage", unit)
 
 
 def show_first_hits(actor: Any, selection_pass: int) -> None:
-    """Have it draw first hits, at their depth, in place of the image.
+    """Draw first hits, at their depth, in place of the image.
 
     ``selection_pass`` is what ``vtkHardwareSelector::GetCurrentPass`` says.
     """

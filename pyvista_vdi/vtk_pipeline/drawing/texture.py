@@ -17,7 +17,7 @@ class _Texture:
         self._texture: Any = None
 
     def _in_context(self, window: Any) -> bool:
-        """Have the texture in a window's context, which is current; whether it is filled there."""
+        """Bind the texture to a window's current context; return whether it is filled there."""
         if self._texture is None:
             self._texture = vtkTextureObject()
             self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
@@ -28,7 +28,7 @@ class _Texture:
         return bool(self._texture.GetHandle() != 0)
 
     def let_go(self) -> None:
-        """Give the texture unit back."""
+        """Release the texture unit."""
         if self._texture is not None:
             self._texture.Deactivate()
 
@@ -79,7 +79,7 @@ class NoDepth(_Texture):
     """
 
     def show(self, window: Any, mapper: Any) -> None:
-        """Give it to a mapper for the frame that begins; the image's texture is active already."""
+        """Bind it for a mapper in the frame that begins; the image's texture is active already."""
         if not self._in_context(window):
             far = np.ones(1, dtype=np.float32)  # window depth of nothing
             self._texture.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, far)

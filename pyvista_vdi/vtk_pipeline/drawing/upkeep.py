@@ -345,7 +345,7 @@ class Upkeep:
         return vdi
 
     def _look_around(self, shower: SetShower, frame: Frame) -> None:
-        """Have a set show the frame's view, and grow where nobody turns and the picture lacks."""
+        """Show a set's VDI that is nearest to the frame's view; add one where pictures lack."""
         window = frame.renderer.GetRenderWindow()
         shower.device = frame.painter.device
         shower.look(frame.view.camera)
@@ -358,7 +358,7 @@ class Upkeep:
                 shower.grow_now()
 
     def tick(self, window: Any) -> None:
-        """Have the event loop look at what goes on, if something does and no hand moves."""
+        """Start the event loop's timer, if something goes on and no hand moves."""
         if self._busy and not self._interaction.moving(window):
             player = self.player
             period = PERIOD if player is None else period_of(player.rate)
@@ -371,7 +371,7 @@ class Upkeep:
         self._loop_ticker.stop()
 
     def _prepare(self, made: Request | None) -> None:
-        """Have compiled, behind the frames, what the first change would wait for."""
+        """Compile, behind the frames, what the first change would wait for."""
         if made is None:
             return
 
@@ -475,7 +475,7 @@ class Upkeep:
             return False
 
     def _follow_changes(self, source: SourceInput, frame: Frame) -> None:
-        """Have what has changed made a VDI of from the frame's view, where it may be."""
+        """Generate a VDI of what has changed from the frame's view, where it may be."""
         stamp = source.stamp()
         if stamp in (self._made_at, self._failed_at) or self.regeneration.policy == "never":
             return
@@ -500,7 +500,7 @@ class Upkeep:
             self._complain(error)
 
     def _say_what_is_lacking(self, vdi: VDI | None, frame: Frame) -> None:
-        """Say once for each cause that a VDI without its volume is seen from where it lacks."""
+        """Warn once for each cause that a VDI without its volume is seen from where it lacks."""
         if vdi is None or self.regeneration.policy != "auto":
             return
         view, stored = frame.view, vdi.metadata.get("view_cone")

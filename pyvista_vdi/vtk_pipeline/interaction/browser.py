@@ -23,7 +23,7 @@ class Follower(Protocol):
     window: Any
 
     def draw(self) -> object:
-        """Have the window drawn: something in it is new."""
+        """Draw the window: something in it is new."""
 
 
 _followers: weakref.WeakSet[Follower] = weakref.WeakSet()
@@ -44,7 +44,7 @@ def watches(window: Any) -> bool:
 
 
 def push(window: Any) -> bool:
-    """Have a window drawn and its picture sent to the browsers that show it; whether any does."""
+    """Draw a window and send its picture to the browsers that show it; return whether any does."""
     publishers, followers = list(_publishers(window)), _following(window)
     for publisher, number in publishers:
         publisher.image_push({"view": number})
@@ -98,7 +98,7 @@ def _helpers() -> list[Any]:
 
 
 def _publishers(window: Any) -> Iterator[tuple[Any, str]]:
-    """Give those who send pictures of a window to browsers, and the number they know it by."""
+    """Yield those who send pictures of a window to browsers, and the number they know it by."""
     for helper in _helpers():
         with suppress(AttributeError):
             for protocol in helper._root_protocol.getLinkProtocols():

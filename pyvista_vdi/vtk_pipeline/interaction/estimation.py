@@ -69,7 +69,7 @@ class Estimation:
         return self._worker.take()  # type: ignore[no-any-return]
 
     def cancel(self) -> None:
-        """Give up what is being made."""
+        """Cancel what is being made."""
         self._worker.clear()
 
     def close(self) -> None:

@@ -237,7 +237,7 @@ class Regeneration:
         return self._view.distance(other, bounds)
 
     def _start(self, request: Request, *, for_view: bool = False) -> None:
-        """Have a VDI made: because of the view alone, or whatever the view does meanwhile."""
+        """Start generating a VDI: for the view alone, or whatever the view does meanwhile."""
         self._for_view = for_view
         device = request.device
         if self._background is None or device != self._device:
@@ -255,7 +255,7 @@ class Regeneration:
         )
 
     def _drop_if_outdated(self) -> None:
-        """Give up a VDI that is made for a view which the hand has left behind."""
+        """Cancel a VDI that is made for a view which the hand has left behind."""
         source = self._source()
         made = None if source is None else source.GetCurrentRequest()
         if self._target is None or made is None or not self._for_view:
@@ -270,13 +270,13 @@ class Regeneration:
             self._background.cancel()
 
     def cancel(self) -> None:
-        """Give up what goes on, and forget what failed."""
+        """Cancel what goes on, and forget what failed."""
         self._give_up()
         self._estimation.cancel()
         self._failed_at = None
 
     def close(self) -> None:
-        """Give up what goes on, and leave no thread."""
+        """Cancel what goes on, and leave no thread."""
         self._target = None
         if self._background is not None:
             self._background.close()

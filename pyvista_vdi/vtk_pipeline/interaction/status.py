@@ -182,7 +182,7 @@ class Warnings:
     def warn(
         self, message: str, error: BaseException | None = None, *, cause: Hashable = None
     ) -> None:
-        """Say it, unless it, or its cause, was said before; a traceback goes to the log."""
+        """Warn, unless this, or its cause, was said before; a traceback goes to the log."""
         if error is not None:
             _log.debug("%s", message, exc_info=error)
         if (cause or message) in self._said:
@@ -194,5 +194,5 @@ class Warnings:
             _log.error(message)
 
     def forget(self) -> None:
-        """Say everything again if it comes up again."""
+        """Forget what was said, so that it is said again if it comes up again."""
         self._said.clear()

@@ -234,7 +234,7 @@ class WindowClock:
         return self._started is not None
 
     def render(self) -> None:
-        """Have the window drawn, as from its event loop."""
+        """Draw the window, as from its event loop."""
         window = self._window.Get()
         if window is not None and browser.push(window):
             return
