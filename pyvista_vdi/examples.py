@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.errors import (
     DataNotFoundError,
@@ -358,17 +357,11 @@ def read_nrrd(file: Path, quantity: str) -> Volume:
     # Where a CPU device reads it without a copy of its own
     aligned = aligned_empty(array.shape, array.dtype.newbyteorder("="))
     aligned[...] = array
-    spacing, direction = _grid_axes(header)
+    spacing, direction = np.asarray(header.get("spacings", np.ones(3)), dtype=np.float64), np.eye(3)
+    if (steps := header.get("space directions")) is not None:
+        # NRRD's rows are the steps from sample to sample along each axis
+        steps = np.asarray(steps, dtype=np.float64)
+        spacing = np.linalg.norm(steps, axis=1)
+        direction = (steps / spacing[:, None]).T
     origin = header.get("space origin", np.zeros(3))
     return Volume(aligned, spacing, origin, direction, name=quantity)
-
-
-def _grid_axes(header: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return spacing (3,) and direction (3, 3; columns are the x, y and z axes) of a header."""
-    steps = header.get("space directions")
-    if steps is None:
-        return np.asarray(header.get("spacings", np.ones(3)), dtype=np.float64), np.eye(3)
-    # NRRD's rows are the steps from sample to sample along each axis
-    steps = np.asarray(steps, dtype=np.float64)
-    spacing = np.linalg.norm(steps, axis=1)
-    return spacing, (steps / spacing[:, None]).T

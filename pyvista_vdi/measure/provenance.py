@@ -42,9 +42,10 @@ def room_hash(room: str) -> str:
     Raises InvalidArgumentError if there is no such room.
     """
     digest = hashlib.sha256()
+    package, kernels = (Path(str(files(name))) for name in ("pyvista_vdi", "pyvista_vdi.opencl"))
     found = [
         (f"{kind}{path.relative_to(folder).as_posix()}", path)
-        for kind, folder in _folders(room).items()
+        for kind, folder in (("", package / room), ("opencl/", kernels / room))
         for path in folder.rglob("*")
         if path.suffix in _STRIPPED and "__pycache__" not in path.parts
     ]
@@ -72,11 +73,6 @@ def outdated(measured: Mapping[str, Any]) -> list[str]:
         if not same:
             changed.append(room)
     return changed
-
-
-def _folders(room: str) -> dict[str, Path]:
-    package, kernels = (Path(str(files(name))) for name in ("pyvista_vdi", "pyvista_vdi.opencl"))
-    return {"": package / room, "opencl/": kernels / room}
 
 
 def _without_remarks(text: str) -> str:

@@ -60,20 +60,24 @@ def covering_view(
         return None
     low = np.floor(pixels.min(axis=0) + _SLACK)
     high = np.maximum(np.ceil(pixels.max(axis=0) - _SLACK), low + 1)
-    low, high, lists = _limited(low, high, max_lists_per_pixel * size.prod())
+    # Take as many lists as allowed, each a square
+    extent, most = high - low, max_lists_per_pixel * size.prod()
+    pitch = max(1.0, math.sqrt(extent.prod() / most), extent.max() / MAX_WINDOW_EDGE)
+    lists = np.ceil(extent / pitch - _SLACK)
+    while not (lists.prod() <= most or (lists == 1).any()):
+        pitch *= 1.01  # rounding up both edges may pass the limit by less than two rows
+        lists = np.ceil(extent / pitch - _SLACK)
+    grown = (lists * pitch - extent) / 2
+    low, high = low - grown, high + grown
 
     half = np.asarray(camera.half_extent(window_size))
     new_half = half * (high - low) / size
     middle = half * (np.asarray(camera.window_center) + (low + high) / size - 1)
     width, height = (int(n) for n in lists)
-    lens = (
-        {"parallel_scale": new_half[1]}
-        if camera.parallel_projection
-        else {
-            "view_angle": math.degrees(2 * math.atan(new_half[1])),
-            "use_horizontal_view_angle": False,
-        }
-    )
+    lens: dict[str, float] = {"parallel_scale": new_half[1]}
+    if not camera.parallel_projection:
+        angle = math.degrees(2 * math.atan(new_half[1]))
+        lens = {"view_angle": angle, "use_horizontal_view_angle": False}
     return camera.replace(window_center=middle / new_half, **lens), (width, height)
 
 
@@ -126,18 +130,3 @@ def _project(
     viewport = points @ camera.viewport_matrix(window_size).T
     uv = viewport[:, :2] / viewport[:, 3:]
     return (uv + 1) / 2 * np.asarray(window_size)
-
-
-def _limited(
-    low: NDArray[np.float64], high: NDArray[np.float64], most: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return a rectangle in pixels and its lists, as many as allowed, each a square."""
-    extent = high - low
-    pitch = max(1.0, math.sqrt(extent.prod() / most), extent.max() / MAX_WINDOW_EDGE)
-    while True:
-        lists = np.ceil(extent / pitch - _SLACK)
-        if lists.prod() <= most or (lists == 1).any():
-            break
-        pitch *= 1.01  # rounding up both edges may pass the limit by less than two rows
-    grown = (lists * pitch - extent) / 2
-    return low - grown, high + grown, lists

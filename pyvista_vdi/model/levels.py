@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.grid import Geometry
@@ -51,12 +50,6 @@ def nearest_list_width(grid: Geometry, camera: Camera, window_size: Sequence[int
     return width if camera.parallel_projection else width * depth
 
 
-def voxel_edges(grid: Geometry, camera: Camera) -> NDArray[np.float64]:
-    """Return the distances of neighbouring points along x, y and z, world units."""
-    to_world = camera.model_to_view[:3, :3] @ grid.index_to_model[:3, :3]
-    return np.asarray(np.linalg.norm(to_world, axis=0))
-
-
 def required_level(
     levels: Sequence[Geometry], camera: Camera, window_size: Sequence[int], unit: str = ""
 ) -> tuple[int, str]:
@@ -74,7 +67,9 @@ def required_level(
         return len(levels) - 1, "the coarsest, as V_O sees nothing of the volume"
     if width == 0:
         return 0, "the finest, as V_O is in the volume"
-    edges = [voxel_edges(level, camera) for level in levels]
+    to_view = camera.model_to_view[:3, :3]
+    # Distances of neighbouring points along x, y and z, world units
+    edges = [np.linalg.norm(to_view @ each.index_to_model[:3, :3], axis=0) for each in levels]
     unit = unit and f" {unit}"
     said = [" x ".join(f"{edge:.3g}" for edge in of_level) + unit for of_level in edges]
     half = f"half a list's width, {width / 2:.3g}{unit} where the volume is nearest to V_O"
@@ -83,10 +78,8 @@ def required_level(
         if now[now > _COARSER * edges[0]].max(initial=0) > width / 2:
             break
         chosen = k
-    coarser = (
-        f"those of level {chosen + 1}, {said[chosen + 1]}, are coarser than {half}"
-        if (chosen + 1 < len(levels))
-        else f"they are no coarser than {half}"
-    )
+    coarser = f"they are no coarser than {half}"
+    if chosen + 1 < len(levels):
+        coarser = f"those of level {chosen + 1}, {said[chosen + 1]}, are coarser than {half}"
     name = "the finest, " if chosen == 0 else "the coarsest, " if chosen + 1 == len(levels) else ""
     return chosen, f"{name}voxels of {said[chosen]}: {coarser}"

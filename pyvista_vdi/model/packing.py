@@ -155,20 +155,6 @@ class Packed8:
             media["optical_depth"] = bits.astype(np.uint32).view(np.float32)
         return media
 
-    @classmethod
-    def of_codes(
-        cls,
-        step: float,
-        origins: NDArray[np.int32],
-        strides: NDArray[np.uint16],
-        front: NDArray[np.uint32],
-        back: NDArray[np.uint32],
-        tau: NDArray[np.uint32],
-        color: NDArray[np.uint32],
-    ) -> Packed8:
-        """Put codes together; ``color`` has red, green and blue in bits 8 to 31."""
-        return cls(step, origins, strides, _words(front, back, tau, color))
-
 
 Packing = Packed16 | Packed8
 
@@ -193,7 +179,14 @@ def packing_of(vdi: Lists, precision: str) -> Packing:
         )
     origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
     words = np.empty((vdi.n_supersegments, 2), np.uint32)
-    step = _grid_step(vdi)
+    # Find the shortest power of two of which at most GRID reach every depth
+    step = 1.0
+    if vdi.n_supersegments:
+        farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
+        exponent = math.frexp(farthest / GRID)[1]  # farthest / GRID < 2^exponent
+        if farthest / 2.0 ** (exponent - 1) <= GRID:
+            exponent -= 1
+        step = 2.0 ** max(exponent, _LEAST_STEP_EXPONENT)
     for lists, part in _pieces(counts):
         origins[lists], strides[lists], front, back = _depths(vdi, step, counts[lists], part)
         tau, color = _tau_codes(vdi.optical_depth[part]), packed_color(vdi.color[part], _COLOR_8)
@@ -218,7 +211,7 @@ def _words(
     tau: NDArray[np.uint32],
     color: NDArray[np.uint32],
 ) -> NDArray[np.uint32]:
-    """Return the two words of each supersegment, see :class:`Packed8`."""
+    """Return the two words of each supersegment, colours in bits 8 to 31: see :class:`Packed8`."""
     words = np.empty((len(front), 2), np.uint32)
     words[:, 0] = front | back << np.uint32(14) | tau << np.uint32(28)
     words[:, 1] = tau >> np.uint32(4) | color
@@ -278,41 +271,18 @@ def _depths(
     origins[occupied], strides[occupied] = origin, stride
     own = np.repeat(np.arange(len(occupied)), lengths)
     codes = np.rint((faces - origin[own, np.newaxis]) / stride[own, np.newaxis]).astype(np.int64)
-    codes = _kept_apart(np.maximum(codes, 0), own, first, lengths)
-    front, back = codes.astype(np.uint32).T
-    return origins, strides, front, back
-
-
-def _grid_step(vdi: Lists) -> float:
-    """Return the shortest power of two of which at most :data:`GRID` reach every depth."""
-    if vdi.n_supersegments == 0:
-        return 1.0
-    farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
-    exponent = math.frexp(farthest / GRID)[1]  # farthest / GRID < 2^exponent
-    if farthest / 2.0 ** (exponent - 1) <= GRID:
-        exponent -= 1
-    return 2.0 ** max(exponent, _LEAST_STEP_EXPONENT)
-
-
-def _kept_apart(
-    codes: NDArray[np.int64],
-    own: NDArray[np.int64],
-    first: NDArray[np.int64],
-    lengths: NDArray[np.int64],
-) -> NDArray[np.int64]:
-    """Return codes, (n, 2), such that every back exceeds its front by at least 1.
-
-    Rounding keeps faces in order; what it made equal is moved behind, and where no codes are left
-    behind, before. ``own`` is each supersegment's list among those that are not empty.
-    """
-    # Less the thicknesses that must lie before it, a face may equal the one before it
+    # Keep every back at least 1 behind its front. Rounding keeps faces in order; what it made equal
+    # is moved behind, and where no codes are left behind, before. Less the thicknesses that must
+    # lie before it, a face may equal the one before it
     within = np.arange(len(codes)) - first[own]
     needed = np.stack([within, within + 1], axis=1)
-    slack = codes - needed
+    slack = np.maximum(codes, 0) - needed
     apart = own[:, np.newaxis] << 20  # no list's maximum reaches the next list
     running = np.maximum.accumulate((slack + apart).reshape(-1)).reshape(-1, 2) - apart
     most = DEPTH_CODES - lengths[own]
-    return np.minimum(running, most[:, np.newaxis]) + needed
+    codes = np.minimum(running, most[:, np.newaxis]) + needed
+    front, back = codes.astype(np.uint32).T
+    return origins, strides, front, back
 
 
 def gaps_and_thicknesses(
@@ -378,14 +348,13 @@ def packed_8(
         raise InvalidVDIError("a supersegment has no thickness, or a code beyond its largest")
     color = np.zeros((n, 4), np.uint8)
     color[:, 1:] = stored["color"]
-    return Packed8.of_codes(
+    colors = color.view("<u4").reshape(-1).astype(np.uint32, copy=False)
+    front = (back - thicknesses).astype(np.uint32)
+    return Packed8(
         step,
         stored["origin"].astype(np.int32, copy=False),
         stored["stride"].astype(np.uint16, copy=False),
-        (back - thicknesses).astype(np.uint32),
-        back.astype(np.uint32),
-        tau,
-        color.view("<u4").reshape(-1).astype(np.uint32, copy=False),
+        _words(front, back.astype(np.uint32), tau, colors),
     )
 
 

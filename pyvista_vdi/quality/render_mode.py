@@ -100,7 +100,8 @@ class RenderModeChooser:
         better picture, or at rest the one that is there sooner. What was drawn last stays unless
         the other is better by more than predictions are wrong by.
         """
-        own = _loss_of_vdi(angle, ssim)
+        unknown = _UNKNOWN_LOSS * min(1.0, angle / _NEIGHBOURS)
+        own = unknown if ssim is None else max(0.0, 1.0 - ssim)
         if seconds is None and own > 1 - bound:
             self._way = "volume"
             return self._way
@@ -112,7 +113,13 @@ class RenderModeChooser:
         if seconds is None:
             changes = times[other] < (1 - _SAVING) * times[self._way]
         else:
-            losses = {way: _loss_of_pixels(time / seconds) for way, time in times.items()}
+            # SSIM lost by as few pixels as it takes to be as many times faster
+            steps = {way: max(1.0, time / seconds) ** 0.5 for way, time in times.items()}
+            slope = _LOST[-1] - _LOST[-2]
+            losses = {
+                way: float(np.interp(step, _STEPS, _LOST)) + max(0.0, step - _STEPS[-1]) * slope
+                for way, step in steps.items()
+            }
             losses["vdi"] += own
             changes = losses[other] < losses[self._way] - _GAIN
         if changes:
@@ -127,16 +134,3 @@ def _mean(before: float | None, new: float) -> float:
 def rise(angle: float) -> float:
     """Return what a ray takes through a VDI, over one at V_O, so many degrees from there."""
     return float(np.interp(angle, _ANGLES, _RISE))
-
-
-def _loss_of_vdi(angle: float, ssim: float | None) -> float:
-    if ssim is not None:
-        return max(0.0, 1.0 - ssim)
-    return _UNKNOWN_LOSS * min(1.0, angle / _NEIGHBOURS)
-
-
-def _loss_of_pixels(too_long: float) -> float:
-    """Return the SSIM lost by as few pixels as it takes to be this many times faster."""
-    step = max(1.0, too_long) ** 0.5
-    beyond = max(0.0, step - _STEPS[-1]) * (_LOST[-1] - _LOST[-2])
-    return float(np.interp(step, _STEPS, _LOST)) + beyond

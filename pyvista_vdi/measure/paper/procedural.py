@@ -8,9 +8,8 @@ a few planes is in memory, and every slab depends on the seed and its own positi
 from __future__ import annotations
 
 import os
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,16 +67,11 @@ def make(kind: Procedural, factor: int, seed: int, name: str) -> Volume:
     def fill(k: int) -> None:
         array[k] = np.clip(slab(k) + np.float32(0.5), 0, largest)
 
-    # A few slabs ahead, so that an interrupt ends it soon
+    # A few slabs at a time, so that an interrupt ends it soon
     workers = os.cpu_count() or 1
     with ThreadPoolExecutor(workers) as pool:
-        waiting: deque[Future[None]] = deque()
-        for k in range(nz):
-            waiting.append(pool.submit(fill, k))
-            if len(waiting) > 2 * workers:
-                waiting.popleft().result()
-        for future in waiting:
-            future.result()
+        for first in range(0, nz, 8 * workers):
+            list(pool.map(fill, range(first, min(first + 8 * workers, nz))))
     return Volume(array, name=name)
 
 
