@@ -495,7 +495,7 @@ PYTHON_MUTANTS = (
     _m(
         "packing: faces that rounding made equal stay equal",
         PACKING,
-        "codes = _kept_apart(np.maximum(codes, 0), own, first, lengths)",
+        "codes = np.minimum(running, most[:, np.newaxis]) + needed",
         "codes = np.maximum(codes, 0)",
         ("model", "raycasting"),
     ),
