@@ -12,14 +12,7 @@ from pyvista_vdi.cli.inputs import has_vtk, measuring, require_new, say_written
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import check_writable
-from pyvista_vdi.measure.paper import (
-    PROFILES,
-    Plan,
-    describe,
-    find_dataset,
-    open_results,
-    run,
-)
+from pyvista_vdi.measure.paper import PROFILES, Plan, describe, find_dataset, open_results, run
 from pyvista_vdi.measure.report import write_text
 
 

@@ -32,12 +32,7 @@ from pyvista_vdi.measure.harness import (
     enlarged,
     sizes_of,
 )
-from pyvista_vdi.measure.paper.datasets import (
-    DEFAULT_SEED,
-    Dataset,
-    find_dataset,
-    label_of,
-)
+from pyvista_vdi.measure.paper.datasets import DEFAULT_SEED, Dataset, find_dataset, label_of
 from pyvista_vdi.measure.paper.report import paper_targets
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.options import check_max_supersegments
