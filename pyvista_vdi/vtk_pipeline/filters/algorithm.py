@@ -8,21 +8,11 @@ from operator import attrgetter
 from typing import Any
 
 from pyvista_vdi.errors import Cancelled, InvalidVDIError, VDIError
-from pyvista_vdi.vtk_pipeline.vtk import (
-    VTK_UNSIGNED_INT,
-    VTKPythonAlgorithmBase,
-    require_this_build,
-    vtkCollection,
-    vtkDataObject,
-    vtkImageData,
-    vtkOutputWindow,
-    vtkStreamingDemandDrivenPipeline,
-    vtkWeakReference,
-)
+from pyvista_vdi.vtk_pipeline import vtk
 
-TIME_STEPS = vtkStreamingDemandDrivenPipeline.TIME_STEPS()
-TIME_RANGE = vtkStreamingDemandDrivenPipeline.TIME_RANGE()
-UPDATE_TIME_STEP = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
+TIME_STEPS = vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS()
+TIME_RANGE = vtk.vtkStreamingDemandDrivenPipeline.TIME_RANGE()
+UPDATE_TIME_STEP = vtk.vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
 
 #: Docstrings of ``SetDevice`` and ``GetDevice``.
 DEVICE = (
@@ -31,7 +21,7 @@ DEVICE = (
 )
 
 
-class Algorithm(VTKPythonAlgorithmBase):
+class Algorithm(vtk.VTKPythonAlgorithmBase):
     """An algorithm whose errors reach whoever asked for the update.
 
     Python's ``Update`` raises them; an update that VTK asks for writes them to VTK's output window
@@ -51,13 +41,13 @@ class Algorithm(VTKPythonAlgorithmBase):
     def SetInputDataObject(self, *args: Any) -> None:
         """Set the input (optionally after a port number, 0)."""
         for each in args:
-            require_this_build(type(each))
+            vtk.require_this_build(type(each))
         super().SetInputDataObject(*args)
 
     def SetInputConnection(self, *args: Any) -> None:
         """Set what makes the input, a port of another algorithm (optionally after a number)."""
         for each in args:
-            require_this_build(type(each))
+            vtk.require_this_build(type(each))
         super().SetInputConnection(*args)
 
     def Update(self, *args: Any) -> None:
@@ -112,9 +102,9 @@ class Algorithm(VTKPythonAlgorithmBase):
             self._error = error
             if not self._python_waits and not isinstance(error, Cancelled):
                 name = type(self).__name__
-                vtkOutputWindow.GetInstance().DisplayErrorText(f"{name}: {error}\n")
+                vtk.vtkOutputWindow.GetInstance().DisplayErrorText(f"{name}: {error}\n")
             if self.GetNumberOfOutputPorts():
-                vtkDataObject.GetData(outputs, 0).Initialize()
+                vtk.vtkDataObject.GetData(outputs, 0).Initialize()
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
@@ -178,7 +168,7 @@ class Held:
     """
 
     def __init__(self, thing: Any) -> None:
-        self._holder = vtkCollection()
+        self._holder = vtk.vtkCollection()
         self._holder.AddItem(thing)
 
     def get(self) -> Any:
@@ -193,7 +183,7 @@ def watch(
 
     Returns the observer's tag.
     """
-    weak = vtkWeakReference()
+    weak = vtk.vtkWeakReference()
     weak.Set(algorithm)
 
     def modified(*_: Any) -> None:
@@ -206,12 +196,12 @@ def watch(
 
 def whole_extent(information: Any) -> tuple[int, ...] | None:
     """Return the extent that a port announces, if it does."""
-    key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+    key = vtk.vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
     return information.Get(key) if information is not None and information.Has(key) else None
 
 
 def announce(
-    outputs: Any, window_size: tuple[int, int], scalars: tuple[int, int] = (VTK_UNSIGNED_INT, 1)
+    outputs: Any, window_size: tuple[int, int], scalars: tuple[int, int] = (vtk.VTK_UNSIGNED_INT, 1)
 ) -> None:
     """Tell the pipeline that an image of one point per pixel will come.
 
@@ -221,10 +211,10 @@ def announce(
     width, height = window_size
     information = outputs.GetInformationObject(0)
     extent = (0, width - 1, 0, height - 1, 0, 0)
-    information.Set(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), extent, 6)
-    information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
-    information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
-    vtkDataObject.SetPointDataActiveScalarInfo(information, *scalars)
+    information.Set(vtk.vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), extent, 6)
+    information.Set(vtk.vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
+    information.Set(vtk.vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
+    vtk.vtkDataObject.SetPointDataActiveScalarInfo(information, *scalars)
 
 
 def announce_times(outputs: Any, times: Sequence[float]) -> None:
@@ -265,4 +255,4 @@ def ask_for_all(inputs: Any) -> None:
     information = inputs[0].GetInformationObject(0)
     extent = whole_extent(information)
     if extent is not None:
-        information.Set(vtkStreamingDemandDrivenPipeline.UPDATE_EXTENT(), extent, 6)
+        information.Set(vtk.vtkStreamingDemandDrivenPipeline.UPDATE_EXTENT(), extent, 6)

@@ -23,23 +23,11 @@ from pyvista_vdi.io.vdi_file.description import plain_number
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.vtk_pipeline import vtk
 
 # The documented name of it is here
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     transfer_function_from_property as transfer_function_from_property,
-)
-from pyvista_vdi.vtk_pipeline.vtk import (
-    VTK_UNSIGNED_CHAR,
-    numpy_to_vtk,
-    require_this_build,
-    vtk_to_numpy,
-    vtkCellDataToPointData,
-    vtkCommonDataModel,
-    vtkDataArray,
-    vtkDataObject,
-    vtkDataSetAttributes,
-    vtkImageData,
-    vtkStringArray,
 )
 
 #: Point scalars of the canonical form: how many supersegments each pixel's list has.
@@ -67,15 +55,15 @@ _REMEDIES = {
 }
 
 
-def require_image(data: Any) -> vtkImageData:
+def require_image(data: Any) -> vtk.vtkImageData:
     """Return ``data`` if it is a uniform grid, and say how to make one of anything else."""
-    if isinstance(data, vtkImageData):
+    if isinstance(data, vtk.vtkImageData):
         return data
     if not hasattr(data, "GetClassName"):
         raise InvalidVolumeTypeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
         )
-    require_this_build(type(data))
+    vtk.require_this_build(type(data))
     raise _refusal(type(data))
 
 
@@ -84,11 +72,15 @@ def require_image_port(port: Any) -> None:
 
     A port that promises no more than a ``vtkDataSet``, say, passes.
     """
-    require_this_build(type(port))
+    vtk.require_this_build(type(port))
     information = port.GetProducer().GetOutputPortInformation(port.GetIndex())
-    name = str(information.Get(vtkDataObject.DATA_TYPE_NAME()))
-    promised = getattr(vtkCommonDataModel, name, None)
-    if promised is None or issubclass(promised, vtkImageData) or issubclass(vtkImageData, promised):
+    name = str(information.Get(vtk.vtkDataObject.DATA_TYPE_NAME()))
+    promised = getattr(vtk.vtkCommonDataModel, name, None)
+    if (
+        promised is None
+        or issubclass(promised, vtk.vtkImageData)
+        or issubclass(vtk.vtkImageData, promised)
+    ):
         return
     raise _refusal(promised)
 
@@ -96,7 +88,7 @@ def require_image_port(port: Any) -> None:
 def _refusal(kind: type) -> UnsupportedError:
     named = f"{with_article(kind.__name__)} is not a uniform grid"
     for name, remedy in _REMEDIES.items():
-        if issubclass(kind, getattr(vtkCommonDataModel, name)):
+        if issubclass(kind, getattr(vtk.vtkCommonDataModel, name)):
             return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")
     return UnsupportedError(
         f"{named} (vtkImageData), which is all that a VDI is made from: resample it to one"
@@ -132,7 +124,7 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     """
     image = require_image(image)
     array = scalars_of(image, scalars, preference)
-    rgba = array.GetNumberOfComponents() == 4 and array.GetDataType() == VTK_UNSIGNED_CHAR
+    rgba = array.GetNumberOfComponents() == 4 and array.GetDataType() == vtk.VTK_UNSIGNED_CHAR
     if array.GetNumberOfComponents() != 1 and not rgba:
         n = array.GetNumberOfComponents()
         raise UnsupportedError(
@@ -153,7 +145,7 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
                 "a volume needs at least two points along each axis"
             )
         # Average the cells' values at the points, by the filter that add_volume uses
-        cells, to_points = vtkImageData(), vtkCellDataToPointData()
+        cells, to_points = vtk.vtkImageData(), vtk.vtkCellDataToPointData()
         cells.CopyStructure(image)
         cells.GetCellData().SetScalars(array)
         to_points.SetInputData(cells)
@@ -173,7 +165,7 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     )
 
 
-def ghosts_of(image: vtkImageData) -> dict[str, NDArray[np.uint8]]:
+def ghosts_of(image: vtk.vtkImageData) -> dict[str, NDArray[np.uint8]]:
     """Return the ghost arrays that mark anything, of "point" and "cell", (nz, ny, nx)."""
     nx, ny, nz = image.GetDimensions()
     found = {}
@@ -186,7 +178,7 @@ def ghosts_of(image: vtkImageData) -> dict[str, NDArray[np.uint8]]:
     return found
 
 
-def _blanked(image: vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
+def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
     """Return the octants that VTK's GPU mapper leaves out, as a :class:`Volume` has them.
 
     Its texels are points, or cells where the scalars are theirs. It leaves out a sample where the
@@ -211,7 +203,9 @@ def _blanked(image: vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
     return blanked
 
 
-def scalars_of(image: vtkImageData, name: str | None, preference: str = "point") -> vtkDataArray:
+def scalars_of(
+    image: vtk.vtkImageData, name: str | None, preference: str = "point"
+) -> vtk.vtkDataArray:
     """Return the array that ``name`` means: see :func:`volume_from_vtk`."""
     if image.GetNumberOfPoints() == 0:
         raise InvalidVolumeError("the volume is empty: it has no points")
@@ -227,7 +221,9 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
         for kind, data in attributes.items()
     }
     named = (array.GetName() for found in arrays.values() for array in found)
-    names = [name for name in dict.fromkeys(named) if name != vtkDataSetAttributes.GhostArrayName()]
+    names = [
+        name for name in dict.fromkeys(named) if name != vtk.vtkDataSetAttributes.GhostArrayName()
+    ]
     if name is None:
         # Active scalars: points first, whatever the preference, as pyvista's active_scalars
         for data in attributes.values():
@@ -250,27 +246,27 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
     raise UnknownArrayError(f"the volume has no array {name!r}: {hint} arrays are {names}")
 
 
-def as_numpy(array: vtkDataArray) -> NDArray[Any]:
+def as_numpy(array: vtk.vtkDataArray) -> NDArray[Any]:
     """Return the values of VTK's array, sharing its memory where they lie one after the other."""
     if not array.HasStandardMemoryLayout():  # implicit (constant, affine, ...), or by components
-        plain = vtkDataArray.CreateDataArray(array.GetDataType())
+        plain = vtk.vtkDataArray.CreateDataArray(array.GetDataType())
         plain.DeepCopy(array)
-        return vtk_to_numpy(plain)  # type: ignore[no-any-return]
-    values: NDArray[Any] = vtk_to_numpy(array)
+        return vtk.vtk_to_numpy(plain)  # type: ignore[no-any-return]
+    values: NDArray[Any] = vtk.vtk_to_numpy(array)
     # NumPy's own array rather than one that keeps VTK's, which has an attribute: see Held
     lent = getattr(array, "_numpy_reference", values)
     theirs, ours = ((a.dtype, a.size, a.ctypes.data) for a in (lent, values))
     return lent.reshape(values.shape) if theirs == ours else values
 
 
-def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
+def volume_to_image(volume: Volume, name: str | None = None) -> vtk.vtkImageData:
     """Return a volume as a grid that shares its memory; its scalars are the active ones."""
     if volume.blanked is not None:
         raise UnsupportedError(
             f"the volume {volume.name!r} has blank octants, for which a vtkImageData has no place: "
             "pass the grid that it was made of"
         )
-    image = vtkImageData()
+    image = vtk.vtkImageData()
     image.SetDimensions(volume.dimensions)
     image.SetSpacing(volume.spacing)
     image.SetOrigin(volume.origin)
@@ -281,7 +277,7 @@ def volume_to_image(volume: Volume, name: str | None = None) -> vtkImageData:
     return image
 
 
-def vdi_to_image(vdi: VDI) -> vtkImageData:
+def vdi_to_image(vdi: VDI) -> vtk.vtkImageData:
     """Return a VDI in its canonical VTK form.
 
     Parameters
@@ -299,7 +295,7 @@ def vdi_to_image(vdi: VDI) -> vtkImageData:
         bit.
     """
     width, height = vdi.window_size
-    image = vtkImageData()
+    image = vtk.vtkImageData()
     image.SetDimensions(width, height, 1)
     counts = np.diff(vdi.offsets).astype(np.uint32)
     image.GetPointData().SetScalars(to_vtk(COUNT, counts))
@@ -321,7 +317,7 @@ def vdi_to_image(vdi: VDI) -> vtkImageData:
             f"the VDI's metadata cannot be written: {error}; they may hold numbers, text, lists "
             "and dictionaries with text as keys"
         ) from error
-    description = vtkStringArray()
+    description = vtk.vtkStringArray()
     description.SetName(DESCRIPTION)
     description.InsertNextValue(text)
     field.AddArray(description)
@@ -330,8 +326,8 @@ def vdi_to_image(vdi: VDI) -> vtkImageData:
 
 def is_vdi_image(data: Any) -> bool:
     """Whether a VTK object is a VDI in its canonical form."""
-    return isinstance(data, vtkImageData) and isinstance(
-        data.GetFieldData().GetAbstractArray(DESCRIPTION), vtkStringArray
+    return isinstance(data, vtk.vtkImageData) and isinstance(
+        data.GetFieldData().GetAbstractArray(DESCRIPTION), vtk.vtkStringArray
     )
 
 
@@ -353,7 +349,7 @@ def vdi_from_image(image: Any) -> VDI:
     InvalidVDIError
         If the image is not such a form, of a newer version, or its arrays break a rule.
     """
-    require_this_build(type(image))
+    vtk.require_this_build(type(image))
     if not is_vdi_image(image):
         kind = type(image).__name__
         raise InvalidVDIError(
@@ -377,7 +373,7 @@ def vdi_from_image(image: Any) -> VDI:
     return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
 
 
-def view_of_image(image: vtkImageData) -> dict[str, Any]:
+def view_of_image(image: vtk.vtkImageData) -> dict[str, Any]:
     """Return what the description of a VDI's image says: arguments of :class:`VDI`."""
     try:
         about = json.loads(image.GetFieldData().GetAbstractArray(DESCRIPTION).GetValue(0))
@@ -397,7 +393,7 @@ def view_of_image(image: vtkImageData) -> dict[str, Any]:
     )
 
 
-def _counts_of(image: vtkImageData) -> NDArray[Any]:
+def _counts_of(image: vtk.vtkImageData) -> NDArray[Any]:
     """Return the supersegments of each list, checked; nothing is allocated for a window alone."""
     array = image.GetPointData().GetArray(COUNT)
     if array is None:
@@ -417,13 +413,13 @@ def _counts_of(image: vtkImageData) -> NDArray[Any]:
     return counts
 
 
-def to_vtk(name: str, array: NDArray[Any]) -> vtkDataArray:
+def to_vtk(name: str, array: NDArray[Any]) -> vtk.vtkDataArray:
     """Return a named array of VTK's that shares the memory."""
     # VTK's arrays hold memory through the buffer protocol; this view drops NumPy's read-only flag
     if not array.flags.writeable and array.size:
         array = np.frombuffer(memoryview(array.data).cast("B"), dtype=array.dtype).reshape(
             array.shape
         )
-    result = numpy_to_vtk(array)
+    result = vtk.numpy_to_vtk(array)
     result.SetName(name)
     return result

@@ -12,11 +12,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_external
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
-from pyvista_vdi.vtk_pipeline.vtk import (
-    require_this_build,
-    vtkColorTransferFunction,
-    vtkVolumeProperty,
-)
+from pyvista_vdi.vtk_pipeline import vtk
 
 #: Entries of a table that samples the property's functions, where nothing narrower than an entry
 #: would be lost: a step in them becomes a ramp of one entry's width.
@@ -120,8 +116,8 @@ def transfer_function_from_property(
 
 def check_property(prop: Any, *, rgba: bool = False) -> None:
     """Refuse what no table can have; functions may be filled with points later."""
-    require_this_build(type(prop))
-    if not isinstance(prop, vtkVolumeProperty):
+    vtk.require_this_build(type(prop))
+    if not isinstance(prop, vtk.vtkVolumeProperty):
         raise InvalidArgumentError(
             f"volume_property must be a vtkVolumeProperty; got {type(prop).__name__}"
         )
@@ -130,7 +126,7 @@ def check_property(prop: Any, *, rgba: bool = False) -> None:
         reasons.append("independent components of an RGBA volume (IndependentComponentsOff())")
     if not rgba and not prop.GetIndependentComponents():
         reasons.append("dependent components, which are for RGBA (IndependentComponentsOn())")
-    if prop.GetTransferFunctionMode() == vtkVolumeProperty.TF_2D:
+    if prop.GetTransferFunctionMode() == vtk.vtkVolumeProperty.TF_2D:
         reasons.append("a 2D transfer function (SetTransferFunctionModeTo1D())")
     if getattr(prop, "GetNumberOfLabels", lambda: 0)() > 0:
         reasons.append("a label map's functions (remove SetLabelColor, SetLabelScalarOpacity)")
@@ -144,7 +140,7 @@ def check_property(prop: Any, *, rgba: bool = False) -> None:
         )
 
 
-def color_function(prop: vtkVolumeProperty) -> Any:
+def color_function(prop: vtk.vtkVolumeProperty) -> Any:
     """Return the function that colours: RGB or grey.
 
     Asking a grey property for its RGB function would make it one of colour.
@@ -153,7 +149,7 @@ def color_function(prop: vtkVolumeProperty) -> Any:
     return prop.GetGrayTransferFunction() if grey else prop.GetRGBTransferFunction()
 
 
-def _gradient_opacity(prop: vtkVolumeProperty, volume: Any) -> dict[str, Any]:
+def _gradient_opacity(prop: vtk.vtkVolumeProperty, volume: Any) -> dict[str, Any]:
     if prop.GetDisableGradientOpacity() or not prop.HasGradientOpacity():
         return {}
     function = _Function("gradient opacity", prop.GetGradientOpacity())
@@ -185,7 +181,7 @@ class _Function:
 
     def __init__(self, name: str, function: Any) -> None:
         self.name, self._function = name, function
-        colored = isinstance(function, vtkColorTransferFunction)
+        colored = isinstance(function, vtk.vtkColorTransferFunction)
         rows = np.empty((function.GetSize(), 6 if colored else 4))
         for i in range(len(rows)):
             function.GetNodeValue(i, rows[i])
@@ -288,7 +284,7 @@ class _Function:
         What ``GetTable`` has of a logarithmic scale differs between versions of VTK.
         """
         function, first, last = self._function, self.x[0], self.x[-1]
-        within = vtkColorTransferFunction()
+        within = vtk.vtkColorTransferFunction()
         within.DeepCopy(function)
         within.SetScaleToLinear()
         within.RemoveAllPoints()

@@ -21,6 +21,7 @@ from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi, mpi, require_sa
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.algorithm import whole_extent
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     ghosts_of,
@@ -29,11 +30,6 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     volume_from_vtk,
 )
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
-from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkDataSetAttributes,
-    vtkImageData,
-    vtkStreamingDemandDrivenPipeline,
-)
 
 #: What fails, for the message that all ranks get.
 _MAKING = "making a VDI"
@@ -154,7 +150,7 @@ class RanksVDISource(VDISource):
         if comm is not None and whole is not None:
             with suppress(InvalidVolumeError):  # RequestData says it
                 own = _boxes(_points(whole), comm.size)[comm.rank]
-                pipeline = vtkStreamingDemandDrivenPipeline
+                pipeline = vtk.vtkStreamingDemandDrivenPipeline
                 # Of several pieces, readers would take this rank's part of the block alone
                 information.Set(pipeline.UPDATE_PIECE_NUMBER(), 0)
                 information.Set(pipeline.UPDATE_NUMBER_OF_PIECES(), 1)
@@ -204,11 +200,11 @@ class RanksVDISource(VDISource):
         volume = self._read(image)
         return getattr(volume, "grid", volume).default_unit_distance  # type: ignore[no-any-return]
 
-    def _holds_all(self, data: vtkImageData) -> bool:
+    def _holds_all(self, data: vtk.vtkImageData) -> bool:
         return not are_several()
 
     def _view(
-        self, grid: vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool
+        self, grid: vtk.vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool
     ) -> tuple[Camera, tuple[int, int]]:
         whole = self._input_grid() if communicator() is not None else grid
         return super()._view(whole or grid, camera, window_size, warn=warn)
@@ -282,7 +278,7 @@ class _Held:
     ends: tuple[float, float]
 
     @classmethod
-    def of(cls, image: vtkImageData, whole: Any, scalars: str | None, preference: str) -> _Held:
+    def of(cls, image: vtk.vtkImageData, whole: Any, scalars: str | None, preference: str) -> _Held:
         """Return the points whose values are right: not those at a border, if of cells."""
         volume = volume_from_vtk(image, scalars, preference)
         if volume.rgba:
@@ -292,8 +288,8 @@ class _Held:
             )
         # Copies of what other ranks have are marked, too
         hidden = {
-            "point": vtkDataSetAttributes.HIDDENPOINT,
-            "cell": vtkDataSetAttributes.HIDDENCELL,
+            "point": vtk.vtkDataSetAttributes.HIDDENPOINT,
+            "cell": vtk.vtkDataSetAttributes.HIDDENCELL,
         }
         if any((marks & hidden[kind]).any() for kind, marks in ghosts_of(image).items()):
             raise UnsupportedError(

@@ -15,17 +15,12 @@ from pyvista_vdi.errors import InvalidVDIError, VDIFileError
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     DESCRIPTION,
     FORM_VERSION,
     vdi_from_image,
     vdi_to_image,
-)
-from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkOutputWindow,
-    vtkStringOutputWindow,
-    vtkXMLImageDataReader,
-    vtkXMLImageDataWriter,
 )
 
 #: Names of VTK's compressors, as its writer's methods have them.
@@ -46,7 +41,7 @@ def write(
         image = vdi_to_image(vdi)
     except InvalidVDIError as error:
         raise VDIFileError(str(error)) from error
-    writer = vtkXMLImageDataWriter()
+    writer = vtk.vtkXMLImageDataWriter()
     writer.SetInputData(image)
     getattr(writer, f"SetCompressorTypeTo{_COMPRESSORS[compression]}")()
     if compression != "none":
@@ -128,7 +123,7 @@ def _image(path: Any) -> Any:
             f"{file} is damaged: {len(content)} bytes cannot hold the {max(declared)} values that "
             "they declare"
         )
-    reader = vtkXMLImageDataReader()
+    reader = vtk.vtkXMLImageDataReader()
     reader.ReadFromInputStringOn()
     reader.SetInputString(content)
     with _messages() as messages:
@@ -151,12 +146,12 @@ def _codec(file: Path) -> str:
 @contextmanager
 def _messages() -> Iterator[Any]:
     """Catch what VTK writes to its output window."""
-    before, messages = vtkOutputWindow.GetInstance(), vtkStringOutputWindow()
-    vtkOutputWindow.SetInstance(messages)
+    before, messages = vtk.vtkOutputWindow.GetInstance(), vtk.vtkStringOutputWindow()
+    vtk.vtkOutputWindow.SetInstance(messages)
     try:
         yield messages
     finally:
-        vtkOutputWindow.SetInstance(before)
+        vtk.vtkOutputWindow.SetInstance(before)
 
 
 def _first_line(messages: Any) -> str:
