@@ -228,23 +228,18 @@ def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
 
 _lock = threading.RLock()
 _found: tuple[list[Candidate], list[str]] | None = None
-#: Whether this process was forked from one that had loaded drivers.
-_forked = False
+#: Whether drivers are here that the threads they work with did not follow into a fork.
+forked = False
 
 
 def _note_fork() -> None:
-    global _forked, _lock
-    _forked = _forked or _found is not None
+    global forked, _lock
+    forked = forked or _found is not None
     _lock = threading.RLock()  # a thread that is not here may have held it
 
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
-
-
-def drivers_lost() -> bool:
-    """Whether drivers are here that the threads they work with did not follow into a fork."""
-    return _forked
 
 
 def require_drivers() -> None:
@@ -255,7 +250,7 @@ def require_drivers() -> None:
     DeviceError
         If this process is such a fork. No lock is taken before: another thread may have held it.
     """
-    if _forked:
+    if forked:
         raise DeviceError(
             "this process was forked from one that had used OpenCL already, and drivers do not "
             'survive that: start processes by multiprocessing.get_context("spawn"), or fork '

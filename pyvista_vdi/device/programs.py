@@ -15,10 +15,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pyvista_vdi.device import sources
-from pyvista_vdi.device.constants import KERNEL_CONSTANTS
+from pyvista_vdi.device.constants import literal
 from pyvista_vdi.device.declarations import Define as Define
 from pyvista_vdi.device.declarations import KernelDeclaration, Parameter
 from pyvista_vdi.device.devices import opencl
@@ -35,11 +33,8 @@ on_compiling: set[Callable[[], object]] = set()
 
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 _NOT_IN_OPTIONS = re.compile(r"[\s\"'\\;]")
-#: What several launches with offsets answer otherwise than one launch does.
-_PLACE_OF_GROUP = re.compile(r"\bget_(group_id|num_groups|global_size|global_offset)\b")
 _logger = logging.getLogger(__name__)
 _numbers = itertools.count(1)
-# pyopencl makes Python code for each, under names that it takes for free in two threads at a time
 _kernel_lock = threading.RLock()
 
 
@@ -69,14 +64,7 @@ def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
         if value is None:
             options.append(f"-D{name}")
             continue
-        if isinstance(value, (bool, np.bool_)):
-            text = str(int(value))
-        elif isinstance(value, (float, np.floating)):
-            text = f"({float(np.float32(value)).hex()}f)"
-        elif isinstance(value, (int, np.integer)):
-            text = str(value) if value >= 0 else f"({value})"
-        else:
-            text = str(value)
+        text = literal(value)
         if not text or _NOT_IN_OPTIONS.search(text):
             raise InvalidArgumentError(
                 f"-D{name}={text!r}: a value must be non-empty and free of spaces, quotes, "
@@ -89,8 +77,8 @@ def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
 class Kernel:
     """A kernel function of a compiled program; threads may share it.
 
-    OpenCL kernel objects carry their arguments and are not thread safe, so each thread gets an
-    object of its own when it first launches.
+    OpenCL's kernel objects carry their arguments and are not thread safe, so each launch has one of
+    its own while it is there.
 
     Attributes
     ----------
@@ -98,20 +86,22 @@ class Kernel:
         The function.
     path : str
         The file that it comes from.
-    divisible : bool
-        Whether several launches with offsets do what one launch does: nothing in the program asks
-        where in the whole its work-group is.
+    argument_count : int
+        How many arguments it takes.
+    parameters : dict of str to Parameter
+        These, by name and in order; empty until they are declared.
+    free : list of pyopencl.Kernel
+        The driver's objects that no launch has.
     """
 
-    def __init__(self, program: Any, path: str, name: str, source: str) -> None:
+    def __init__(self, program: Any, path: str, name: str) -> None:
         self.name = name
         self.path = path
-        self.divisible = _PLACE_OF_GROUP.search(source) is None
-        self._program = program
-        self._local = threading.local()
         self.parameters: dict[str, Parameter] = {}
-        self._free: list[Any] = []  # driver's kernel objects that no launch has
-        self.argument_count = int(self.object.num_args)
+        self.free: list[Any] = []
+        self._program = program
+        self.free.append(self.take())
+        self.argument_count = int(self.free[0].num_args)
 
     def declare(self, declaration: KernelDeclaration, defines: Mapping[str, Define]) -> None:
         """Take the names and types of the arguments from a declaration.
@@ -121,8 +111,6 @@ class Kernel:
         KernelBuildError
             If the compiled kernel has another number of them.
         """
-        if self.parameters:
-            return
         parameters = declaration.parameters(defines)
         if len(parameters) != self.argument_count:
             raise KernelBuildError(
@@ -132,31 +120,17 @@ class Kernel:
         self.parameters = parameters
 
     def take(self) -> Any:
-        """Return a driver's kernel object that nobody else has; to make one takes its time."""
-        try:
-            return self._free.pop()
-        except IndexError:
-            return _kernel_object(self._program, self.name)
-
-    def put_back(self, driver_kernel: Any) -> None:
-        """Keep a driver's kernel object for the next launch."""
-        self._free.append(driver_kernel)
-
-    @property
-    def object(self) -> Any:
-        """The driver's kernel object of the calling thread."""
-        found = getattr(self._local, "kernel", None)
-        if found is None:
-            found = self._local.kernel = _kernel_object(self._program, self.name)
-        return found
-
-    @property
-    def arguments_set(self) -> dict[int, Any]:
-        """By index, what the calling thread's kernel object was given last, for who gives it."""
-        found: dict[int, Any] | None = getattr(self._local, "arguments", None)
-        if found is None:
-            found = self._local.arguments = {}
-        return found
+        """Return a driver's object that nobody else has; to make one takes its time."""
+        with contextlib.suppress(IndexError):
+            return self.free.pop()
+        cl: Any = opencl()
+        # pyopencl makes Python code for each, under names that it takes for free in two threads
+        with _kernel_lock:
+            try:
+                return cl.Kernel(self._program, self.name)
+            except sqlite3.Error:  # the file in which it keeps that code cannot be used
+                cl._PYOPENCL_NO_CACHE = True
+                return cl.Kernel(self._program, self.name)
 
     def __repr__(self) -> str:
         return f"<Kernel {self.name!r} of {self.path}>"
@@ -179,11 +153,7 @@ class ProgramCache:
         self._kernels: dict[tuple[Any, ...], Kernel] = {}
         self._programs: dict[tuple[str, tuple[str, ...]], Any] = {}
         self._locks: dict[tuple[str, tuple[str, ...]], threading.Lock] = {}
-        self._base_options = (
-            "-cl-std=CL1.2",
-            *_rounding_options(device),
-            *define_options(KERNEL_CONSTANTS),
-        )
+        self._base_options = ("-cl-std=CL1.2", *_rounding_options(device))
 
     def known(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel | None:
         """A kernel of the package's files that was compiled before; parameters as for kernel."""
@@ -244,7 +214,7 @@ class ProgramCache:
         self, program: Any, path: str, name: str, source: str, options: tuple[str, ...]
     ) -> Kernel:
         try:
-            return Kernel(program, path, name, source)
+            return Kernel(program, path, name)
         except opencl().Error as exc:
             names = program.kernel_names.replace(";", ", ") or "none"
             raise KernelBuildError(
@@ -258,16 +228,6 @@ def _rounding_options(device: Any) -> tuple[str, ...]:
     if device.single_fp_config & correctly_rounded:
         return ("-cl-fp32-correctly-rounded-divide-sqrt",)
     return ()
-
-
-def _kernel_object(program: Any, name: str) -> Any:
-    cl: Any = opencl()
-    with _kernel_lock:
-        try:
-            return cl.Kernel(program, name)
-        except sqlite3.Error:  # the file in which it keeps that code cannot be used
-            cl._PYOPENCL_NO_CACHE = True
-            return cl.Kernel(program, name)
 
 
 def build(context: Any, device: Any, path: str, source: str, options: tuple[str, ...]) -> Any:

@@ -7,6 +7,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
 
+from pyvista_vdi.device.constants import definitions
 from pyvista_vdi.errors import KernelBuildError
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
@@ -86,8 +87,10 @@ def _read_disk(path: Path) -> str:
 
 def _expand_text(name: str, text: str) -> str:
     lines: list[str] = []
-    _append_file(name, text, {name}, lines)
-    return "\n".join(lines) + "\n"
+    seen = {name}
+    _append_file(name, text, seen, lines)
+    constants = definitions({file.partition("/")[0] for file in seen})
+    return "\n".join([*constants, *lines]) + "\n"
 
 
 def _append_file(name: str, text: str, seen: set[str], out: list[str]) -> None:
