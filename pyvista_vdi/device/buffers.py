@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 
 #: Page-locked host memory that a device may have, and the least worth it, bytes.
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
@@ -88,14 +88,7 @@ class PinnedArrays:
 class Held:
     """What goes back with a buffer: bytes that are accounted for, and the driver's memory.
 
-    Attributes
-    ----------
-    nbytes : int
-        Bytes that it takes on the device.
-    memory : pyopencl.MemoryObject or None
-        The driver's.
-    readers : set of int or None
-        Where the memory is a host array's: the queues whose kernels use it.
+    ``readers``: where the memory is a host's array, the queues whose kernels use it.
     """
 
     nbytes = 0
@@ -120,8 +113,8 @@ class DeviceBuffer:
         What it holds, for messages.
     writable : bool
         Whether :meth:`Runtime.write` and :meth:`Runtime.fill` may change it.
-    released : bool
-        Whether the memory has been given back.
+    memory : pyopencl.MemoryObject or None
+        The driver's; None when it has been given back.
     readers : set of int or None
         Where the memory is a host array's: the queues whose kernels use it.
     host : numpy.ndarray or None
@@ -143,7 +136,7 @@ class DeviceBuffer:
         self.nbytes = math.prod(shape) * dtype.itemsize
         self.name = name
         self.writable = writable
-        self.released = False
+        self.memory: Any = None
         self.readers: set[int] | None = None
         self.host: NDArray[Any] | None = None
         # Nothing is held yet, so that wherever an interrupt comes, what is held goes back
@@ -151,23 +144,15 @@ class DeviceBuffer:
         self._finalizer = weakref.finalize(self, give_back, self.held)
         self._finalizer.atexit = False  # the driver frees everything at exit
 
-    @property
-    def memory(self) -> Any:
-        """The driver's memory object.
-
-        Raises
-        ------
-        DeviceError
-            If the buffer has been released.
-        """
-        if self.released:
-            raise DeviceError(f"the buffer {self.name!r} was used after its release")
-        return self.held.memory
-
     def release(self) -> None:
         """Give the memory back; a second call does nothing. Enqueued work still finishes."""
-        self.released = True
+        self.memory = None
         self._finalizer()
+
+    @property
+    def released(self) -> bool:
+        """Whether the memory has been given back."""
+        return self.memory is None
 
     def __enter__(self) -> DeviceBuffer:
         return self

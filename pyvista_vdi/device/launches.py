@@ -28,23 +28,13 @@ _NULL = np.uintp(0)
 
 
 def padded(size: Size, group: Size) -> tuple[int, ...]:
-    """The next multiple of a work-group size in each dimension.
-
-    Parameters
-    ----------
-    size, group : int or tuple of int
-        Work items wanted, and per work-group.
-
-    Returns
-    -------
-    tuple of int
-        A global size for a launch; the kernel leaves out the surplus itself.
-    """
-    return tuple(-(-n // g) * g for n, g in zip(_as_size(size), _as_size(group), strict=True))
+    """The next multiple of a work-group size in each dimension; kernels leave out the surplus."""
+    sizes = size if isinstance(size, tuple) else (size,)
+    groups = group if isinstance(group, tuple) else (group,)
+    return tuple([-(-n // g) * g for n, g in zip(sizes, groups, strict=True)])
 
 
-def _as_size(size: Size) -> tuple[int, ...]:
-    return tuple(map(int, size)) if isinstance(size, tuple) else (int(size),)
+_RELEASED = "the buffer {!r} was used after its release"
 
 
 class Launch:
@@ -66,7 +56,11 @@ class Launch:
         self._queues, self._kernel = queues, kernel
         self._missing = dict.fromkeys(kernel.parameters)  # in order
         self._buffers: dict[str, DeviceBuffer | None] = {}
-        self._object = kernel.take()  # the driver's, which holds the arguments
+        # The driver's, which holds the arguments: one that no other launch has
+        try:
+            self._object = kernel.free.pop()
+        except IndexError:
+            self._object = kernel.new_object()
 
     def __del__(self) -> None:
         if hasattr(self, "_object"):
@@ -85,8 +79,21 @@ class Launch:
                     f"kernel {kernel.name!r} of {kernel.path} has no argument {name!r} with these "
                     f"options; it takes {', '.join(kernel.parameters)}"
                 )
+            buffer = value if isinstance(value, DeviceBuffer) else None
             try:
-                self._object.set_arg(parameter.index, _given(parameter, value))
+                if buffer is not None:
+                    given = buffer.memory
+                    if given is None:
+                        raise DeviceError(_RELEASED.format(buffer.name))
+                    if parameter.held is not None and buffer.dtype not in parameter.held:
+                        raise TypeError
+                elif parameter.scalar is not None and value is not None:
+                    given = parameter.scalar(value)
+                    if given != value and given.dtype.kind != "f":
+                        raise TypeError
+                else:
+                    given = _given(parameter, value)
+                self._object.set_arg(parameter.index, given)
             except (AttributeError, OverflowError, TypeError, ValueError) as exc:
                 raise TypeError(
                     f"argument {name!r} of kernel {kernel.name!r} is declared as {parameter.kind}; "
@@ -95,25 +102,14 @@ class Launch:
             except queues.cl.Error as exc:
                 doing = f"setting argument {name!r} of {kernel.name!r} of {kernel.path}"
                 raise queues.failure(exc, doing) from exc
-            self._buffers[name] = value if isinstance(value, DeviceBuffer) else None
+            self._buffers[name] = buffer
             self._missing.pop(name, None)
 
     def set_in_order(self, *arguments: Any) -> None:
         """Set all arguments of a kernel that nobody declared, by the types that NumPy gives them.
 
-        Parameters
-        ----------
-        *arguments : DeviceBuffer, LocalMemory, numpy scalar, numpy.ndarray or None
-            In the kernel's order; an array is passed by value, as a vector or a structure.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If there are more or fewer than the kernel takes.
-        TypeError
-            If one has no device type (a Python number).
-        DeviceError
-            If a buffer has been released, or the driver refuses for any other reason.
+        A small array is passed by value, as a vector or a structure; None is a null pointer.
+        TypeError if one has no device type, such as a Python number.
         """
         kernel, queues = self._kernel, self._queues
         if len(arguments) != kernel.argument_count:
@@ -125,6 +121,8 @@ class Launch:
             given, buffer = value, None
             if isinstance(value, DeviceBuffer):
                 given, buffer = value.memory, value
+                if given is None:
+                    raise DeviceError(_RELEASED.format(value.name))
             elif value is None:
                 given = _NULL
             elif isinstance(value, LocalMemory):
@@ -154,23 +152,17 @@ class Launch:
         size : int or tuple of int
             Work-items in each dimension; nothing is launched if one is 0.
         group : int or tuple of int, optional
-            Work-items of a work-group, which divide ``size`` (see :func:`padded`); by default the
-            driver chooses.
-        **arguments : DeviceBuffer, number, sequence of numbers, structure or None
+            Those of a work-group, which divide ``size`` (see :func:`padded`); by default the driver
+            chooses.
+        **arguments
             As of :meth:`Runtime.bind`.
 
         Raises
         ------
-        InvalidArgumentError
-            If the sizes do not fit each other, a name is no argument's, or one was never given.
-        TypeError
-            If a value is not of its argument's type.
-        DeviceMemoryError
-            If the driver lacks memory or resources.
-        DeviceError
-            If a buffer has been released, or the driver refuses for any other reason.
-        Cancelled
-            Inside :meth:`Runtime.background`, if the work is no longer wanted.
+        InvalidArgumentError, TypeError
+            If the sizes do not fit each other, or the arguments not the kernel's.
+        DeviceMemoryError, DeviceError
+            If the driver refuses, or a buffer has been released.
         """
         # Set what changes
         queues, kernel = self._queues, self._kernel
@@ -194,14 +186,14 @@ class Launch:
             return
 
         # Note who reads host memory in place, which is waited for before it goes
-        number = queues.thread.queue
+        number = queues.thread.number
         for buffer in self._buffers.values():
             if buffer is None:
                 continue
-            if buffer.released:
-                raise DeviceError(f"the buffer {buffer.name!r} was used after its release")
+            if buffer.memory is None:
+                raise DeviceError(_RELEASED.format(buffer.name))
             if buffer.readers is not None and number not in buffer.readers:
-                queues.note_reader(buffer)
+                queues.note_reader(buffer.readers)
 
         # Enqueue it
         worker = queues.turns.thread.worker
@@ -213,7 +205,9 @@ class Launch:
         except queues.cl.Error as exc:
             doing = f"launching {kernel.name!r} of {kernel.path} on {whole} by {local}"
             raise queues.failure(exc, doing) from exc
-        queues.record(kernel.name, event)
+        profile = queues.thread.profile or queues.profiled
+        if profile is not None:
+            profile.record(kernel.name, event)
 
     def _run_in_pieces(
         self, worker: Worker, whole: tuple[int, ...], local: tuple[int, ...] | None
@@ -245,33 +239,21 @@ class Launch:
 
 
 def _given(parameter: Parameter, value: Any) -> Any:
-    """Return a value as the driver takes it.
-
-    Numbers are rounded to float32 where the type is that, and are otherwise kept exactly.
-
-    Raises
-    ------
-    AttributeError, OverflowError, TypeError or ValueError
-        If it cannot be had of the argument's type.
-    """
+    """Return local memory, a null pointer, a structure or a vector as the driver takes it."""
     kind, number, count = parameter.kind, parameter.number, parameter.count
     if kind.startswith("local "):
         assert number is not None
         return opencl().LocalMemory(operator.index(value) * count * number.itemsize)
     if kind.endswith("*"):
-        if value is None:
-            return _NULL
-        # Buffers may hold the parts of a pointer's numbers, such as two floats for a ulong
-        memory, held = value.memory, value.dtype
-        if number is not None and held != number and number.itemsize % (2 * held.itemsize):
+        if value is not None:
             raise TypeError
-        return memory
+        return _NULL
     if number is None or number.names is not None:
         if value.dtype != number:
             raise TypeError
         return value
     converted = np.array(value, number)
     exact = number.kind == "f" or np.array_equal(converted, value)
-    if value is None or converted.size != count or not exact:
+    if converted.size != count or not exact:
         raise TypeError
     return converted

@@ -71,21 +71,8 @@ class Memory(Queues):
     ) -> DeviceBuffer:
         """Uninitialised memory on the device, checked against its limits before it is taken.
 
-        Parameters
-        ----------
-        nbytes_or_shape : int or tuple of int
-            An integer is a number of **bytes**, a tuple a shape in elements. Zero is allowed.
-        dtype : dtype_like, default: numpy.float32
-            Element type.
-        name : str, default: "buffer"
-            What it is for; messages say it.
-        read_only : bool, default: False
-            Whether kernels only read it.
-
-        Returns
-        -------
-        DeviceBuffer
-            Release it, use it in a ``with`` block, or drop it.
+        An integer is a number of **bytes**, a tuple a shape in elements; zero is allowed. ``name``
+        is what it is for: messages say it. Release it, use it in a ``with`` block, or drop it.
 
         Raises
         ------
@@ -109,28 +96,8 @@ class Memory(Queues):
         """Uninitialised memory for kernels to write, downloaded when they have.
 
         On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
-        is copied, and that array holds what is written afterwards, too.
-
-        Parameters
-        ----------
-        shape : tuple of int
-            Shape in elements; zero is allowed.
-        dtype : dtype_like, default: numpy.float32
-            Element type.
-        name : str, default: "result"
-            What it holds; messages say it.
-        lasting : bool, default: False
-            As for :func:`aligned_empty`.
-
-        Returns
-        -------
-        DeviceBuffer
-            As of :meth:`buffer`.
-
-        Raises
-        ------
-        DeviceMemoryError
-            As for :meth:`buffer`.
+        is copied, and that array holds what is written afterwards, too. ``lasting`` is as for
+        :func:`aligned_empty`; all else, and what is raised, as for :meth:`buffer`.
         """
         dtype, flags = np.dtype(dtype), self.cl.mem_flags
         shape = shape_of(shape, dtype)
@@ -144,27 +111,8 @@ class Memory(Queues):
         """Memory for kernels to write what an array is to hold; :meth:`download` brings it there.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array, or its beginning, copies nothing.
-
-        Parameters
-        ----------
-        array : numpy.ndarray
-            C-contiguous and writable; what is in it is not read. Leave it alone until the
-            download.
-        name : str, default: "array"
-            What it is to hold; messages say it.
-
-        Returns
-        -------
-        DeviceBuffer
-            Of the array's shape and dtype, uninitialised.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the array is not C-contiguous or not writable.
-        DeviceMemoryError
-            As for :meth:`buffer`.
+        that very array, or its beginning, copies nothing. The array is C-contiguous and writable
+        (InvalidArgumentError else); what is in it is not read. Leave it alone until the download.
         """
         if not (array.flags.c_contiguous and array.flags.writeable):
             raise InvalidArgumentError(
@@ -247,6 +195,7 @@ class Memory(Queues):
                 doing = f"allocating {bytes_text(nbytes)} for the buffer {name!r}"
                 raise self.failure(exc, doing) from exc
             raise
+        buffer.memory = held.memory
         if in_place:
             buffer.readers = held.readers = set()
             buffer.host = host if writable else None

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.buffers import DeviceBuffer
 from pyvista_vdi.device.device import Device
 from pyvista_vdi.device.devices import Candidate
 from pyvista_vdi.device.profiling import KernelTime, Profile, profiling_wanted, table
@@ -18,9 +17,9 @@ from pyvista_vdi.device.scheduling import Turns
 
 
 class _ThisThread(threading.local):
-    """The number of a thread's queue, the main one's unless it has its own; and who profiles it."""
+    """The number of a thread's queue, and where the times of what it enqueues go."""
 
-    queue = 1
+    number = 1  # the main queue's
     profile: Profile | None = None
 
 
@@ -32,7 +31,9 @@ class Queues(Device):
     turns : Turns
         Who works on the device now.
     thread : object
-        ``queue``, the number of the calling thread's queue, and ``profile``, where its times go.
+        ``number`` of the calling thread's queue, and ``profile``, where its times go.
+    profiled : Profile or None
+        Where the times of all others go: with ``PYVISTA_VDI_PROFILE``.
     """
 
     def __init__(self, candidate: Candidate, context: Any = None) -> None:
@@ -42,22 +43,22 @@ class Queues(Device):
         self._queues: dict[int, Any] = {}  # those that exist, numbered as they were made
         self._queues_made = 0
         self._queues_lock = threading.RLock()
-        self._profile: Profile | None = None
+        self.profiled: Profile | None = None
         if profiling_wanted():
-            self._profile = Profile()
+            self.profiled = Profile()
             atexit.register(self._print_profile)
         self._new_queue()
 
     @property
     def queue(self) -> Any:
-        """The calling thread's queue."""
+        """The calling thread's queue; an error in a fork, where its driver would wait for ever."""
         if devices.forked:
             devices.require_drivers()
-        return self._queues[self.thread.queue]
+        return self._queues[self.thread.number]
 
     def _new_queue(self, *, profiled: bool = False) -> int:
         cl = self.cl
-        wanted = profiled or self._profile is not None
+        wanted = profiled or self.profiled is not None
         properties = cl.command_queue_properties.PROFILING_ENABLE if wanted else 0
         try:
             queue = cl.CommandQueue(self._context, self._device, properties)
@@ -73,36 +74,26 @@ class Queues(Device):
         """Give the calling thread an in-order command queue of its own inside the ``with`` block.
 
         What was enqueued before is finished first, and what is enqueued inside is finished at
-        the end, so buffers may cross the borders of the block.
-
-        Parameters
-        ----------
-        profile : Profile, optional
-            Collects the device times of what the thread enqueues inside; by default they go where
-            ``PYVISTA_VDI_PROFILE`` wants them, if anywhere.
+        the end, so buffers may cross the borders of the block. ``profile`` collects the device
+        times of what the thread enqueues inside.
         """
         self.finish()
         thread, inner = self.thread, self._new_queue(profiled=profile is not None)
-        outer, outer_profile = thread.queue, thread.profile
-        thread.queue, thread.profile = inner, profile
+        outer, outer_profile = thread.number, thread.profile
+        thread.number, thread.profile = inner, profile
         try:
             yield
         finally:
-            thread.queue, thread.profile = outer, outer_profile
+            thread.number, thread.profile = outer, outer_profile
             self.finish_queues({inner})
             with self._queues_lock:
                 del self._queues[inner]
 
     def finish(self) -> None:
-        """Wait until all that was enqueued on the calling thread's queue is done.
+        """Wait until all is done that was enqueued on the calling thread's queue.
 
         Threads outside :meth:`queue_scope` share one. A buffer that a thread with a queue of its
-        own has written may be handed to another thread after this.
-
-        Raises
-        ------
-        DeviceError
-            If a kernel failed meanwhile.
+        own has written may be handed to another thread after this. DeviceError if a kernel failed.
         """
         try:
             self.queue.finish()
@@ -113,21 +104,18 @@ class Queues(Device):
         """Finish those of some queues that still exist, where their driver does."""
         if devices.forked:
             return
-        with self._queues_lock:
-            queues = [self._queues[number] for number in numbers if number in self._queues]
         try:
-            for queue in queues:
-                queue.finish()
+            for number in tuple(numbers):
+                if (queue := self._queues.get(number)) is not None:
+                    queue.finish()
         except self.cl.Error as exc:
             raise self.failure(exc, "waiting for enqueued work") from exc
 
-    def note_reader(self, buffer: DeviceBuffer) -> None:
-        """Remember that this thread's queue reads a buffer whose memory is a caller's array."""
-        number = self.thread.queue
-        if buffer.readers is not None and number not in buffer.readers:
-            with self._queues_lock:
-                buffer.readers.intersection_update(self._queues)
-                buffer.readers.add(number)
+    def note_reader(self, readers: set[int]) -> None:
+        """Remember that this thread's queue reads a buffer whose memory is a host's array."""
+        with self._queues_lock:
+            readers.intersection_update(self._queues)
+            readers.add(self.thread.number)
 
     def foreground(self) -> contextlib.AbstractContextManager[None]:
         """Draw a frame that a person waits for inside the ``with`` block.
@@ -147,30 +135,14 @@ class Queues(Device):
         """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
 
         The calling thread gets a queue of its own. Its launches and copies are cut into pieces
-        that take no longer than a turn; each is finished when the call returns.
-
-        Parameters
-        ----------
-        cancelled : callable
-            Asked between pieces; True ends the work with :class:`Cancelled`. Called often, from
-            the thread itself.
-
-        Raises
-        ------
-        Cancelled
-            From any method that uses the device.
+        that take no longer than a turn; each is finished when the call returns. ``cancelled`` is
+        asked between pieces: True ends the work with :class:`Cancelled`, from any method.
         """
         with self.queue_scope(), self.turns.background(cancelled):
             yield
 
     def give_way(self) -> None:
-        """Let frames that wait go first; background work on the host calls it now and then.
-
-        Raises
-        ------
-        Cancelled
-            If the background work is no longer wanted.
-        """
+        """Let frames that wait go first; background work on the host calls it now and then."""
         self.turns.checkpoint()
 
     def aside(self) -> contextlib.AbstractContextManager[None]:
@@ -193,18 +165,12 @@ class Queues(Device):
         return self.turns.holding(lock)
 
     def profile(self) -> list[KernelTime]:
-        """Device time per kernel so far; empty unless ``PYVISTA_VDI_PROFILE`` was set.
-
-        Returns
-        -------
-        list of KernelTime
-            Longest total first.
-        """
-        return self._profile.figures() if self._profile else []
+        """Device time per kernel so far; empty unless ``PYVISTA_VDI_PROFILE`` was set."""
+        return self.profiled.figures() if self.profiled else []
 
     def record(self, name: str, event: Any) -> None:
         """Note the time of an enqueued command, if anybody wants it."""
-        profile = self.thread.profile or self._profile
+        profile = self.thread.profile or self.profiled
         if profile is not None:
             profile.record(name, event)
 

@@ -115,13 +115,17 @@ class Runtime(Transfers):
         InvalidArgumentError
             If a define cannot be written as an option.
         """
-        found = self._programs.known(path, name, defines or {})
-        if found is not None:
-            return found
+        defines = defines or {}
+        # Numbers that are equal are written otherwise as others' types
+        key = (path, name, tuple(defines.items()), tuple(map(type, defines.values())))
+        known = self._programs.known if isinstance(path, str) else {}  # a file on disk may change
+        if key in known:
+            return known[key]
         # Compilers take seconds, and not the device
         background = self.turns.thread.worker is not None
         with self.turns.aside() if background else contextlib.nullcontext():
-            return self._programs.kernel(path, name, defines or {})
+            known[key] = self._programs.kernel(path, name, defines)
+        return known[key]
 
     def launch(self, kernel: Kernel, size: Size, group: Size | None, *arguments: Any) -> None:
         """Enqueue a kernel that nobody declared, with its arguments in order.

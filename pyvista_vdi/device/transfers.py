@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device.buffers import LEAST_PINNED, DeviceBuffer
 from pyvista_vdi.device.memory import Memory
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError
 
 #: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
 _COPY_BYTES = 4 * 2**20
@@ -20,28 +20,11 @@ class Transfers(Memory):
     """A device whose buffers are written and read."""
 
     def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
-        """An array's values on the device, for kernels to read.
+        """An array's values on the device, for kernels to read; ``name`` says what they are.
 
         A CPU device uses an array that is C-contiguous and aligned for it in place (see
         :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
-        the values are copied.
-
-        Parameters
-        ----------
-        array : numpy.ndarray
-            Any shape; made C-contiguous if it is not.
-        name : str, default: "array"
-            What it holds; messages say it.
-
-        Returns
-        -------
-        DeviceBuffer
-            Not writable.
-
-        Raises
-        ------
-        DeviceMemoryError
-            As for :meth:`buffer`.
+        the values are copied. The buffer is not writable. Raises as :meth:`buffer` does.
         """
         shape, array, flags = np.shape(array), np.ascontiguousarray(array), self.cl.mem_flags
         in_place, dtype = self.in_place(array), array.dtype
@@ -61,21 +44,10 @@ class Transfers(Memory):
     def download(
         self, buffer: DeviceBuffer, out: NDArray[Any] | None = None, count: int | None = None
     ) -> NDArray[Any]:
-        """Values of a buffer, when all that was enqueued before is done.
+        """Return the values of a buffer, when all that was enqueued before is done.
 
-        Parameters
-        ----------
-        buffer : DeviceBuffer
-            The source.
-        out : numpy.ndarray, optional
-            C-contiguous target of the buffer's dtype and of as many elements.
-        count : int, optional
-            Only so many elements from the start, as a 1D array.
-
-        Returns
-        -------
-        numpy.ndarray
-            ``out``, or a new array of the buffer's shape.
+        They are in ``out``, a C-contiguous array of the buffer's dtype and of as many elements, or
+        in a new one of its shape; with ``count``, only so many from the start, in 1D.
 
         Raises
         ------
@@ -101,7 +73,8 @@ class Transfers(Memory):
             self._copy(buffer, out, to_host=True)
         elif out.nbytes:
             # Map it: the memory is the array's, so that nothing is copied, and the values stay
-            self.turns.checkpoint()
+            if self.turns.thread.worker is not None:
+                self.turns.checkpoint()
             cl, queue = self.cl, self.queue
             try:
                 mapped, event = cl.enqueue_map_buffer(
@@ -118,28 +91,14 @@ class Transfers(Memory):
     ) -> Callable[[], None]:
         """Copy part of a buffer into an array when all that was enqueued before is done.
 
-        Inside :meth:`background` the copy is done when this returns.
-
-        Parameters
-        ----------
-        buffer : DeviceBuffer
-            The source.
-        out : numpy.ndarray
-            C-contiguous target of the buffer's dtype; leave it alone until then.
-        first : int
-            The first element that is copied; as many follow as the array has.
-
-        Returns
-        -------
-        callable
-            Returns when the values are there, and raises DeviceError if the driver failed.
+        Inside :meth:`background` the copy is done when this returns. As many elements as ``out``
+        has are copied, from the ``first`` on; leave it alone until what is returned, when called,
+        has waited for them (and raised DeviceError if the driver failed).
 
         Raises
         ------
         InvalidArgumentError
             If the elements are not all in the buffer, or the array does not fit.
-        DeviceError
-            If the driver fails.
         """
         _check_exchange(buffer, out, out.size, written=True, first=first)
         event = self._copy(buffer, out, to_host=True, first=first, later=True)
@@ -157,21 +116,13 @@ class Transfers(Memory):
     def write(self, buffer: DeviceBuffer, array: NDArray[Any], *, first: int | None = None) -> None:
         """Copy an array into a buffer; the array is free to change when this returns.
 
-        Parameters
-        ----------
-        buffer : DeviceBuffer
-            The target, not one from :meth:`upload`.
-        array : numpy.ndarray
-            Of the buffer's dtype and of as many elements.
-        first : int, optional
-            Write only part of the buffer: as many elements as the array has, from this one on.
+        It fills the buffer, which is not one from :meth:`upload`, or only as many elements as it
+        has, from the ``first`` on.
 
         Raises
         ------
         InvalidArgumentError
             If it does not fit or the buffer is not writable.
-        DeviceError
-            If the driver fails.
         """
         _check_writable(buffer)
         array = np.ascontiguousarray(array)
@@ -214,22 +165,15 @@ class Transfers(Memory):
         return None if waits else event
 
     def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
-        """Fill a buffer with one byte or one element.
+        """Fill a buffer, not one from :meth:`upload`, with one byte or one element.
 
-        Parameters
-        ----------
-        buffer : DeviceBuffer
-            The target, not one from :meth:`upload`.
-        value : int or numpy scalar
-            A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is.
+        A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is.
 
         Raises
         ------
         InvalidArgumentError
             If the value is no byte, the pattern does not divide the buffer, or the buffer is not
             writable.
-        DeviceError
-            If the driver fails.
         """
         _check_writable(buffer)
         if isinstance(value, int) and not 0 <= value <= 255:
@@ -248,7 +192,8 @@ class Transfers(Memory):
             return
         try:
             event = cl.enqueue_fill_buffer(queue, memory, pattern, 0, buffer.nbytes)
-            self.note_reader(buffer)
+            if buffer.readers is not None:
+                self.note_reader(buffer.readers)
             self.record("[fill]", event)
             if self.turns.thread.worker is not None:
                 queue.finish()  # nothing of this thread runs when its turn is over
@@ -257,6 +202,8 @@ class Transfers(Memory):
 
 
 def _check_writable(buffer: DeviceBuffer) -> None:
+    if buffer.memory is None:
+        raise DeviceError(f"the buffer {buffer.name!r} was used after its release")
     if not buffer.writable:
         raise InvalidArgumentError(
             f"the buffer {buffer.name!r} was uploaded and may share the caller's array; "
@@ -273,6 +220,8 @@ def _check_exchange(
     first: int = 0,
 ) -> None:
     """Refuse an array that cannot exchange so many elements with a buffer, from one on."""
+    if buffer.memory is None:
+        raise DeviceError(f"the buffer {buffer.name!r} was used after its release")
     room = buffer.nbytes // buffer.dtype.itemsize
     if not 0 <= first <= room - elements:
         raise InvalidArgumentError(
