@@ -31,7 +31,7 @@ def padded(size: Size, group: Size) -> tuple[int, ...]:
     """The next multiple of a work-group size in each dimension; kernels leave out the surplus."""
     sizes = size if isinstance(size, tuple) else (size,)
     groups = group if isinstance(group, tuple) else (group,)
-    return tuple([-(-n // g) * g for n, g in zip(sizes, groups, strict=True)])
+    return tuple(n + -n % g for n, g in zip(sizes, groups, strict=True))
 
 
 _RELEASED = "the buffer {!r} was used after its release"
