@@ -44,10 +44,11 @@ SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
 #: By folder of ``opencl/``, those that programs with a file of it know.
 OF_FOLDERS: dict[str, str] = {
+    "cpu16": "PLANE_FORMS STEEPEST",
     "generation": "RUN_WORDS ERRORS_AT_A_TIME LISTS_PER_ITEM",
     "large": "RUN_WORDS",
     "lib": "STRIP COLUMN_ITEMS CELL CELL_ITEMS",
-    "multi_vdi": "CELL",
+    "multi_vdi": "CELL CELL_ITEMS SEGMENT_SIZE SPARE_SLOTS",
     "raycasting": "BUNDLE_SHIFT BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS PLANE_FORMS"
     " STEEPEST SEGMENT_SIZE SPARE_SLOTS DEPTH_CODES",
     "series": "DEPTH_CODES",
