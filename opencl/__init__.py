@@ -57,8 +57,8 @@ Entry points:
 ``generation/march_lists.cl``, ``generation/shorten_lists.cl``, ``generation/pack_lists.cl``
     ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments, by the
     runs of ``generation/runs.cl``.
-``generation/criteria.cl``
-    ``cut_lists``, where another criterion than least error is asked for.
+``generation/homogeneity.cl``
+    ``cut_lists``, where homogeneity is asked for in place of least error.
 ``generation/offsets.cl``
     ``sum_lengths``, ``list_offsets``: where each list begins in a VDI's arrays.
 ``volume/bricks.cl``

@@ -39,7 +39,7 @@ def _m(name: str, file: str, old: str, new: str, rooms: tuple[str, ...] = ()) ->
 
 MARCH, MARCH_LISTS = "opencl/volume/march.cl", "opencl/generation/march_lists.cl"
 RUNS, SHORTEN = "opencl/generation/runs.cl", "opencl/generation/shorten_lists.cl"
-CRITERIA = "opencl/generation/criteria.cl"
+HOMOGENEITY = "opencl/generation/homogeneity.cl"
 LISTS, RAYS = "opencl/raycasting/lists.cl", "opencl/raycasting/list_rays.cl"
 DECODE = "opencl/series/decode.cl"
 LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
@@ -131,14 +131,8 @@ KERNEL_MUTANTS = (
         "if (earlier.each[lane] > 0)",
     ),
     _m(
-        "criteria: shares for one more supersegment",
-        CRITERIA,
-        "at.y / (float)limit;",
-        "at.y / (float)(limit + 1);",
-    ),
-    _m(
-        "criteria: homogeneity's threshold is not squared",
-        CRITERIA,
+        "homogeneity: the threshold is not squared",
+        HOMOGENEITY,
         "const float most = threshold * threshold;",
         "const float most = threshold;",
     ),

@@ -39,7 +39,7 @@ def generate_vdi(
     """Make a VDI of a classified volume.
 
     Each list's ray is marched once. Neighbouring samples are merged while the medium stays
-    homogeneous; what is recorded is then merged at least error, or cut by another criterion,
+    homogeneous; what is recorded is then merged at least error, or cut by homogeneity,
     until the budget of supersegments is kept. Lists go on behind what V_O sees, because other
     views may see it.
 

@@ -10,14 +10,6 @@ from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import Slice
 from pyvista_vdi.model.options import GenerationOptions
 
-#: The kernel's name of each criterion other than least error, which needs no kernel of its own.
-_CUTS = {
-    "homogeneity": "HOMOGENEITY",
-    "length": "EQUAL_LENGTH",
-    "transmittance": "EQUAL_TRANSMITTANCE",
-    "optical-depth": "EQUAL_OPTICAL_DEPTH",
-}
-
 
 class Merge:
     """Shortens the records of a slice, between chunks of the march and to the budget."""
@@ -31,9 +23,8 @@ class Merge:
             runtime, path, "shorten_lists", defines, in_blocks=runtime.is_cpu
         )
         self._cut = None
-        if options.criterion in _CUTS:
-            defines = {**defines, "CRITERION": _CUTS[options.criterion]}
-            self._cut = Step.of(runtime, "generation/criteria.cl", "cut_lists", defines)
+        if options.criterion == "homogeneity":
+            self._cut = Step.of(runtime, "generation/homogeneity.cl", "cut_lists", defines)
 
     def make_room(self, part: Slice, chunk: Chunk) -> None:
         """Merge what is least unlike in records without room for another chunk.
@@ -48,7 +39,7 @@ class Merge:
         self._shorten(part, self._records.slices.kept, exactly=False)
 
     def to_budget(self, part: Slice) -> None:
-        """Merge at least error, or cut by another criterion, until the budget is kept."""
+        """Merge at least error, or cut by homogeneity, until the budget is kept."""
         if self._cut is None:
             self._shorten(part, self._limit, exactly=True)
             return

@@ -18,12 +18,7 @@ from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.reference.criteria import (
-    cut_at_equal_lengths,
-    cut_at_equal_optical_depths,
-    cut_at_equal_transmittance,
-    cut_where_unlike,
-)
+from pyvista_vdi.reference.homogeneity import cut_where_unlike
 from pyvista_vdi.reference.occlusion import NodeOcclusion, mean_transmittance
 from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, pixel_ray
 from pyvista_vdi.reference.shading import gradient_factors, lit_colors
@@ -31,7 +26,7 @@ from pyvista_vdi.reference.shading import gradient_factors, lit_colors
 Array = NDArray[np.float64]
 
 #: What decides where lists are cut; the engine's names.
-CRITERIA = ("least-error", "homogeneity", "length", "transmittance", "optical-depth")
+CRITERIA = ("least-error", "homogeneity")
 
 #: How far outside the grid, in points, a position may lie by float64 rounding alone.
 GRID_TOLERANCE = 1e-9
@@ -203,8 +198,8 @@ def build_vdi(
         As for :func:`samples`.
     max_supersegments : int
         N_S: no list gets longer.
-    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
-        What decides where a list is cut; see :mod:`pyvista_vdi.reference.criteria`.
+    criterion : {"least-error", "homogeneity"}
+        What decides where a list is cut; see :mod:`pyvista_vdi.reference.homogeneity`.
     weighting : {"transmittance", "optical_depth"}
         Of the colours; see :func:`pyvista_vdi.model.compositing.merge`.
 
@@ -245,7 +240,7 @@ def build_vdi(
             else 0.0
         )
         lists.append(_cut(runs, criterion, max_supersegments, per_reference, weighting))
-    return _vdi_from(lists, camera, window_size, volume.bounds, depth_origin, criterion)
+    return vdi_of_lists(lists, camera, window_size, volume.bounds, depth_origin, criterion)
 
 
 def near_depth(bounds: Sequence[float], camera: Camera) -> float:
@@ -493,12 +488,6 @@ def _cut(
     """Bring a ray's runs to the budget; ``per_reference``: voxels per unit of view depth."""
     if criterion == "homogeneity":
         return cut_where_unlike(runs, budget, per_reference, weighting)
-    if criterion == "length":
-        return cut_at_equal_lengths(runs, budget, weighting)
-    if criterion == "transmittance":
-        return cut_at_equal_transmittance(runs, budget, weighting)
-    if criterion == "optical-depth":
-        return cut_at_equal_optical_depths(runs, budget, weighting)
     return _within_budget(runs, budget, weighting)
 
 
@@ -528,7 +517,7 @@ def _merge_cost(parts: list[Segment]) -> float:
     return float(np.abs(amount - length[:, None] * mean).sum() + gap * mean.sum())
 
 
-def _vdi_from(
+def vdi_of_lists(
     lists: list[list[Segment]],
     camera: Camera,
     window_size: Sequence[int],

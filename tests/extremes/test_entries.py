@@ -25,6 +25,7 @@ from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume, ref
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model import float32_limits as numerics
 from pyvista_vdi.model.cropping import PRESETS
+from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.reference.rays import pixel_ray
 from pyvista_vdi.volume.classified_volume import DeviceVolume, march_forms
@@ -89,7 +90,7 @@ def test_needles(runtime, worst):
 
 
 @pytest.mark.every(3)
-@pytest.mark.parametrize("criterion", strategies.criteria())
+@pytest.mark.parametrize("criterion", CRITERIA)
 def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst, criterion):
     """Steps of few units in the last place of their depth, which rounding could make nothing."""
     volume = field_volume((1e-3, 1, 1e3))

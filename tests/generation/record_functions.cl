@@ -1,5 +1,5 @@
-// Entry points to opencl/generation/runs.cl and shorten_lists.cl, one work-item per case or record.
-#include "generation/shorten_lists.cl"
+// Entry points to opencl/generation/runs.cl, shorten_lists.cl and homogeneity.cl, one work-item per case or record.
+#include "generation/homogeneity.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void merged(int count, __global const float8 *a, __global const float8 *b, __global float8 *results)
@@ -21,6 +21,7 @@ __kernel void merge_errors(int count, __global const float8 *a, __global const f
 #define WITHIN 0
 #define ROOM 1
 #define LIMIT 2
+#define ALIKE 3
 
 // Shorten record i by one of these; `runs` are in (record, k) order, before and after.
 __kernel void shortened(int count, int way, int limit, int capacity, float per_reference, float hidden_weight,
@@ -41,6 +42,8 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
         n = merge_within(record, &start, n, threshold, 1, per_reference, hidden_weight);
     else if (way == ROOM)
         n = make_room(record, &start, errors, n, limit, &threshold, per_reference, hidden_weight);
+    else if (way == ALIKE)
+        n = cut_to_limit(record, n, limit, per_reference);
     else
         n = merge_to_limit(record, &start, errors, n, limit, per_reference, hidden_weight);
     thresholds[i] = threshold;
