@@ -15,7 +15,9 @@ from pyvista_vdi.device.buffers import (
     kept_together,
 )
 from pyvista_vdi.device.choice import describe_devices, get_runtime, list_devices
+from pyvista_vdi.device.declarations import KernelDeclaration, Struct
 from pyvista_vdi.device.devices import DeviceInfo
+from pyvista_vdi.device.kernels import Launch
 from pyvista_vdi.device.profiling import KernelTime, Profile
 from pyvista_vdi.device.programs import Kernel
 from pyvista_vdi.device.runtime import Runtime
@@ -26,10 +28,13 @@ __all__ = [
     "DeviceInfo",
     "GrowingArray",
     "Kernel",
+    "KernelDeclaration",
     "KernelTime",
+    "Launch",
     "LocalMemory",
     "Profile",
     "Runtime",
+    "Struct",
     "aligned_empty",
     "bytes_text",
     "describe_devices",

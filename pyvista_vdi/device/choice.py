@@ -10,11 +10,21 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.buffers import LocalMemory, bytes_text
+from pyvista_vdi.device.buffers import bytes_text
+from pyvista_vdi.device.declarations import KernelDeclaration
 from pyvista_vdi.device.devices import Candidate, DeviceInfo
 from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
+PROBE = KernelDeclaration(
+    "lib/probe.cl",
+    "probe",
+    x="float*",
+    values="float4*",
+    group_sum="uint*",
+    total="uint*",
+    shared="local uint*",
+)
 PROBE_COUNT = 256
 PROBE_GROUP = 32
 # OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
@@ -270,7 +280,6 @@ def run_probe(runtime: Runtime) -> str:
     """
     x = np.linspace(0.01, 0.99, PROBE_COUNT, dtype=np.float32)
     groups = PROBE_COUNT // PROBE_GROUP
-    kernel = runtime.kernel("lib/probe.cl", "probe")
     with (
         runtime.upload(x, name="probe input") as inputs,
         runtime.buffer((PROBE_COUNT, 4), np.float32, name="probe values") as values,
@@ -278,8 +287,8 @@ def run_probe(runtime: Runtime) -> str:
         runtime.buffer((1,), np.uint32, name="probe total") as total,
     ):
         runtime.fill(total, 0)
-        shared = LocalMemory(PROBE_GROUP * 4)
-        runtime.launch(kernel, PROBE_COUNT, PROBE_GROUP, inputs, values, sums, total, shared)
+        launch = runtime.bind(PROBE, x=inputs, values=values, group_sum=sums, total=total)
+        launch(PROBE_COUNT, PROBE_GROUP, shared=PROBE_GROUP)
         return _check_probe(x, *(runtime.download(b) for b in (values, sums, total)))
 
 

@@ -19,11 +19,12 @@ import numpy as np
 
 from pyvista_vdi.device import sources
 from pyvista_vdi.device.constants import KERNEL_CONSTANTS
+from pyvista_vdi.device.declarations import Define as Define
+from pyvista_vdi.device.declarations import KernelDeclaration, Parameter
 from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 from pyvista_vdi.model.user_cache import user_cache
 
-Define = str | int | float | bool | None
 LOG_LINES_SHOWN = 30
 _LINE_MARK = re.compile(r'#line (\d+) "(.*)"')
 #: Seconds from which a driver that keeps programs itself is taken to be compiling.
@@ -108,7 +109,38 @@ class Kernel:
         self.divisible = _PLACE_OF_GROUP.search(source) is None
         self._program = program
         self._local = threading.local()
+        self.parameters: dict[str, Parameter] = {}
+        self._free: list[Any] = []  # driver's kernel objects that no launch has
         self.argument_count = int(self.object.num_args)
+
+    def declare(self, declaration: KernelDeclaration, defines: Mapping[str, Define]) -> None:
+        """Take the names and types of the arguments from a declaration.
+
+        Raises
+        ------
+        KernelBuildError
+            If the compiled kernel has another number of them.
+        """
+        if self.parameters:
+            return
+        parameters = declaration.parameters(defines)
+        if len(parameters) != self.argument_count:
+            raise KernelBuildError(
+                f"kernel {self.name!r} of {self.path} takes {self.argument_count} arguments, and "
+                f"{len(parameters)} are declared: {', '.join(parameters)}"
+            )
+        self.parameters = parameters
+
+    def take(self) -> Any:
+        """Return a driver's kernel object that nobody else has; to make one takes its time."""
+        try:
+            return self._free.pop()
+        except IndexError:
+            return _kernel_object(self._program, self.name)
+
+    def put_back(self, driver_kernel: Any) -> None:
+        """Keep a driver's kernel object for the next launch."""
+        self._free.append(driver_kernel)
 
     @property
     def object(self) -> Any:

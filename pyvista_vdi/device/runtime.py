@@ -8,7 +8,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from pyvista_vdi.device.arguments import (
     Size,
     as_size,
     check_host_array,
+    driver_argument,
     preferred_group,
     set_arguments,
 )
@@ -31,9 +32,11 @@ from pyvista_vdi.device.buffers import (
     bytes_text,
     shape_of,
 )
+from pyvista_vdi.device.declarations import Define, KernelDeclaration
 from pyvista_vdi.device.devices import Candidate, DeviceInfo, drivers_lost, opencl
+from pyvista_vdi.device.kernels import Launch
 from pyvista_vdi.device.profiling import KernelTime, Profile, profiling_wanted, table
-from pyvista_vdi.device.programs import Define, Kernel, ProgramCache
+from pyvista_vdi.device.programs import Kernel, ProgramCache
 from pyvista_vdi.device.scheduling import Turns, Worker
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
@@ -102,7 +105,10 @@ class Runtime:
         return f"<Runtime on {self.info.full_name}>"
 
     def kernel(
-        self, path: str | Path, name: str, defines: Mapping[str, Define] | None = None
+        self,
+        path: str | Path | KernelDeclaration,
+        name: str = "",
+        defines: Mapping[str, Define] | None = None,
     ) -> Kernel:
         """A kernel function, compiled when first asked for and kept.
 
@@ -129,6 +135,10 @@ class Runtime:
             If a define cannot be written as an option.
         """
         defines = defines or {}
+        if isinstance(path, KernelDeclaration):
+            kernel = self.kernel(path.path, path.name, defines)
+            kernel.declare(path, defines)
+            return kernel
         found = self._programs.known(path, name, defines)
         if found is not None:
             return found
@@ -172,46 +182,123 @@ class Runtime:
         Cancelled
             Inside :meth:`background`, if the work is no longer wanted.
         """
-        whole = as_size(global_size)
-        group = None if local_size is None else as_size(local_size)
-        if group is not None and (
-            len(group) != len(whole) or any(n % g for n, g in zip(whole, group, strict=True))
-        ):
-            raise InvalidArgumentError(
-                f"kernel {kernel.name!r}: the global size {whole} is no multiple of the "
-                f"work-group size {group} in every dimension; round it up with padded()"
-            )
         if len(args) != kernel.argument_count:
             raise InvalidArgumentError(
                 f"kernel {kernel.name!r} of {kernel.path} takes {kernel.argument_count} "
                 f"arguments, {len(args)} were given"
             )
+        whole, group = self._checked_sizes(kernel, global_size, local_size)
         if 0 in whole:
             return
         with self._driver(f"launching {kernel.name!r} of {kernel.path} on {whole} by {group}"):
             set_arguments(kernel, args)
-            for argument in args:
-                if isinstance(argument, DeviceBuffer) and argument.readers is not None:
-                    self._note_reader(argument)
+        buffers = [argument for argument in args if isinstance(argument, DeviceBuffer)]
+        self.enqueue(kernel, kernel.object, global_size, local_size, buffers)
+
+    def bind(
+        self,
+        declaration: KernelDeclaration,
+        defines: Mapping[str, Define] | None = None,
+        /,
+        **arguments: Any,
+    ) -> Launch:
+        """Return a launch of a kernel, which is compiled when first asked for.
+
+        Parameters
+        ----------
+        declaration : KernelDeclaration
+            The kernel and its arguments.
+        defines : mapping of str to str, int, float, bool or None, optional
+            ``-D`` options: what changes the code's shape. Floats become exact float32 literals.
+        **arguments : DeviceBuffer, number, sequence of numbers, structure or None
+            Those that are known already. Numbers are converted to the declared type, which they
+            must fit; vectors are given as arrays or sequences, local memory as elements for each
+            work-group; None is a null pointer.
+
+        Returns
+        -------
+        Launch
+            To be called with sizes, and with the arguments that are missing or change.
+
+        Raises
+        ------
+        KernelBuildError
+            If it cannot be assembled or compiled; carries log, options and source.
+        InvalidArgumentError
+            If a name is no argument's, or a define cannot be written as an option.
+        TypeError
+            If a value is not of its argument's type.
+        DeviceError
+            If a buffer has been released.
+        """
+        launch = Launch(self, self.kernel(declaration, defines=defines))
+        if arguments:
+            launch.set(**arguments)
+        return launch
+
+    def set_arguments(self, kernel: Kernel, driver_kernel: Any, given: dict[int, Any]) -> None:
+        """Give a driver's kernel some arguments, by their places; for :class:`Launch`."""
+        with self._driver(f"setting arguments of {kernel.name!r} of {kernel.path}"):
+            for index, argument in given.items():
+                driver_kernel.set_arg(index, driver_argument(kernel, index, argument))
+
+    def enqueue(
+        self,
+        kernel: Kernel,
+        driver_kernel: Any,
+        size: Size,
+        group: Size | None,
+        buffers: Sequence[DeviceBuffer],
+    ) -> None:
+        """Enqueue a driver's kernel whose arguments are set, these buffers among them."""
+        whole, local = self._checked_sizes(kernel, size, group)
+        if 0 in whole:
+            return
+        with self._driver(f"launching {kernel.name!r} of {kernel.path} on {whole} by {local}"):
+            for buffer in buffers:
+                if buffer.released:
+                    raise DeviceError(f"the buffer {buffer.name!r} was used after its release")
+                if buffer.readers is not None:
+                    self._note_reader(buffer)
             if self._turns.worker is None:
-                self._enqueue(kernel, whole, group)
+                self._enqueue(kernel, driver_kernel, whole, local)
             else:
-                self._run_in_pieces(self._turns.worker, kernel, whole, group)
+                self._run_in_pieces(self._turns.worker, kernel, driver_kernel, whole, local)
+
+    def _checked_sizes(
+        self, kernel: Kernel, size: Size, group: Size | None
+    ) -> tuple[tuple[int, ...], tuple[int, ...] | None]:
+        whole = as_size(size)
+        local = None if group is None else as_size(group)
+        if local is not None and (
+            len(local) != len(whole) or any(n % g for n, g in zip(whole, local, strict=True))
+        ):
+            raise InvalidArgumentError(
+                f"kernel {kernel.name!r}: the global size {whole} is no multiple of the "
+                f"work-group size {local} in every dimension; round it up with padded()"
+            )
+        return whole, local
 
     def _enqueue(
         self,
         kernel: Kernel,
+        driver_kernel: Any,
         size: tuple[int, ...],
         group: tuple[int, ...] | None,
         offset: tuple[int, ...] | None = None,
     ) -> None:
         event = opencl().enqueue_nd_range_kernel(
-            self._queue, kernel.object, size, group, global_work_offset=offset
+            self._queue, driver_kernel, size, group, global_work_offset=offset
         )
         self._record(kernel.name, event)
 
     def _run_in_pieces(
-        self, worker: Worker, kernel: Kernel, whole: tuple[int, ...], group: tuple[int, ...] | None
+        self,
+        worker: Worker,
+        kernel: Kernel,
+        driver_kernel: Any,
+        whole: tuple[int, ...],
+        group: tuple[int, ...] | None,
     ) -> None:
         """Run a launch as launches of parts of its last dimension, each no longer than allowed."""
         rows, row_items = whole[-1], math.prod(whole[:-1])
@@ -229,7 +316,8 @@ class Runtime:
             parts = -(-left // max(fitting, step))
             size = min(left, -(-left // (parts * step)) * step)
             began = time.perf_counter()
-            self._enqueue(kernel, (*whole[:-1], size), group, (*(0 for _ in whole[1:]), done))
+            offset = (*(0 for _ in whole[1:]), done)
+            self._enqueue(kernel, driver_kernel, (*whole[:-1], size), group, offset)
             self._queue.finish()
             worker.took(kernel.name, size * row_items, time.perf_counter() - began)
             done += size
