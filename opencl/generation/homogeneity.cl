@@ -70,28 +70,21 @@ inline int cut_to_limit(__global float *record, int count, int limit, float per_
     return count > limit ? merge_alike(record, count, INFINITY, per_reference, true) : count;
 }
 
-// Bring records to at most `limit` runs by homogeneity, and merge neighbours as while marching: what is alike needs no cut.
+// Bring records to at most recording.limit runs by homogeneity, and merge neighbours as while marching: what is alike needs no cut.
 __kernel void cut_lists(
-    int limit,
-    int width, int height,
-    int first_column, int columns, int first_row, int rows,
+    const RaysOfView view,
     __global const float *forms,
-    int capacity,
-    float reference_length,
-    float hidden_weight,
-    float threshold,               // merge errors up to this are accepted
+    const Recording recording,
     __global float *records,
     __global uint *counts)
 {
     const uint item = (uint)get_global_id(0);
-    const Rays rays = rays_of_part(item, width, height, first_column, columns, first_row, rows);
-    const Int list = rays.y * columns + rays.x;
-    const int count = load_counts(counts, list, rays.present);
-    if (count == 0)
+    const Rays ray = rays_of_view(&view, item);
+    const int list = ray.y * view.columns + ray.x;
+    if (!ray.present || counts[list] == 0)
         return;
-    const float per_reference = march_speed(forms, rays.a, rays.b) / reference_length;
-    __global float *record = records + record_start(item, capacity);
-    const Places start = {0};
-    const int cut = cut_to_limit(record, count, limit, per_reference);
-    counts[list] = (uint)merge_within(record, &start, cut, threshold, 1, per_reference, hidden_weight);
+    const float per_reference = march_speed(forms, ray.a, ray.b) / recording.reference_length;
+    __global float *record = records + record_start(item, recording.capacity);
+    const int cut = cut_to_limit(record, (int)counts[list], recording.limit, per_reference);
+    counts[list] = (uint)merge_within(record, cut, recording.finest, per_reference, recording.hidden_weight);
 }

@@ -28,7 +28,8 @@ from pyvista_vdi.model.cropping import PRESETS
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.reference.rays import pixel_ray
-from pyvista_vdi.volume.classified_volume import DeviceVolume, march_forms
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.rays import GridRays
 
 pytestmark = pytest.mark.extremes
 
@@ -37,7 +38,7 @@ SHINY = Shading(0.2, 0.6, 0.5, 30.0)
 
 def is_far(runtime, volume, camera, window=WINDOW):
     medium = DeviceVolume(runtime, volume, transfer())
-    return "DOUBLE_FLOAT_RAYS" in medium.forms(camera, window).defines
+    return medium.forms(camera, window).double_float
 
 
 @pytest.mark.parametrize(
@@ -70,7 +71,7 @@ def test_what_is_not_very_thin_is_computed_in_float32_alone(runtime, dimensions)
     for azimuth in range(0, 91, 15):
         for options in ({}, {"distance": 1.3}, {"parallel": True}):
             camera = view(volume, azimuth, 35, **options)
-            assert not march_forms(volume, camera, (640, 480)).defines
+            assert not GridRays(volume, 1.0, 1.0).forms(camera, (640, 480)).double_float
 
 
 def test_needles(runtime, worst):
