@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from baselines.criteria import CRITERIA, RECORDED, cut
 from shared import benches, execute, mean_of, parser_of  # beside this file
 
 from pyvista_vdi import generate
@@ -30,6 +31,9 @@ ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0)
 #: Views of the default that no angle tells: degrees and zoom.
 ZOOMED = ((0.0, 2.0), (20.0, 2.0), (20.0, 4.0))
 
+#: N_S of the default.
+MOST = 20
+
 #: What is changed of the default: arguments of generation, and the lists along an edge per pixel.
 SETTINGS: Mapping[str, Mapping[str, Any]] = {
     "default": {},
@@ -41,10 +45,8 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
     "8-byte": {"precision": "8-byte"},
     "lists x2, N_S 10, 8-byte": {"lists": 2, "max_supersegments": 10, "precision": "8-byte"},
     "view cone 0": {"view_cone": 0.0},
-    **{
-        name: {"criterion": name}
-        for name in ("homogeneity", "length", "optical-depth", "transmittance")
-    },
+    "homogeneity": {"criterion": "homogeneity"},
+    **{name: {"cut": name} for name in CRITERIA},
 }
 
 #: Volumes for which one transfer function has to do, because of their size.
@@ -97,7 +99,12 @@ def of_setting(bench: Any, setting: Mapping[str, Any], *, estimated: bool) -> di
     """Return how near a VDI's pictures are, by view, how large it is, and what tiles estimate."""
     setting = dict(setting)
     lists = setting.pop("lists", 1)
+    shares = setting.pop("cut", None)  # a baseline: cut from all that is recorded
+    if shares is not None:
+        setting["max_supersegments"] = RECORDED
     vdi = bench.generate(tuple(round(lists * edge) for edge in bench.size), **setting)
+    if shares is not None:
+        vdi = cut(vdi, shares, MOST)
     views = {f"{angle:g}": bench.view.azimuth(angle) for angle in ANGLES}
     if estimated:
         for angle, zoom in ZOOMED:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
+from baselines.criteria import CRITERIA, RECORDED, cut
 from baselines.world_rays import WorldRays
 from scaling import fitted
 from shared import execute, load, parser_of  # beside this file
@@ -68,8 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     benches = Latest(bench_of)
 
     def vdi_of(threshold: float, lists: int, limit: int, criterion: str) -> Any:
-        size = scaled(options.size, lists)
-        return benches(threshold).generate(size, max_supersegments=limit, criterion=criterion)
+        size, bench = scaled(options.size, lists), benches(threshold)
+        if criterion in CRITERIA:
+            return cut(bench.generate(size, max_supersegments=RECORDED), criterion, limit)
+        return bench.generate(size, max_supersegments=limit, criterion=criterion)
 
     vdis = Latest(vdi_of)
 

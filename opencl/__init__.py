@@ -8,7 +8,7 @@ Map of the files
 Shared functions:
 
 ``lib/lanes.cl``, ``lib/transpose.cl``
-    One text for one ray and for sixteen in vectors (``-D LANES``).
+    What formulas are written of: numbers of one ray, or of sixteen, and their transposition.
 ``lib/rays.cl``
     Affine forms along the ray of a pixel, clipping to planes, pixels in blocks of 4 x 4.
 ``lib/double_float.cl``
@@ -23,18 +23,18 @@ Shared functions:
     Lights, and gradient opacity: what the steps need of the scalar's gradient.
 ``volume/samples.cl``
     Steps that were sampled before they are composited.
+``volume/medium.cl``
+    Colour and optical depth around a sample.
 ``volume/occlusion.cl``
     Ambient occlusion at a sample.
-``volume/empty_macrocells.cl``
-    Size of the blocks by which marches skip what is transparent.
-``volume/march.cl``
+``volume/rays_of_view.cl``, ``volume/march.cl``
     The steps along a ray of a volume: generation and direct volume rendering share them.
+``volume/cropped_march.cl``, ``volume/projection.cl``
+    What cropping keeps of a ray, and blend modes beside compositing.
 ``lib/list_space.cl``
     V_O's list space: coordinates of a ray in it, and its depth coordinate.
 ``lib/cropping.cl``
     The parts of a ray that cropping keeps.
-``lib/lanes.cl``, ``lib/transpose.cl``
-    One text for one ray and for sixteen in vectors, and their numbers transposed.
 ``raycasting/list_rays.cl``, ``raycasting/pixels.cl``
     Rays in list space, clipped; model lengths along them; their pixels.
 ``raycasting/stepping.cl``
@@ -56,9 +56,9 @@ Entry points:
     ``probe``: the kernel that a device must run correctly before it is used.
 ``generation/march_lists.cl``, ``generation/shorten_lists.cl``, ``generation/pack_lists.cl``
     ``march_lists``, ``shorten_lists``, ``pack_lists``: volume to lists of supersegments, by the
-    runs of ``generation/runs.cl``.
-``generation/criteria.cl``
-    ``cut_lists``, where another criterion than least error is asked for.
+    runs of ``generation/runs.cl`` in ``generation/records.cl``.
+``generation/homogeneity.cl``
+    ``cut_lists``, where homogeneity is asked for in place of least error.
 ``generation/offsets.cl``
     ``sum_lengths``, ``list_offsets``: where each list begins in a VDI's arrays.
 ``volume/bricks.cl``
@@ -78,8 +78,12 @@ Entry points:
     ``alone_ends``, ``take_cells``: where only one of several VDIs is met.
 ``raycasting/preview.cl``
     ``preview``: VDI to image by a given number of samples per ray (paper, section 5).
-``volume/render_volume.cl``
-    ``render_volume``: direct volume rendering, the baseline.
+``volume/render_volume.cl``, ``volume/project.cl``
+    ``render_volume``, ``project``: direct volume rendering, the baseline, and other blend modes.
+``cpu16/generation_march.cl``, ``cpu16/generation_shorten.cl``,
+``cpu16/generation_optical_depths.cl``, ``cpu16/volume_render.cl``, ``cpu16/volume_project.cl``
+    The same kernels for sixteen rays in vectors, on CPUs, by ``cpu16/generation_records.cl`` and
+    ``cpu16/volume_picture.cl``.
 ``raycasting/occupancy.cl``
     ``count_supersegments``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
 ``volume/macrocells.cl``

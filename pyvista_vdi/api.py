@@ -91,10 +91,9 @@ def generate(
     max_supersegments : int
         Longest list, 1 to 4096. A promise: never exceeded, and nothing non-transparent is
         dropped for it.
-    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
-        What decides where a list that must be shortened is cut: merging at least error, or, to
-        compare with, a threshold on differences, equal depths, or equal shares of the light that
-        V_O loses, by differences or, with ``"optical-depth"``, by ratios. See
+    criterion : {"least-error", "homogeneity"}
+        What decides where a list that must be shortened is cut: merging at least error, or the
+        paper's threshold on differences. See
         :class:`pyvista_vdi.model.options.GenerationOptions`.
     sample_distance : float, optional
         Length of a step along the ray, model units; half the smallest spacing by default.
@@ -610,7 +609,7 @@ def estimate(
         Width and height in pixels.
     max_supersegments : int
         Longest list.
-    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+    criterion : {"least-error", "homogeneity"}
         As for :func:`generate`.
     ambient_occlusion : bool, float or AmbientOcclusion, optional
         As for :func:`generate`.

@@ -13,6 +13,7 @@ ROOMS = {
     "multi_vdi": ("raycasting",),
     "series": ("extensions/series",),
     "large": ("extensions/large",),
+    "cpu16": ("generation", "volume", "raycasting"),
 }
 
 
@@ -37,9 +38,9 @@ def _m(name: str, file: str, old: str, new: str, rooms: tuple[str, ...] = ()) ->
     return Mutant(name, file, old, new, rooms or ROOMS[file.split("/")[1]])
 
 
-MARCH, MARCH_LISTS = "opencl/volume/march.cl", "opencl/generation/march_lists.cl"
-RUNS, SHORTEN = "opencl/generation/runs.cl", "opencl/generation/shorten_lists.cl"
-CRITERIA = "opencl/generation/criteria.cl"
+MARCH, MARCH_LISTS = "opencl/volume/march.cl", "opencl/cpu16/generation_march.cl"
+RUNS, SHORTEN = "opencl/generation/runs.cl", "opencl/cpu16/generation_shorten.cl"
+HOMOGENEITY = "opencl/generation/homogeneity.cl"
 LISTS, RAYS = "opencl/raycasting/lists.cl", "opencl/raycasting/list_rays.cl"
 DECODE = "opencl/series/decode.cl"
 LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
@@ -59,8 +60,8 @@ KERNEL_MUTANTS = (
     _m(
         "march: opacity unit distance multiplies",
         MARCH,
-        "speed / unit_distance",
-        "speed * unit_distance",
+        "speed / view->unit_distance",
+        "speed * view->unit_distance",
     ),
     _m("skipping: two steps too far", MARCH, "march->per_step - 0.51f", "march->per_step + 1.49f"),
     _m(
@@ -72,7 +73,7 @@ KERNEL_MUTANTS = (
     _m(
         "march: errors are not weighted by what is seen",
         MARCH_LISTS,
-        "square_of(difference) * seen_weight(run, hidden_weight)",
+        "square_of(difference) * seen_weight(run, recording.hidden_weight)",
         "square_of(difference)",
     ),
     _m(
@@ -109,14 +110,14 @@ KERNEL_MUTANTS = (
     _m(
         "shortening: < for <= of a threshold",
         SHORTEN,
-        "<= (Row)(thresholds)",
-        "< (Row)(thresholds)",
+        "errors) <= thresholds;",
+        "errors) < thresholds;",
     ),
     _m(
         "shortening: of equal errors the last",
         SHORTEN,
-        "const RowPlaces less = error < least;",
-        "const RowPlaces less = error <= least;",
+        "const Int less = error < least;",
+        "const Int less = error <= least;",
     ),
     _m(
         "shortening: one run more than the limit",
@@ -131,14 +132,8 @@ KERNEL_MUTANTS = (
         "if (earlier.each[lane] > 0)",
     ),
     _m(
-        "criteria: shares for one more supersegment",
-        CRITERIA,
-        "at.y / (float)limit;",
-        "at.y / (float)(limit + 1);",
-    ),
-    _m(
-        "criteria: homogeneity's threshold is not squared",
-        CRITERIA,
+        "homogeneity: the threshold is not squared",
+        HOMOGENEITY,
         "const float most = threshold * threshold;",
         "const float most = threshold;",
     ),
@@ -175,12 +170,12 @@ KERNEL_MUTANTS = (
     _m(
         "bricks: no margin",
         "opencl/volume/bricks.cl",
-        "<< BRICK_SHIFT) - BRICK_MARGIN;",
-        "<< BRICK_SHIFT);",
+        "<< bricks.shift) - bricks.margin;",
+        "<< bricks.shift);",
     ),
     _m(
         "render_volume: opacity multiplier is added",
-        "opencl/volume/render_volume.cl",
+        "opencl/cpu16/volume_render.cl",
         "step.w *= opacity_multiplier;",
         "step.w += opacity_multiplier;",
     ),
@@ -199,8 +194,8 @@ KERNEL_MUTANTS = (
     _m(
         "compositing: green by red",
         "opencl/lib/compositing.cl",
-        "ADD_TO_SUM(y, weight * color.y)",
-        "ADD_TO_SUM(y, weight * color.x)",
+        "seen->sums.y += weight * color.y;",
+        "seen->sums.y += weight * color.x;",
     ),
     _m(
         "list search: the guess before is one too far",

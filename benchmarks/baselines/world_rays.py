@@ -22,10 +22,10 @@ KERNELS = Path(__file__).with_name("world_rays.cl")
 class WorldRays:
     """A VDI drawn by rays of the new view, every supersegment intersected as a pyramid's part.
 
-    Theirs is of ``criterion="transmittance"``. ``binary``: whether a list's first supersegment is
-    found by halving, not by looking from its beginning. The lists lie on the device one after the
-    other, as view depths of faces less the depth origin, nothing behind V_O's eye, and as straight
-    RGB and extinction per model length: in no list space.
+    Theirs is of equal transmittance (``criteria.py``). ``binary``: whether a list's first
+    supersegment is found by halving, not by looking from its beginning. The lists lie on the device
+    one after the other, as view depths of faces less the depth origin, nothing behind V_O's eye,
+    and as straight RGB and extinction per model length: in no list space.
     """
 
     def __init__(self, runtime: Runtime, vdi: VDI, *, binary: bool = True) -> None:

@@ -1,57 +1,51 @@
-// Records to the VDI's arrays.
+// Pack: records to the VDI's arrays.
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
-#include "lib/rays.cl"
-#include "generation/runs.cl"
+#include "volume/rays_of_view.cl"
+#include "generation/records.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Records of a slice of rays to the VDI's arrays.
 __kernel void pack_lists(
-    __global const float *records,
+    const RaysOfView view,          // the slice
+    __global const float *forms,
     int capacity,
-    int width, int rows,            // of the slice
+    __global const float *records,
     __global const ulong *offsets,  // where each list begins, and the last one ends
     uint made,                      // lists before the slice's
     ulong held,                     // supersegments before those that the arrays hold
     __global float *fronts,         // view depth less the depth origin, world units
     __global float *backs,
     __global float *colors,         // straight RGB, 3 per supersegment
-    __global float *optical_depths
-#ifdef DOUBLE_FLOAT_RAYS
-    , __global const float *forms,
-    int planes,
-    int height, int first_row
-#endif
-)
+    __global float *optical_depths)
 {
     const uint item = (uint)get_global_id(0);
-    const int2 pixel = block_pixel(item, width);
-    if (pixel.x >= width || pixel.y >= rows)
+    const Rays ray = rays_of_view(&view, item);
+    if (!ray.present)
         return;
     __global const float *record = records + record_start(item, capacity);
-    const size_t list = made + (size_t)pixel.y * width + pixel.x;
+    const size_t list = made + (size_t)ray.y * view.columns + ray.x;
     const ulong begin = offsets[list] - held;
     const int count = (int)(offsets[list + 1] - offsets[list]);
-#ifdef DOUBLE_FLOAT_RAYS
-    const float a = (float)pixel.x + 0.5f - 0.5f * (float)width;
-    const float b = (float)(first_row + pixel.y) + 0.5f - 0.5f * (float)height;
     float2 entry = (float2)(0.0f);
-    float length = 0.0f;
-    clip_from_entry(forms + 6 * FORM_SIZE, planes, a, b, INFINITY, &entry, &length);
-    const float2 exit = double_float_sum(entry, (float2)(length, 0.0f));
-    // Faces as they are stored lie in the volume, or its bounds would cut off what rounding has put outside
-    float least = entry.y > 0.0f ? nextafter(entry.x, INFINITY) : entry.x;
-    const float most = exit.y < 0.0f ? nextafter(exit.x, -INFINITY) : exit.x;
-#endif
+    float least = -INFINITY, most = INFINITY;
+    if (DOUBLE_FLOAT_RAYS) {
+        float length = 0.0f;
+        clip_from_entry(forms + 6 * FORM_SIZE, view.planes, ray.a, ray.b, INFINITY, &entry, &length);
+        const float2 exit = double_float_sum(entry, (float2)(length, 0.0f));
+        // Faces as they are stored lie in the volume, or its bounds would cut off what rounding has put outside
+        least = entry.y > 0.0f ? nextafter(entry.x, INFINITY) : entry.x;
+        most = exit.y < 0.0f ? nextafter(exit.x, -INFINITY) : exit.x;
+    }
     for (int k = 0; k < count; ++k) {
         Run run = load_run(record, k);
-#ifdef DOUBLE_FLOAT_RAYS
-        // Rounding must neither leave a supersegment without thickness nor let two overlap
-        run.FRONT = fmax(double_float_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
-        run.BACK = fmin(double_float_sum(entry, (float2)(run.BACK, 0.0f)).x, most);
-        run.BACK = fmax(run.BACK, nextafter(run.FRONT, INFINITY));
-        least = run.BACK;
-#endif
+        if (DOUBLE_FLOAT_RAYS) {
+            // Rounding must neither leave a supersegment without thickness nor let two overlap
+            run.FRONT = fmax(double_float_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
+            run.BACK = fmin(double_float_sum(entry, (float2)(run.BACK, 0.0f)).x, most);
+            run.BACK = fmax(run.BACK, nextafter(run.FRONT, INFINITY));
+            least = run.BACK;
+        }
         fronts[begin + k] = run.FRONT;
         backs[begin + k] = run.BACK;
         optical_depths[begin + k] = run.TAU;

@@ -1,24 +1,24 @@
 // Runs of blocks: from the records of a block's rays, and behind each other into the records of V_O's rays.
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
-#include "lib/rays.cl"
-#include "generation/runs.cl"
+#include "volume/rays_of_view.cl"
+#include "generation/records.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // A slice's records, one behind the other in the order of its lists.
 __kernel void copy_runs(
-    __global const float *records,
+    const RaysOfView view,
     int capacity,
-    int columns, int rows,         // of the slice
+    __global const float *records,
     __global const uint *counts,   // runs of each list
     __global const uint *begins,   // where those of each list go
     __global float *runs)
 {
     const uint item = (uint)get_global_id(0);
-    const int2 pixel = block_pixel(item, columns);
-    if (pixel.x >= columns || pixel.y >= rows)
+    const Rays ray = rays_of_view(&view, item);
+    if (!ray.present)
         return;
-    const size_t list = (size_t)pixel.y * columns + pixel.x;
+    const size_t list = (size_t)ray.y * view.columns + ray.x;
     __global const float *record = records + record_start(item, capacity);
     __global float *to = runs + (size_t)begins[list] * RUN_WORDS;
     for (int k = 0; k < (int)counts[list]; ++k)
@@ -28,32 +28,28 @@ __kernel void copy_runs(
 // Append a block's runs to the records of rays that come from nearer blocks. Runs that touch become one where a march would
 // have gone on with the first. How much light is left is what those before have let through.
 __kernel void append_runs(
-    int width, int height,
-    int first_column, int columns, int first_row, int rows, // the records' lists
+    const RaysOfView view,
     __global const float *forms,
-    int capacity,
-    float reference_length,        // model units
-    float hidden_weight,           // of what the view from V_O cannot see, 0 to 1
-    float finest,                  // merge errors up to this are accepted
+    const Recording recording,
     int4 window,                   // of the block: first column, first row, columns, rows
     __global const uint *begins,   // where the runs of each of the block's lists begin, and the last one's end
     __global const float *runs,
-    __global float *all_records,
+    __global float *records,
     __global uint *counts)
 {
     const uint item = (uint)get_global_id(0);
-    const Rays rays = rays_of_part(item, width, height, first_column, columns, first_row, rows);
-    const int x = first_column + rays.x - window.x, y = first_row + rays.y - window.y;
-    if (!rays.present || x < 0 || x >= window.z || y < 0 || y >= window.w)
+    const Rays ray = rays_of_view(&view, item);
+    const int x = view.first_column + ray.x - window.x, y = view.first_row + ray.y - window.y;
+    if (!ray.present || x < 0 || x >= window.z || y < 0 || y >= window.w)
         return;
     const size_t of_block = (size_t)y * window.z + x;
     uint next = begins[of_block];
     const uint end = begins[of_block + 1];
     if (next == end)
         return;
-    const int list = rays.y * columns + rays.x;
-    __global float *record = all_records + record_start(item, capacity);
-    const float per_reference = march_speed(forms, rays.a, rays.b) / reference_length;
+    const int list = ray.y * view.columns + ray.x;
+    __global float *record = records + record_start(item, recording.capacity);
+    const float per_reference = march_speed(forms, ray.a, ray.b) / recording.reference_length;
     int count = (int)counts[list];
     float transmittance = 1.0f;
     if (count > 0) {
@@ -62,7 +58,7 @@ __kernel void append_runs(
         transmittance = last.TRANSMITTANCE - last.TRANSMITTANCE * last.OPACITY;
         if (run.FRONT == last.BACK &&
             merge_error(1, last, run_feature(last, per_reference), run, run_feature(run, per_reference), per_reference,
-                        hidden_weight) <= finest) {
+                        recording.hidden_weight) <= recording.finest) {
             transmittance -= transmittance * run.OPACITY;
             store_run(record, count - 1, merged_runs(last, run));
             ++next;

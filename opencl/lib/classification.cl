@@ -9,30 +9,19 @@
 // Optical depth of a step through an opaque sample, whatever the unit distance: exp(-30) is 1e-13.
 #define OPAQUE_OPTICAL_DEPTH 30.0f
 
-// Colour (rgb) and opacity (w) of a scalar; NaN is transparent.
+// Colour (rgb) and opacity (w) of a scalar; NaN is transparent. per_scalar: (entries - 1) / (high - low), or a huge number
+// where the range is a single scalar.
 inline Real4 classify(Real scalar, __global const float4 *table, int entries, float low, float per_scalar)
 {
-#if LANES == 1
-    if (isnan(scalar))
-        return (float4)(0.0f);
-#endif
-    // per_scalar: (entries - 1) / (high - low), or a huge number where the range is a single scalar
-    const Real x = clamp((scalar - low) * per_scalar, 0.0f, (float)(entries - 1));
-    const Int i = min(TO_INT(x), max(entries - 2, 0));
-#if LANES == 1
-    const float4 here = table[i];
-    const float4 next = table[min(i + 1, entries - 1)];
-    return mix(here, next, x - (float)i);
-#else
     const Int known = isnan(scalar) == 0;
-    const Int entry = SELECT((Int)(0), i, known);
+    const Real x = clamp((scalar - low) * per_scalar, 0.0f, (float)(entries - 1));
+    const Int entry = SELECT((Int)(0), min(TO_INT(x), max(entries - 2, 0)), known);
     const Real4 here = load_fours(table, entry);
     const Real4 next = load_fours(table + min(1, entries - 1), entry);
-    const Real share = x - TO_REAL(i);
+    const Real share = x - TO_REAL(entry);
 #define BETWEEN(c) SELECT((Real)(0.0f), mix(here.c, next.c, share), known)
     return REAL4(BETWEEN(x), BETWEEN(y), BETWEEN(z), BETWEEN(w));
 #undef BETWEEN
-#endif
 }
 
 FUNCTION_OF_LANES(log1p_of, log1p)

@@ -1,12 +1,16 @@
 // Front-to-back compositing by "over" (docs/conventions.md, "A supersegment is a homogeneous medium").
 //
-// -D COMPENSATED  for rays that may meet so many media that their roundings add up to what one sees (docs/numerics.md,
+// -D COMPENSATED  not 0: for rays that may meet so many media that their roundings add up to what one sees (docs/numerics.md,
 //                 "Accumulated rounding"):
 //                     1  opacity is summed up from 0, so that what is nearly transparent keeps its digits
 //                     2  and every sum carries what it rounds off (Kahan)
 #include "lib/lanes.cl"
 #include "lib/opacity.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
+#ifndef COMPENSATED
+#define COMPENSATED 0
+#endif
 
 typedef struct {
     Real4 sums;         // premultiplied red, green and blue; transmittance
@@ -22,30 +26,34 @@ inline Seen nothing_seen()
     return seen;
 }
 
-#if defined(COMPENSATED) && COMPENSATED == 2
-#define ADD_TO_SUM(component, summand)                                                                        \
-    {                                                                                                         \
-        const Real sum = seen->sums.component;                                                                \
-        const Real term = (summand) - seen->compensation.component;                                           \
-        seen->sums.component = sum + term;                                                                    \
-        seen->compensation.component = (seen->sums.component - sum) - term;                                   \
+// Add to a sum, and carry what is rounded off.
+#define ADD_COMPENSATED(component, summand)                                      \
+    {                                                                            \
+        const Real sum = seen->sums.component;                                   \
+        const Real term = (summand) - seen->compensation.component;              \
+        seen->sums.component = sum + term;                                       \
+        seen->compensation.component = (seen->sums.component - sum) - term;      \
     }
-#else
-#define ADD_TO_SUM(component, summand) seen->sums.component += (summand);
-#endif
 
 // Composite straight `color` (xyz) behind what has been seen; `weight` is its opacity times the transmittance before it.
 inline void composite_over(Seen *seen, Real weight, Real4 color)
 {
-    ADD_TO_SUM(x, weight * color.x)
-    ADD_TO_SUM(y, weight * color.y)
-    ADD_TO_SUM(z, weight * color.z)
-#if defined(COMPENSATED) && COMPENSATED == 1
-    seen->compensation.w += weight;
-    seen->sums.w = 1.0f - seen->compensation.w;
-#else
-    ADD_TO_SUM(w, -weight)
-#endif
+    if (COMPENSATED == 2) {
+        ADD_COMPENSATED(x, weight * color.x)
+        ADD_COMPENSATED(y, weight * color.y)
+        ADD_COMPENSATED(z, weight * color.z)
+        ADD_COMPENSATED(w, -weight)
+        return;
+    }
+    seen->sums.x += weight * color.x;
+    seen->sums.y += weight * color.y;
+    seen->sums.z += weight * color.z;
+    if (COMPENSATED == 1) {
+        seen->compensation.w += weight;
+        seen->sums.w = 1.0f - seen->compensation.w;
+    } else {
+        seen->sums.w -= weight;
+    }
 }
 
 // Composite a medium of straight colour for the rays that are chosen.
@@ -56,13 +64,9 @@ inline void composite_medium(Seen *seen, Real optical_depth, Real4 color, Int ch
 
 inline Real alpha_seen(const Seen *seen)
 {
-#if !defined(COMPENSATED)
-    return 1.0f - seen->sums.w;
-#elif COMPENSATED == 1
-    return fmin(seen->compensation.w, 1.0f);
-#else
-    return (1.0f - seen->sums.w) + seen->compensation.w;
-#endif
+    if (COMPENSATED == 1)
+        return fmin(seen->compensation.w, 1.0f);
+    return COMPENSATED == 2 ? (1.0f - seen->sums.w) + seen->compensation.w : 1.0f - seen->sums.w;
 }
 
 // Premultiplied RGBA of what was composited.

@@ -4,13 +4,17 @@
 // j-th along y and the k-th along z, as in vtkVolumeMapper. The planes are forms (lib/rays.cl) that are positive beyond
 // them: low x, high x, low y, high y, low z, high z; a high one is never below its low one.
 //
-// -D CROPPED   the regions that are kept are no box (a box is clipped to); without it nothing of this is compiled
+// -D CROPPED   not 0: the regions that are kept are no box (a box is clipped to)
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifdef CROPPED
+#if CROPPED
 #define CROPPING_PARAMETER uint regions,
 #define CROPPING_ARGUMENT regions,
+#else
+#define CROPPING_PARAMETER
+#define CROPPING_ARGUMENT
+#endif
 #define CROPPING_PLANES 6
 #define MOST_KEPT 4 // six crossings make seven parts, and those that touch are one
 
@@ -83,7 +87,3 @@ inline void cut_to_part(const Kept *kept, int n, Real *from, Real *to)
     *from = fmax(*from, kept->from[n]);
     *to = fmin(*to, kept->to[n]);
 }
-#else
-#define CROPPING_PARAMETER
-#define CROPPING_ARGUMENT
-#endif

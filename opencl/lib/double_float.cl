@@ -2,11 +2,7 @@
 //
 // The sum and the product of two floats, and what they round off, are exact (Knuth 1969, 4.2.2; Dekker 1971, "A floating-point
 // technique for extending the available precision"). That of pairs is right to some 2^-46 of the larger operand.
-//
-// -D DOUBLE_FLOAT_RAYS   they are used, see lib/rays.cl; without it nothing of this is compiled
 #pragma OPENCL FP_CONTRACT OFF
-
-#ifdef DOUBLE_FLOAT_RAYS
 
 // |a| >= |b|, or a is 0
 inline float2 double_float_of_ordered(float a, float b)
@@ -43,4 +39,3 @@ inline bool double_float_less(float2 a, float2 b)
 {
     return a.x < b.x || (a.x == b.x && a.y < b.y);
 }
-#endif

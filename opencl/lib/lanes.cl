@@ -1,53 +1,20 @@
-// One text for one ray and for several side by side: what the lanes of a vector hold, and what is done to each.
+// What formulas are written of: the numbers of one ray, or of each of sixteen side by side.
 //
 // -D LANES  1 (default): a work-item follows one ray, and what vectors there are is the compiler's business
-//           16: it follows that many together, in vectors that are written out
-// -D VECTOR_FUNCTIONS  the driver's functions round a vector as they round a number, as Intel's do: they are asked for vectors
+//           16: it follows that many together, in vectors that are written out (cpu16/)
+// -D VECTOR_FUNCTIONS  0, or 1: the driver's functions round a vector as they round a number, as Intel's do: of sixteen they
+//           are asked for vectors
 //
-// A formula is written once, of Real, Int and Uint; only loads, stores and transposes differ (#if LANES == 1). Truth values are
+// A formula is written once, of Real, Int and Uint; only loads, stores and transposes differ. Truth values are
 // Int: 1 in one lane, all bits in a vector. They are joined by &, | and !, never by ~, and are not counted with: COUNT is.
 // Functions that take a vector and a number (min, fmax, clamp) and operators take both forms; fma and SELECT want (Real)(x).
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifndef LANES
-#define LANES 1
+#ifndef VECTOR_FUNCTIONS
+#define VECTOR_FUNCTIONS 0
 #endif
 
-#if LANES == 1
-typedef float Real;
-typedef int Int;
-typedef uint Uint;
-typedef float3 Real3;
-typedef float4 Real4;
-#define REAL3(x, y, z) (float3)(x, y, z)
-#define REAL4(x, y, z, w) (float4)(x, y, z, w)
-#define SELECT(otherwise, then, condition) ((condition) ? (then) : (otherwise))
-#define ANY(condition) (condition) // whether it holds in any lane
-#define ALL(condition) (condition)
-#define MAY_MATTER(condition) 1    // whether to do what is selected by `condition` alone: without a branch, unless lanes are many
-#define COUNT(condition) (condition) // 1 where it holds, or 0
-#define TO_REAL(x) ((float)(x))    // the value
-#define TO_INT(x) ((int)(x))
-#define TO_UCHAR(x) ((uchar)(x))
-#define AS_REAL(x) as_float(x)     // the bits
-#define AS_INT(x) as_int(x)
-#define AS_UINT(x) as_uint(x)
-#define KERNEL_OF_LANES __kernel
-#define LANE_NUMBERS 0
-#define OF_LANES(TYPE, OF_LANE) (TYPE)(OF_LANE(0)) // TYPE: Real, Int or Uint; OF_LANE(n): lane n's, a macro
-#define LOAD_LANES(k, from) ((from)[k]) // the k-th row of LANES numbers
-#define STORE_LANES(x, k, to) ((to)[k] = (x))
-
-inline int least_lane(int x)
-{
-    return x;
-}
-
-inline int largest_lane(int x)
-{
-    return x;
-}
-#else
+#if LANES == 16
 typedef float16 Real;
 typedef int16 Int;
 typedef uint16 Uint;
@@ -93,38 +60,72 @@ inline int largest_lane(Int x)
     const int2 of_eight = max(of_four.lo, of_four.hi);
     return max(of_eight.x, of_eight.y);
 }
-#endif
 
-// A number of each lane that is read one by one: of a vector as a Place, from memory, as to take each out of a register costs
-// two operations more.
-#if LANES == 1
-typedef const int Place;
-#else
+// A number of each lane that is read one by one: of a vector from memory, as to take each out of a register costs two
+// operations more.
 typedef const volatile int Place;
-#endif
-typedef union {
-    Int all;
-    int each[LANES];
-} Places;
 
 // A function of the driver's, of each lane: by itself, if a vector's may be another one
-#if LANES == 1 || defined(VECTOR_FUNCTIONS)
-#define FUNCTION_OF_LANES(name, of_number)          \
-    inline Real name(Real x)                        \
-    {                                               \
-        return of_number(x);                        \
-    }
-#else
 #define FUNCTION_OF_LANES(name, of_number)                                                                              \
     inline Real name(Real x)                                                                                            \
     {                                                                                                                   \
+        if (VECTOR_FUNCTIONS)                                                                                           \
+            return of_number(x);                                                                                        \
         const float *of_x = (const float *)&x;                                                                          \
         return (Real)(of_number(of_x[0]), of_number(of_x[1]), of_number(of_x[2]), of_number(of_x[3]),                   \
                       of_number(of_x[4]), of_number(of_x[5]), of_number(of_x[6]), of_number(of_x[7]),                   \
                       of_number(of_x[8]), of_number(of_x[9]), of_number(of_x[10]), of_number(of_x[11]),                 \
                       of_number(of_x[12]), of_number(of_x[13]), of_number(of_x[14]), of_number(of_x[15]));              \
     }
+#else
+#define LANES 1
+typedef float Real;
+typedef int Int;
+typedef uint Uint;
+typedef float3 Real3;
+typedef float4 Real4;
+#define REAL3(x, y, z) (float3)(x, y, z)
+#define REAL4(x, y, z, w) (float4)(x, y, z, w)
+#define SELECT(otherwise, then, condition) ((condition) ? (then) : (otherwise))
+#define ANY(condition) (condition) // whether it holds in any lane
+#define ALL(condition) (condition)
+#define MAY_MATTER(condition) 1    // whether to do what is selected by `condition` alone: without a branch, unless lanes are many
+#define COUNT(condition) (condition) // 1 where it holds, or 0
+#define TO_REAL(x) ((float)(x))    // the value
+#define TO_INT(x) ((int)(x))
+#define TO_UCHAR(x) ((uchar)(x))
+#define AS_REAL(x) as_float(x)     // the bits
+#define AS_INT(x) as_int(x)
+#define AS_UINT(x) as_uint(x)
+#define KERNEL_OF_LANES __kernel
+#define LANE_NUMBERS 0
+#define OF_LANES(TYPE, OF_LANE) (TYPE)(OF_LANE(0)) // TYPE: Real, Int or Uint; OF_LANE(n): lane n's, a macro
+#define LOAD_LANES(k, from) ((from)[k]) // the k-th row of LANES numbers
+#define STORE_LANES(x, k, to) ((to)[k] = (x))
+
+inline int least_lane(int x)
+{
+    return x;
+}
+
+inline int largest_lane(int x)
+{
+    return x;
+}
+
+typedef const int Place;
+
+#define FUNCTION_OF_LANES(name, of_number) \
+    inline Real name(Real x)               \
+    {                                      \
+        return of_number(x);               \
+    }
 #endif
+
+typedef union {
+    Int all;
+    int each[LANES];
+} Places;
 
 // The lower and the higher of two numbers that are never NaN: one instruction each
 #define LOWER_OF(x, y) SELECT(y, x, (x) < (y))

@@ -14,7 +14,7 @@
 #include "lib/directions.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifdef DOUBLE_FLOAT_RAYS
+#if DOUBLE_FLOAT_RAYS
 #define FORM_SIZE 12
 #else
 #define FORM_SIZE 6
@@ -52,7 +52,6 @@ inline Int clip_to_planes(__global const float *planes, int count, Real a, Real 
     return *t0 < *t1;
 }
 
-#ifdef DOUBLE_FLOAT_RAYS
 // Three coefficients of a form, and their rests, at pixel offsets (a, b), which are exact.
 inline float2 double_float_of_form(__global const float *c, float a, float b)
 {
@@ -93,7 +92,6 @@ inline bool clip_from_entry(__global const float *planes, int count, float a, fl
     *length = double_float_sum(t1, -t0).x;
     return *length < INFINITY; // not so where every slope has become 0
 }
-#endif
 
 // Offsets of pixels from the middle of so many.
 inline Real offsets_from_middle(Int pixels, int count)
@@ -109,7 +107,6 @@ inline int2 block_pixel(uint item, int width)
     return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
 }
 
-#if LANES == 1
 // The ray of a pixel.
 typedef struct {
     bool present; // the pixel is in the window
@@ -121,12 +118,11 @@ inline Ray ray_of_pixel(int2 pixel, int width, int height)
 {
     Ray ray;
     ray.present = pixel.x < width && pixel.y < height;
-    ray.a = offsets_from_middle(pixel.x, width);
-    ray.b = offsets_from_middle(pixel.y, height);
+    ray.a = (float)pixel.x + 0.5f - 0.5f * (float)width;
+    ray.b = (float)pixel.y + 0.5f - 0.5f * (float)height;
     ray.place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
     return ray;
 }
-#endif
 
 // The rays of a work-item through part of a window, from `first` on: one, or those of a block.
 typedef struct {

@@ -32,4 +32,14 @@ inline Real4 load_fours(__global const float4 *from, Int at)
 #undef FOUR
 #undef FOURS
 }
+#define load_halves load_fours
+#else
+#define load_fours(from, at) ((from)[at])
+
+// The same in two loads, where a vector's lanes load from different places, and not in four.
+inline float4 load_halves(__global const float4 *from, int at)
+{
+    __global const ulong *halves = (__global const ulong *)(from + at);
+    return (float4)(as_float2(halves[0]), as_float2(halves[1]));
+}
 #endif

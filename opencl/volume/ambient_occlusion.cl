@@ -1,23 +1,18 @@
 // Ambient occlusion of a classified volume: the mean transmittance around each node of a coarse grid.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, MACROCELL_SHIFT: see volume/sampling.cl and volume/march.cl
-// -D GRADIENT_OPACITY: see volume/shading.cl
+// -D: see volume/medium.cl
 //
 // Node (i, j, k) lies at the volume's index position (i, j, k) * cell. step_opacities gives each node the mean opacity, over
 // a step of the marches to come, of the box of one cell around it. All nodes march in the same directions by the same steps,
 // so ambient_transmittances reads the opacities at offsets that are the same for every node: places and weights come in a
-// table. Around the nodes lies a margin of zeros, as wide as the marches reach. With -D GRID_PART a node gets what its box has
+// table. Around the nodes lies a margin of zeros, as wide as the marches reach. With GRID_PART a node gets what its box has
 // in the part's own cells; the sums over all parts are the opacities.
-#define OCCLUSION_GRID
-#include "volume/march.cl"
-#include "volume/occlusion.cl"
+#include "volume/medium.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifdef GRID_PART
-#define OWN_CELL(position, axis) ((position) >= part_lower.axis && (position) < part_upper.axis)
-#else
-#define OWN_CELL(position, axis) 1
-#endif
+// Whether a position lies in the part's own cells.
+#define OWN_CELL(position, axis) \
+    (!GRID_PART || ((position) >= classified.part_lower.axis && (position) < classified.part_upper.axis))
 
 // Whether any macrocell between two index positions may hold something visible.
 inline bool any_visible(__global const uchar *visible, int4 macrocells, float3 low, float3 high)
@@ -34,15 +29,12 @@ inline bool any_visible(__global const uchar *visible, int4 macrocells, float3 l
 }
 
 __kernel void step_opacities(
+    const Classified classified,
     __global const VOXEL_T *voxels,
-    int4 size,                     // points along x, y, z
-    __global const float4 *table,  // see generation/march_lists.cl
-    int entries,
-    float low, float per_scalar,
+    __global const float4 *table,
+    __global const uchar *blanked,
+    __global const float *gradient,
     __global const uchar *visible,
-    int4 macrocells,
-    GRID_PART_PARAMETERS
-    SHADING_PARAMETERS
     int4 points,                   // of the whole grid along x, y, z
     int4 first_node,
     int4 nodes,                    // along x, y, z
@@ -56,14 +48,13 @@ __kernel void step_opacities(
     const int3 node = (int3)((int)get_global_id(0), (int)get_global_id(1), (int)get_global_id(2));
     if (node.x >= nodes.x)
         return;
-    const Medium of_all = {voxels, size, table, entries, low, per_scalar, visible, macrocells GRID_PART_ARGUMENTS SHADING_ARGUMENTS};
-    const Medium *medium = &of_all;
+    const Medium medium = {classified, voxels, table, 0, blanked, gradient, 0, 0};
     const float3 edge = convert_float3(cell.xyz);
     const float3 centre = convert_float3((node + first_node.xyz) * cell.xyz);
     const float3 apart = edge / convert_float3(samples.xyz);
     float sum = 0.0f;
-    const float3 here = (float3)(IN_PART(centre.x, x), IN_PART(centre.y, y), IN_PART(centre.z, z));
-    if (any_visible(visible, macrocells, here - 0.5f * edge, here + 0.5f * edge))
+    const float3 here = (float3)(IN_PART(classified, centre.x, x), IN_PART(classified, centre.y, y), IN_PART(classified, centre.z, z));
+    if (any_visible(visible, classified.macrocells, here - 0.5f * edge, here + 0.5f * edge))
         for (int k = 0; k < samples.z; ++k)
             for (int j = 0; j < samples.y; ++j)
                 for (int i = 0; i < samples.x; ++i) {
@@ -73,7 +64,7 @@ __kernel void step_opacities(
                     // Beyond the volume there is nothing
                     if (x >= 0.0f && y >= 0.0f && z >= 0.0f && x <= (float)(points.x - 1) && y <= (float)(points.y - 1) &&
                         z <= (float)(points.z - 1) && OWN_CELL(x, x) && OWN_CELL(y, y) && OWN_CELL(z, z))
-                        sum += opacity_of(medium_at(medium, x, y, z, units).w * steps);
+                        sum += opacity_of(medium_at(&medium, x, y, z, units).w * steps);
                 }
     const int3 place = node + margin.xyz;
     opacities[(place.z * padded.y + place.y) * padded.x + place.x] = sum / (float)(samples.x * samples.y * samples.z);
@@ -103,7 +94,7 @@ __kernel void ambient_transmittances(
         for (int d = 0; d < directions; ++d) {
             float transmittance = 1.0f;
             for (int k = d * steps; k < (d + 1) * steps; ++k)
-                transmittance *= 1.0f - trilinear(own + places[k], padded.x, plane, shares[3 * k], shares[3 * k + 1],
+                transmittance *= 1.0f - trilinear(own, places[k], padded.x, plane, shares[3 * k], shares[3 * k + 1],
                                                   shares[3 * k + 2]);
             sum += transmittance;
         }

@@ -1,16 +1,10 @@
-// What of a volume is left out though its grid has it: blank points and cells (docs/conventions.md, "From a volume to the medium").
-//
-// -D BLANKED  there are some; without it nothing of this is compiled. Positions are the whole grid's: not with GRID_PART
+// What of a volume is left out though its grid has it: blank points and cells (docs/conventions.md, "Blanking"). Positions are
+// the whole grid's: a part of a grid has none.
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Of the structure Medium, of the kernels that take one, and of its initialiser: see volume/shading.cl
-#ifdef BLANKED
-#define BLANKING_FIELD __global const uchar *blanked; // of each point: a bit for each octant around it, half a voxel long
-#define BLANKING_PARAMETER __global const uchar *blanked,
-#define BLANKING_ARGUMENT , blanked
-
-// Whether index position (x, y, z) lies in a blank octant of the point nearest to it.
+// Whether index position (x, y, z) lies in a blank octant of the point nearest to it. `blanked`: of each point, a bit for each
+// octant around it, half a voxel long.
 inline Int is_blank(__global const uchar *blanked, int4 size, Real x, Real y, Real z)
 {
     const Int i = clamp(TO_INT(x + 0.5f), 0, size.x - 1);
@@ -23,8 +17,3 @@ inline Int is_blank(__global const uchar *blanked, int4 size, Real x, Real y, Re
     return OF_LANES(Int, BLANK) != 0;
 #undef BLANK
 }
-#else
-#define BLANKING_FIELD
-#define BLANKING_PARAMETER
-#define BLANKING_ARGUMENT
-#endif

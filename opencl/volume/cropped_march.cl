@@ -1,12 +1,11 @@
 // The parts of a march along a volume's ray that cropping keeps.
 //
-// -D CROPPED: see lib/cropping.cl
+// -D CROPPED  1: there are such, see lib/cropping.cl
 #include "volume/march.cl"
 #include "lib/cropping.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifdef CROPPED
-// The kept parts of a ray, in t.
+// The kept parts of a ray, in t. `form`: the first of the planes of cropping.
 inline Kept kept_march(const March *march, __global const float *form, Real a, Real b, uint regions)
 {
     Real at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
@@ -29,4 +28,3 @@ inline Real kept_share(const Kept *kept, Real front, Real back)
     }
     return sum / (back - front);
 }
-#endif

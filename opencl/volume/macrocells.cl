@@ -1,12 +1,13 @@
 // Macrocells of a volume that a transfer function makes transparent, so that marches can skip them.
 //
-// -D VOXEL_T, INDEX_T, RGBA: see volume/sampling.cl
+// -D VOXEL_T, INDEX_T, COMPONENTS: see volume/sampling.cl
 //
 // Macrocell (i, j, k) covers the index positions from MACROCELL i to MACROCELL (i + 1) along x, both included, and likewise along y and
 // z: every point that a sample between them reads, whatever the interpolation.
-#include "volume/empty_macrocells.cl"
 #include "volume/sampling.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
+#define MACROCELL (1 << MACROCELL_SHIFT) // points along each axis
 
 // Least and largest scalar of each macrocell, NaN left out (it is transparent); (INFINITY, -INFINITY) where all is NaN.
 __kernel void macrocell_ranges(__global const VOXEL_T *voxels, int4 size, int4 macrocells, __global float2 *ranges)

@@ -1,44 +1,34 @@
 // Ambient occlusion at a sample, from the grid that volume/ambient_occlusion.cl fills (docs/conventions.md).
-//
-// -D OCCLUSION  samples are darkened by what stands around them; without it nothing of this is compiled (what fills the
-//               grid defines OCCLUSION_GRID)
+#include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Of the structure Medium, of the kernels that take one, and of its initialiser: see volume/shading.cl
-#ifdef OCCLUSION
-#define OCCLUSION_FIELD                                                                        \
-    __global const float *ambient; /* mean transmittance around each node */                   \
-    int4 nodes;                    /* along x, y, z */                                         \
-    float4 to_nodes;               /* nodes per voxel along x, y, z; strength */
-#define OCCLUSION_PARAMETER __global const float *ambient, int4 nodes, float4 to_nodes,
-#define OCCLUSION_ARGUMENT , ambient, nodes, to_nodes
-#else
-#define OCCLUSION_FIELD
-#define OCCLUSION_PARAMETER
-#define OCCLUSION_ARGUMENT
-#endif
-
-#if defined(OCCLUSION) || defined(OCCLUSION_GRID)
 // Trilinear between (0, 0, 0) and (1, 1, 1) of eight values, `row` and `plane` apart.
-inline float trilinear(__global const float *v, int row, int plane, float fx, float fy, float fz)
+inline Real trilinear(__global const float *values, Int first, int row, int plane, Real fx, Real fy, Real fz)
 {
-    const float near = mix(mix(v[0], v[1], fx), mix(v[row], v[row + 1], fx), fy);
-    v += plane;
-    const float far = mix(mix(v[0], v[1], fx), mix(v[row], v[row + 1], fx), fy);
+    const Places places = {first};
+    Place *at = places.each;
+#define VALUE(n) v[at[n]]
+    Real corners[8];
+    for (int k = 0; k < 8; ++k) {
+        __global const float *v = values + (k >> 2) * plane + (k >> 1 & 1) * row + (k & 1);
+        corners[k] = OF_LANES(Real, VALUE);
+    }
+#undef VALUE
+    const Real near = mix(mix(corners[0], corners[1], fx), mix(corners[2], corners[3], fx), fy);
+    const Real far = mix(mix(corners[4], corners[5], fx), mix(corners[6], corners[7], fx), fy);
     return mix(near, far, fz);
 }
-#endif
 
-#ifdef OCCLUSION
-// Factor of the colour at index position (x, y, z).
-inline float ambient_factor(__global const float *ambient, int4 nodes, float4 to_nodes, float x, float y, float z)
+// Factor of the colour at index position (x, y, z). `ambient`: mean transmittance around each of `nodes` along x, y, z.
+// `to_nodes`: nodes per voxel along x, y, z, and the strength.
+inline Real ambient_factor(__global const float *ambient, int4 nodes, float4 to_nodes, Real x, Real y, Real z)
 {
-    const float3 at = (float3)(x, y, z) * to_nodes.xyz;
-    const int3 node = clamp(convert_int3(at), (int3)(0), nodes.xyz - 2);
-    const float3 share = clamp(at - convert_float3(node), 0.0f, 1.0f);
+    const Real at_x = x * to_nodes.x, at_y = y * to_nodes.y, at_z = z * to_nodes.z;
+    const Int i = clamp(TO_INT(at_x), 0, nodes.x - 2);
+    const Int j = clamp(TO_INT(at_y), 0, nodes.y - 2);
+    const Int k = clamp(TO_INT(at_z), 0, nodes.z - 2);
     const int plane = nodes.x * nodes.y;
-    __global const float *v = ambient + node.z * plane + node.y * nodes.x + node.x;
-    const float open = trilinear(v, nodes.x, plane, share.x, share.y, share.z);
-    return open / fma(to_nodes.w, 1.0f - open, open); // exactly 1 where all the light arrives
+    const Real open = trilinear(ambient, k * plane + j * nodes.x + i, nodes.x, plane, clamp(at_x - TO_REAL(i), 0.0f, 1.0f),
+                                clamp(at_y - TO_REAL(j), 0.0f, 1.0f), clamp(at_z - TO_REAL(k), 0.0f, 1.0f));
+    return open / fma((Real)(to_nodes.w), 1.0f - open, open); // exactly 1 where all the light arrives
 }
-#endif

@@ -1,74 +1,47 @@
-// Projections of a volume, the blend modes of volume rendering beside compositing: along a ray, the greatest or the least
-// scalar, classified; or the mean or the integral of opacity times scalar, as a grey value (docs/conventions.md, "Blending").
-//
-// -D MAXIMUM, MINIMUM, AVERAGE or ADDITIVE: which of them
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST: see volume/sampling.cl; DOUBLE_FLOAT_RAYS: see lib/rays.cl; CROPPED: see lib/cropping.cl
-#include "volume/cropped_march.cl"
-#include "volume/picture.cl"
+// Projections of a volume: see volume/projection.cl. One ray for each work-item; sixteen: cpu16/volume_project.cl.
+#include "volume/projection.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-KERNEL_OF_LANES void project(
-    MEDIUM_PARAMETERS
-    VIEW_PARAMETERS
-    OPAQUE_DEPTH_PARAMETERS
-    CROPPING_PARAMETER                    // regions that are kept; their planes are forms behind the others
-    float per_range, float at_zero,       // scalar to 0 .. 1 over the volume's range
-    __global float4 *image)               // premultiplied RGBA, top row first
+__kernel void project(
+    const Classified classified,
+    __global const VOXEL_T *voxels,
+    __global const float4 *table,
+    __global const uchar *distances,
+    __global const uchar *blanked,
+    __global const float *gradient,
+    __global const float *lighting,
+    __global const float *ambient,
+    const RaysOfView view,
+    __global const float *forms,
+    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first; 0: none does
+    uint regions,                       // that cropping keeps; its planes are forms behind the others
+    float per_range, float at_zero,     // scalar to 0 .. 1 over the volume's range
+    __global float4 *image)             // premultiplied RGBA, top row first
 {
-    const Rays rays = rays_of_block((uint)get_global_id(0) * LANES, width, height, 0, height);
-    if (!ANY(rays.present))
+    const Rays ray = rays_of_view(&view, (uint)get_global_id(0));
+    if (!ray.present)
         return;
-    const Places places = places_in_picture(&rays, width, height, 0);
-    const Real t_end = opaque_ends(&places, opaque_depth, has_opaque_depth);
-
-    Real extreme = NAN;
-    Real sum = 0.0f, lost = 0.0f; // and what it rounded off
-    Real length = 0.0f;           // that was sampled, steps
+    const size_t place = (size_t)(view.height - 1 - ray.y) * view.width + ray.x;
+    const Medium medium = {classified, voxels, table, distances, blanked, gradient, lighting, ambient};
+    Projection projection = {NAN, 0.0f, 0.0f, 0.0f};
     March march;
-    if (ANY(begin_march(&march, forms, planes, rays.a, rays.b, sample_distance, unit_distance, t_end))) {
-        const Medium medium = MEDIUM;
-#ifdef CROPPED
-        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, rays.a, rays.b, regions);
-#endif
-        for (int k = 0; ANY(march.steps > k); ++k) {
-            const Real front = step_face(&march, (Int)(k)), back = step_face(&march, (Int)(k + 1));
-            const Real t = 0.5f * (front + back);
-            Real steps = (back - front) * march.per_step;
-#ifdef CROPPED
-            steps *= kept_share(&kept, front, back);
-#endif
-            const Real scalar = sample_volume(medium.voxels, medium.size, fma(t, march.slope.x, march.start.x),
-                                              fma(t, march.slope.y, march.start.y), fma(t, march.slope.z, march.start.z));
-            Int counts = (march.steps > k) & (steps > 0.0f) & (scalar == scalar);
-#ifdef BLANKED
-            counts = counts & !is_blank(medium.blanked, medium.size, fma(t, march.slope.x, march.start.x),
-                                        fma(t, march.slope.y, march.start.y), fma(t, march.slope.z, march.start.z));
-#endif
-            length = SELECT(length, length + steps, counts);
-#if defined(MAXIMUM)
-            extreme = SELECT(extreme, fmax(extreme, scalar), counts);
-#elif defined(MINIMUM)
-            extreme = SELECT(extreme, fmin(extreme, scalar), counts);
-#else
-            const Real opacity = classify(scalar, medium.table, medium.entries, medium.low, medium.per_scalar).w;
-            const Real more = opacity * fma(scalar, (Real)(per_range), (Real)(at_zero)) * steps - lost;
-            const Real next = sum + more;
-            lost = SELECT(lost, (next - sum) - more, counts);
-            sum = SELECT(sum, next, counts);
-#endif
+    if (begin_march(&march, &view, &classified, forms, ray.a, ray.b, opaque_depth ? opaque_depth[place] : INFINITY)) {
+        Kept kept;
+        if (CROPPED)
+            kept = kept_march(&march, forms + (6 + view.planes) * FORM_SIZE, ray.a, ray.b, regions);
+        for (int k = 0; k < march.steps; ++k) {
+            const float front = step_face(&march, k), back = step_face(&march, k + 1);
+            const float t = 0.5f * (front + back);
+            const float x = fma(t, march.slope.x, march.start.x), y = fma(t, march.slope.y, march.start.y);
+            const float z = fma(t, march.slope.z, march.start.z);
+            float steps = (back - front) * march.per_step;
+            if (CROPPED)
+                steps *= kept_share(&kept, front, back);
+            const float scalar = sample_volume(voxels, &classified.points, x, y, z);
+            const bool blank = blanked && is_blank(blanked, classified.points.size, x, y, z);
+            if (steps > 0.0f && !isnan(scalar) && !blank)
+                project_sample(&projection, &medium, scalar, steps, per_range, at_zero, 1);
         }
     }
-#if defined(MAXIMUM) || defined(MINIMUM)
-    const Real4 color = classify(extreme, table, entries, low, per_scalar);
-    store_colors(image, &places, REAL4(color.x * color.w, color.y * color.w, color.z * color.w, color.w));
-#else
-#ifdef AVERAGE
-    const Real grey = clamp(sum / length, 0.0f, 1.0f);
-#else
-    const Real grey = clamp(sum * (march.units * march.step), 0.0f, 1.0f);
-#endif
-    const Int some = length > 0.0f;
-    const Real shown = SELECT((Real)(0.0f), grey, some);
-    store_colors(image, &places, REAL4(shown, shown, shown, SELECT((Real)(0.0f), (Real)(1.0f), some)));
-#endif
+    image[place] = projected(&projection, &medium, &march);
 }

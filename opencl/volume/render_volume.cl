@@ -1,95 +1,72 @@
-// Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation.
+// Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation. One ray for each
+// work-item; sixteen: cpu16/volume_render.cl.
 //
-// -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, MACROCELL_SHIFT: see volume/sampling.cl and volume/march.cl
-// -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see volume/shading.cl; OCCLUSION: see volume/occlusion.cl
-// -D COMPENSATED: see lib/compositing.cl; DOUBLE_FLOAT_RAYS: see lib/rays.cl
-// -D CROPPED: see lib/cropping.cl
-// -D OPACITY_MULTIPLIER: optical depths are multiplied
-// -D LANES: see volume/march.cl
-// -D SAMPLED: see volume/samples.cl; some steps of some rows at a time then, as they are sampled
+// -D CROPPED: see lib/cropping.cl; COMPENSATED: see lib/compositing.cl; the volume's: see volume/march.cl
 #include "volume/cropped_march.cl"
-#include "volume/picture.cl"
+#include "volume/samples.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifdef OPACITY_MULTIPLIER
-#define MULTIPLIER_PARAMETER float opacity_multiplier,
-#else
-#define MULTIPLIER_PARAMETER
-#endif
-
-#ifdef SAMPLED
-#define PART_PARAMETERS                                                                        \
-    int first_row, int rows, int first_step, int steps,                                        \
-    __global float4 *states, /* of each ray: colour and transmittance, what they rounded off */
-#else
-#define PART_PARAMETERS
-#endif
-
-// Work-items are pixels in blocks of 4 x 4, or the blocks.
-
-KERNEL_OF_LANES void render_volume(
-    MEDIUM_PARAMETERS
-    VIEW_PARAMETERS
-    OPAQUE_DEPTH_PARAMETERS
-    float transmittance_cutoff,           // the ray ends where no more than this is left; negative: never
-    CROPPING_PARAMETER                    // regions that are kept; their planes are forms behind the others
-    MULTIPLIER_PARAMETER
-    PART_PARAMETERS
-    __global float4 *image)               // premultiplied RGBA, top row first
+__kernel void render_volume(
+    const Classified classified,
+    __global const VOXEL_T *voxels,
+    __global const float4 *table,
+    __global const uchar *distances,
+    __global const uchar *blanked,
+    __global const float *gradient,
+    __global const float *lighting,
+    __global const float *ambient,
+    const RaysOfView view,
+    __global const float *forms,
+    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first; 0: none does
+    float transmittance_cutoff,         // a ray ends where no more than this is left; negative: never
+    float opacity_multiplier,           // of optical depths
+    uint regions,                       // that cropping keeps; its planes are forms behind the others
+    __global const float4 *samples,     // see volume/samples.cl; 0: steps are sampled here
+    __global float4 *states,            // of each ray behind a part of its steps: what has been seen; 0: all steps are taken
+    __global float4 *image)             // premultiplied RGBA, top row first
 {
-    const uint item = (uint)get_global_id(0) * LANES;
-#ifdef SAMPLED
-    __global float4 *state = states + 2 * (size_t)item;
-#else
-    const int first_row = 0, rows = height, first_step = 0, steps = INT_MAX;
-#endif
-    const Rays rays = rays_of_block(item, width, height, first_row, rows);
-    if (!ANY(rays.present))
+    const uint item = (uint)get_global_id(0);
+    const Rays ray = rays_of_view(&view, item);
+    if (!ray.present)
         return;
-    const Places places = places_in_picture(&rays, width, height, first_row);
-    const Real t_end = opaque_ends(&places, opaque_depth, has_opaque_depth);
-
+    const size_t place = (size_t)(view.height - 1 - (view.first_row + ray.y)) * view.width + ray.x;
     Seen seen = nothing_seen();
-#ifdef SAMPLED
-    if (first_step > 0) {
-        seen.sums = state[0];
-        seen.compensation = state[1];
+    if (states && view.first_step > 0) {
+        seen.sums = states[2 * (size_t)item];
+        seen.compensation = states[2 * (size_t)item + 1];
     }
-#endif
     March march;
-    if (ANY(begin_march(&march, forms, planes, rays.a, rays.b, sample_distance, unit_distance, t_end))) {
-        const Medium medium = MEDIUM;
-#ifdef CROPPED
-        const Kept kept = kept_march(&march, forms + (6 + planes) * FORM_SIZE, rays.a, rays.b, regions);
-#endif
-        Int k = first_step;
-        const Int end = SELECT(march.steps, (Int)(first_step + steps), march.steps - first_step > steps);
-        bool look = true; // for empty space: not where something was seen in the turn before
-        for (;;) {
-            const Int going = (k < end) & (seen.sums.w > transmittance_cutoff);
-            if (!ANY(going))
-                break;
-            const Real front = step_face(&march, k), back = step_face(&march, k + 1);
-            const Int empty = look ? empty_steps(&march, &medium, going, k, end, 1, front, back) : (Int)(0);
-            const Int here = going & (empty == 0);
-            if (ANY(here)) {
-                Real4 step = step_medium(&march, &medium, k, front, back);
-#ifdef CROPPED
-                step.w *= kept_share(&kept, front, back);
-#endif
-#ifdef OPACITY_MULTIPLIER
-                step.w *= opacity_multiplier;
-#endif
-                look = !ANY(here & (step.w > 0.0f));
-                composite_medium(&seen, step.w, step, here);
+    if (begin_march(&march, &view, &classified, forms, ray.a, ray.b, opaque_depth ? opaque_depth[place] : INFINITY)) {
+        const Medium medium = {classified, voxels, table, distances, blanked, gradient, lighting, ambient};
+        __global const float4 *sampled = samples + samples_start(item, view.steps);
+        Kept kept;
+        if (CROPPED)
+            kept = kept_march(&march, forms + (6 + view.planes) * FORM_SIZE, ray.a, ray.b, regions);
+        const int end = min(view.first_step + view.steps, march.steps);
+        bool look = true;
+        for (int k = view.first_step; k < end && seen.sums.w > transmittance_cutoff;) {
+            // Skip what is transparent, but not where something was seen in the step before
+            const float front = step_face(&march, k), back = step_face(&march, k + 1);
+            const int empty = look ? empty_steps(&march, &medium, 1, k, end, 1, front, back) : 0;
+            if (empty > 0) {
+                k += empty;
+                continue;
             }
-            k += max(empty, 1);
+            // Sample the step's midpoint, classify and shade it
+            float4 step = samples ? sampled[(k - view.first_step) * SAMPLE_LANES] : step_medium(&march, &medium, front, back);
+            if (CROPPED)
+                step.w *= kept_share(&kept, front, back);
+            step.w *= opacity_multiplier;
+            look = !(step.w > 0.0f);
+            // Composite it behind what has been seen
+            composite_medium(&seen, step.w, step, 1);
+            ++k;
         }
     }
-#ifdef SAMPLED
-    state[0] = seen.sums;
-    state[1] = seen.compensation;
-#endif
-    store_colors(image, &places, composited(&seen));
+    if (states) {
+        states[2 * (size_t)item] = seen.sums;
+        states[2 * (size_t)item + 1] = seen.compensation;
+    }
+    image[place] = composited(&seen);
 }

@@ -1,59 +1,25 @@
 // Shading and gradient opacity, as VTK's GPU volume mapper computes them (docs/conventions.md, "Lighting").
 //
-// -D SHADED             samples are lit
-// -D HEADLIGHT          by one headlight and nothing else, which VTK shades its own way
-// -D POSITIONAL_LIGHTS  some of the lights shine from a position
-// -D SHARP_HIGHLIGHTS   the specular power is so large that a cosine's rounding shows in its power
-// -D GRADIENT_OPACITY   opacity depends on how fast the scalar changes
+// -D SHADED            0: samples are not lit; 1: they are; 2: by one headlight and nothing else, which VTK shades its own way
+// -D GRADIENT_OPACITY  1: opacity depends on how fast the scalar changes
 //
-// Without SHADED and GRADIENT_OPACITY nothing of this is compiled. Lights are in a frame of their own, "the lights'
-// frame", whose origin is the eye: the model frame's axes for a headlight, the view's otherwise.
+// Lights are in a frame of their own, "the lights' frame", whose origin is the eye: the model frame's axes for a headlight,
+// the view's otherwise.
 #include "lib/classification.cl"
 #include "lib/directions.cl"
 #include "volume/sampling.cl"
-#include "volume/occlusion.cl"
-#include "volume/blanking.cl"
-#include "volume/samples.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Of the structure Medium, of the kernels that take one, and of its initialiser: after `macrocells` in each
-#define SHADING_FIELDS LIGHTING_FIELD GRADIENT_FIELD OCCLUSION_FIELD BLANKING_FIELD SAMPLES_FIELD
-#define SHADING_PARAMETERS LIGHTING_PARAMETER GRADIENT_PARAMETER OCCLUSION_PARAMETER BLANKING_PARAMETER SAMPLES_PARAMETER
-#define SHADING_ARGUMENTS LIGHTING_ARGUMENT GRADIENT_ARGUMENT OCCLUSION_ARGUMENT BLANKING_ARGUMENT SAMPLES_ARGUMENT
-
-#ifdef SHADED
-#define LIGHTING_FIELD __global const float *lighting; // see lit
-#define LIGHTING_PARAMETER __global const float *lighting,
-#define LIGHTING_ARGUMENT , lighting
-#else
-#define LIGHTING_FIELD
-#define LIGHTING_PARAMETER
-#define LIGHTING_ARGUMENT
-#endif
-
-#ifdef GRADIENT_OPACITY
-#define GRADIENT_FIELD __global const float *gradient; // see gradient_opacity
-#define GRADIENT_PARAMETER __global const float *gradient,
-#define GRADIENT_ARGUMENT , gradient
-#else
-#define GRADIENT_FIELD
-#define GRADIENT_PARAMETER
-#define GRADIENT_ARGUMENT
-#endif
-
-#if defined(SHADED) || defined(GRADIENT_OPACITY)
 // Differences of the scalar between a voxel ahead and a voxel behind along each index axis; 0 where one is NaN.
-inline Real3 scalar_differences(__global const VOXEL_T *voxels, int4 size, Real x, Real y, Real z)
+inline Real3 scalar_differences(__global const VOXEL_T *voxels, const Points *points, Real x, Real y, Real z)
 {
-    const Real along_x = sample_volume(voxels, size, x + 1.0f, y, z) - sample_volume(voxels, size, x - 1.0f, y, z);
-    const Real along_y = sample_volume(voxels, size, x, y + 1.0f, z) - sample_volume(voxels, size, x, y - 1.0f, z);
-    const Real along_z = sample_volume(voxels, size, x, y, z + 1.0f) - sample_volume(voxels, size, x, y, z - 1.0f);
+    const Real along_x = sample_volume(voxels, points, x + 1.0f, y, z) - sample_volume(voxels, points, x - 1.0f, y, z);
+    const Real along_y = sample_volume(voxels, points, x, y + 1.0f, z) - sample_volume(voxels, points, x, y - 1.0f, z);
+    const Real along_z = sample_volume(voxels, points, x, y, z + 1.0f) - sample_volume(voxels, points, x, y, z - 1.0f);
     return REAL3(SELECT(along_x, (Real)(0.0f), isnan(along_x)), SELECT(along_y, (Real)(0.0f), isnan(along_y)),
                  SELECT(along_z, (Real)(0.0f), isnan(along_z)));
 }
-#endif
 
-#ifdef GRADIENT_OPACITY
 // Places in `gradient`
 #define TO_TABLE 0      // differences to table positions, per axis
 #define LAST_POSITION 3 // beyond it the table is not looked up
@@ -87,9 +53,7 @@ inline Real scaled_optical_depth(Real tau, Real factor)
 {
     return SELECT(tau, -log1p_of(factor * expm1_of(-tau)), factor < 1.0f);
 }
-#endif
 
-#ifdef SHADED
 // Places in `lighting`
 #define NORMAL 0        // rows of the matrix from differences along the index axes to the lights' frame
 #define POSITION 9      // rows of the affine map from index positions to the lights' frame
@@ -98,8 +62,9 @@ inline Real scaled_optical_depth(Real tau, Real factor)
 #define SPECULAR 23
 #define SPECULAR_POWER 24
 #define TWO_SIDED 25
-#define LIGHT_COUNT 26
-#define FIRST_LIGHT 27
+#define SHARP 26 // the specular power is so large that a cosine's rounding shows in its power
+#define LIGHT_COUNT 27
+#define FIRST_LIGHT 28
 // Places in a light
 #define LIGHT_AMBIENT 0
 #define LIGHT_DIFFUSE 3
@@ -123,12 +88,11 @@ inline Real3 unit_or_zero(Real3 v)
 #undef UNIT
 }
 
-// The power of a cosine, 0 < cosine. `lost`: 1 - cosine, which is right where the cosine has rounded it off.
-#ifdef SHARP_HIGHLIGHTS
-#define highlight(cosine, lost, power) exp((power) * log1p(-fmin(lost, 1.0f)))
-#else
-#define highlight(cosine, lost, power) pow_of(cosine, power)
-#endif
+// A power of 1 - lost, where the cosine itself has rounded `lost` off.
+inline Real sharp_highlight(Real lost, float power)
+{
+    return exp(power * log1p_of(-fmin(lost, 1.0f)));
+}
 
 // Colour that a sample sends to the eye. `differences`: see scalar_differences. `x`, `y`, `z`: its index position.
 // The normal points to where the scalar grows, so that it looks away from a light in front of a denser inside: vectors
@@ -143,18 +107,21 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
 #undef POSITION_ALONG
     const Real3 view = unit_or_zero(position); // from the eye
     const float power = lighting[SPECULAR_POWER];
-    const bool two_sided = lighting[TWO_SIDED] != 0.0f;
-#ifdef HEADLIGHT
-    __global const float *light = lighting + FIRST_LIGHT;
-    Real facing = dot_of(normal, view);
-    const Real reflected = fmax(2.0f * facing * facing - 1.0f, 0.0f); // cosine between the reflected ray and the eye's
-    if (two_sided)
-        facing = fabs(facing);
-#ifdef SHARP_HIGHLIGHTS
-    const float3 across = cross(normal, view); // as long as the sine of half the angle to the reflected ray
-#endif
-    const Real specular = highlight(reflected, 2.0f * dot(across, across), power);
-    // The light's own ambient colour has no part in it
+    const bool two_sided = lighting[TWO_SIDED] != 0.0f, sharp = lighting[SHARP] != 0.0f;
+    if (SHADED == 2) {
+        __global const float *light = lighting + FIRST_LIGHT;
+        Real facing = dot_of(normal, view);
+        const Real reflected = fmax(2.0f * facing * facing - 1.0f, 0.0f); // cosine between the reflected ray and the eye's
+        if (two_sided)
+            facing = fabs(facing);
+        Real specular;
+        if (sharp) {
+            const Real3 across = cross_of(normal, view); // as long as the sine of half the angle to the reflected ray
+            specular = sharp_highlight(2.0f * dot_of(across, across), power);
+        } else {
+            specular = pow_of(reflected, power);
+        }
+        // The light's own ambient colour has no part in it
 #define LIT(c, n)                                                                                                          \
     clamp(lighting[AMBIENT] * color.c +                                                                                    \
               SELECT((Real)(0.0f),                                                                                         \
@@ -162,7 +129,9 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
                          specular * lighting[SPECULAR] * light[LIGHT_SPECULAR + n],                                        \
                      facing > 0.0f),                                                                                       \
           0.0f, 1.0f)
-#else
+        return OF_AXES(LIT);
+#undef LIT
+    }
     float3 ambient = (float3)(0.0f);
     Real3 diffuse = REAL3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), specular = diffuse;
     const int count = (int)lighting[LIGHT_COUNT];
@@ -172,9 +141,7 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
         Real3 direction = OF_AXES(SHINES);
 #undef SHINES
         Real strength = 1.0f;
-        bool positional = false;
-#ifdef POSITIONAL_LIGHTS
-        positional = light[LIGHT_POSITIONAL] != 0.0f;
+        const bool positional = light[LIGHT_POSITIONAL] != 0.0f;
         if (positional) {
 #define FROM_LIGHT(c, n) (position.c - light[LIGHT_POSITION + n])
             const Real3 from_light = OF_AXES(FROM_LIGHT);
@@ -189,7 +156,6 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
                 strength *= SELECT((Real)(0.0f), pow_of(fmax(inside, 0.0f), light[LIGHT_EXPONENT]), inside >= light[LIGHT_CONE]);
             }
         }
-#endif
         Real facing = dot_of(normal, direction);
         if (two_sided)
             facing = SELECT(facing, -facing, facing < 0.0f);
@@ -204,10 +170,15 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
         Real reflected = dot_of(view, mirrored);
         const Int turned = two_sided && positional ? reflected < 0.0f : (Int)(0);
         reflected = SELECT(reflected, -reflected, turned);
-#ifdef SHARP_HIGHLIGHTS
-        const float3 chord = view - (turned ? -mirrored : mirrored);
-#endif
-        const Real shines = strength * highlight(reflected, 0.5f * dot(chord, chord), power);
+        Real shines;
+        if (sharp) {
+#define CHORD(c, n) (view.c - SELECT(mirrored.c, -mirrored.c, turned))
+            const Real3 chord = OF_AXES(CHORD);
+#undef CHORD
+            shines = strength * sharp_highlight(0.5f * dot_of(chord, chord), power);
+        } else {
+            shines = strength * pow_of(reflected, power);
+        }
 #define SPECULAR_OF(c, n) SELECT(specular.c, specular.c + shines * light[LIGHT_SPECULAR + n], faces & (reflected > 0.0f))
         specular = OF_AXES(SPECULAR_OF);
 #undef SPECULAR_OF
@@ -216,8 +187,6 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
     // The lights' ambient colours are not multiplied by the sample's: so does VTK
 #define LIT(c, n) \
     clamp(lighting[AMBIENT] * ambient.c + lighting[DIFFUSE] * diffuse.c * color.c + lighting[SPECULAR] * specular.c, 0.0f, 1.0f)
-#endif
     return OF_AXES(LIT);
 #undef LIT
 }
-#endif

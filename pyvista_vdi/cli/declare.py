@@ -340,8 +340,7 @@ def limits(parser: argparse.ArgumentParser) -> None:
     option(
         group,
         "--criterion",
-        "where lists are cut: least-error (default), homogeneity, length, "
-        "transmittance or optical-depth",
+        "where lists are cut: least-error (default) or homogeneity",
         "NAME",
         default="least-error",
     )

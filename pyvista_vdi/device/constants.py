@@ -14,6 +14,8 @@ COLUMN_ITEMS = 16 * STRIP
 CELL = 4 * STRIP
 CELL_ITEMS = CELL * CELL
 
+#: Logarithm to base 2 of the points along each edge of a macrocell (``volume/macrocells.cl``).
+MACROCELL_SHIFT = 3
 #: float32 numbers of a recorded run (``generation/runs.cl``).
 RUN_WORDS = 8
 #: Merge errors of a ray that are looked at in one step: records have room for a multiple of them.

@@ -10,8 +10,6 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation.list_arrays import growing_lists, require_room
 from pyvista_vdi.generation.march import March
-from pyvista_vdi.generation.merge import Merge
-from pyvista_vdi.generation.pack import Pack
 from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -19,7 +17,8 @@ from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.volume.classified_volume import DeviceVolume, GridRays
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.rays import GridRays
 
 Progress = Callable[[float], object]
 
@@ -39,7 +38,7 @@ def generate_vdi(
     """Make a VDI of a classified volume.
 
     Each list's ray is marched once. Neighbouring samples are merged while the medium stays
-    homogeneous; what is recorded is then merged at least error, or cut by another criterion,
+    homogeneous; what is recorded is then merged at least error, or cut by homogeneity,
     until the budget of supersegments is kept. Lists go on behind what V_O sees, because other
     views may see it.
 
@@ -90,21 +89,23 @@ def generate_vdi(
     medium = DeviceVolume(runtime, volume, transfer_function, options, room=slices.room(volume))
     with (
         medium.giving_bricks_back(),
-        Records(runtime, medium, camera, size, slices, options) as records,
+        Records(runtime, medium.rays, camera, size, slices, options) as records,
         March(records, medium, camera) as march,
         growing_lists(runtime, size, options.max_supersegments, slices.rows * width) as lists,
     ):
-        merge, pack = Merge(records, options), Pack(records, lists)
         for part in slices:
-            records.clear()
+            records.begin(part)
+            # Sample the rays' steps, merge what is alike, and make room in records that are full
             for chunk in march.chunks(part):
-                march.advance(part, chunk)
-                merge.make_room(part, chunk)
-            merge.to_budget(part)
+                march.advance(chunk)
+                records.make_room(last=chunk.last)
+            # Fit each record to the budget
+            records.fit()
             if part.number > 0:
                 lists.wait()  # for the slice before: the device has this one to go on with
                 report(progress, part.first_row / height)
-            pack.append(part)
+            # Pack the lists behind those made before
+            records.pack(lists)
         offsets, front, back, color, optical_depth = lists.finished()
     report(progress, 1.0)
 
@@ -156,7 +157,7 @@ def made_from(
 
 
 def report(progress: Progress | None, fraction: float) -> None:
-    """Say how far generation is; give it up if the answer is False."""
+    """Report how far generation is, and raise Cancelled if the answer is False."""
     if progress is not None and progress(fraction) is False:
         raise Cancelled(f"generation was cancelled at {fraction:.0%}")
 

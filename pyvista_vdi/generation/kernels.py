@@ -3,72 +3,56 @@
 from __future__ import annotations
 
 from pyvista_vdi.device import KernelDeclaration, Struct
-from pyvista_vdi.volume.kernels import MEDIUM, VIEW
+from pyvista_vdi.volume.kernels import CLASSIFIED, MEDIUM, VIEW
 
-#: The rays of a slice.
-PLACE: dict[str, str | Struct] = {
-    "first_column": "int",
-    "columns": "int",
-    "first_row": "int",
-    "rows": "int",
-}
-#: What a merge error is weighted by.
-WEIGHTS: dict[str, str | Struct] = {"reference_length": "float", "hidden_weight": "float"}
-
-MARCH_LISTS = KernelDeclaration(
-    "generation/march_lists.cl",
-    "march_lists",
-    **MEDIUM,
-    **VIEW,
-    **PLACE,
-    first_step="int",
-    steps="int",
+#: The numbers of records of runs.
+RECORDING = Struct(
+    "Recording",
+    capacity="int",
+    limit="int",
     grain="int",
+    window_row="int",
     finest="float",
-    capacity="int",
-    **WEIGHTS,
-    window_row="int if GRID_PART",
-    entering="float* if GRID_PART",
-    thresholds="float*",
-    all_records="float*",
-    counts="uint*",
+    reference_length="float",
+    hidden_weight="float",
 )
-LONGEST_MARCHES = KernelDeclaration(
-    "generation/march_lists.cl",
-    "longest_marches",
-    **{name: f"{kind} if GRID_PART" for name, kind in MEDIUM.items()},
+_RECORDED: dict[str, str | Struct] = {
+    "recording": RECORDING,
+    "entering": "float*",
+    "thresholds": "float*",
+    "records": "float*",
+    "counts": "uint*",
+}
+MARCH_LISTS = KernelDeclaration(
+    "generation/march_lists.cl", "march_lists", **MEDIUM, **VIEW, samples="float4*", **_RECORDED
+)
+MARCH_LISTS_16 = KernelDeclaration(
+    "cpu16/generation_march.cl", "march_lists", **MEDIUM, **VIEW, **_RECORDED
+)
+_LONGEST: dict[str, str | Struct] = {
+    "classified": CLASSIFIED,
     **VIEW,
-    **PLACE,
-    slice_rows="int",
-    longest="int*",
-)
-SHORTEN_LISTS = KernelDeclaration(
-    "generation/shorten_lists.cl",
-    "shorten_lists",
-    limit="int",
-    exactly="int",
-    width="int",
-    height="int",
-    **PLACE,
-    forms="float*",
-    capacity="int",
-    **WEIGHTS,
-    all_thresholds="float*",
-    all_records="float*",
-    all_errors="float*",
-    counts="uint*",
-)
+    "slice_rows": "int",
+    "longest": "int*",
+}
+LONGEST_MARCHES = KernelDeclaration("generation/march_lists.cl", "longest_marches", **_LONGEST)
+LONGEST_MARCHES_16 = KernelDeclaration("cpu16/generation_march.cl", "longest_marches", **_LONGEST)
+_SHORTENED: dict[str, str | Struct] = {
+    **VIEW,
+    "recording": RECORDING,
+    "exactly": "int",
+    "thresholds": "float*",
+    "records": "float*",
+    "errors": "float*",
+    "counts": "uint*",
+}
+SHORTEN_LISTS = KernelDeclaration("generation/shorten_lists.cl", "shorten_lists", **_SHORTENED)
+SHORTEN_LISTS_16 = KernelDeclaration("cpu16/generation_shorten.cl", "shorten_lists", **_SHORTENED)
 CUT_LISTS = KernelDeclaration(
-    "generation/criteria.cl",
+    "generation/homogeneity.cl",
     "cut_lists",
-    limit="int",
-    width="int",
-    height="int",
-    **PLACE,
-    forms="float*",
-    capacity="int",
-    **WEIGHTS,
-    threshold="float",
+    **VIEW,
+    recording=RECORDING,
     records="float*",
     counts="uint*",
 )
@@ -93,10 +77,9 @@ LIST_OFFSETS = KernelDeclaration(
 PACK_LISTS = KernelDeclaration(
     "generation/pack_lists.cl",
     "pack_lists",
-    records="float*",
+    **VIEW,
     capacity="int",
-    width="int",
-    rows="int",
+    records="float*",
     offsets="ulong*",
     made="uint",
     held="ulong",
@@ -104,8 +87,4 @@ PACK_LISTS = KernelDeclaration(
     backs="float*",
     colors="float*",
     optical_depths="float*",
-    forms="float* if DOUBLE_FLOAT_RAYS",
-    planes="int if DOUBLE_FLOAT_RAYS",
-    height="int if DOUBLE_FLOAT_RAYS",
-    first_row="int if DOUBLE_FLOAT_RAYS",
 )

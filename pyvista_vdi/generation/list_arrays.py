@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import (
     DeviceBuffer,
     GrowingArray,
-    LocalMemory,
     Runtime,
     aligned_empty,
     kept_together,
 )
 from pyvista_vdi.device.constants import LISTS_PER_ITEM
 from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.generation.kernels import LIST_OFFSETS, SUM_LENGTHS
 from pyvista_vdi.model.host_memory import require_host_memory
 
 #: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
@@ -41,7 +41,7 @@ class GrowingLists(ABC):
     has launched the march of the next, and waits for nothing else.
     """
 
-    _places: DeviceBuffer  # offsets on the device
+    _offsets_on_device: DeviceBuffer
 
     def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
         self._runtime = runtime
@@ -51,14 +51,15 @@ class GrowingLists(ABC):
         self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
         self._offsets[0] = 0
         self._made = 0  # lists, those of the last slice included
+        self._first = 0  # place, on the device, of the next slice's first offset
         self._known = 0  # supersegments of all lists whose sum is known here
         self._summing: Callable[[], int] | None = None  # waits for the sum with the last slice
         self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
-        self._kernels = [
-            runtime.kernel("generation/offsets.cl", name)
-            for name in ("sum_lengths", "list_offsets")
-        ]
+        self._targets: list[DeviceBuffer] = []  # of slices' supersegments, in the arrays' order
         self._sums = runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths")
+        shared = {"partial": GROUP, "sums": self._sums}
+        self._sum_lengths = runtime.bind(SUM_LENGTHS, **shared)
+        self._place_lists = runtime.bind(LIST_OFFSETS, **shared)
 
     def __enter__(self) -> GrowingLists:
         return self
@@ -67,27 +68,24 @@ class GrowingLists(ABC):
         try:
             self._runtime.finish()  # the arrays may go when nothing is copied into them any more
         finally:
-            for buffer in self._buffers():
+            for buffer in (*self._targets, self._sums, self._offsets_on_device):
                 buffer.release()
 
-    def follow(self, lengths: DeviceBuffer, n: int) -> tuple[Any, ...]:
-        """Have the device find where the next n lists go, of which there are so many lengths.
+    def follow(self, lengths: DeviceBuffer, n: int) -> dict[str, Any]:
+        """Find where the next n lists go, of which there are so many lengths, on the device.
 
         Returns
         -------
-        tuple
+        dict
             Arguments ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
         """
         self.wait()
-        blocks = blocks_to_sum(n)
-        shared = (np.uint32(n), lengths, LocalMemory(8 * GROUP), self._sums)
-        made = np.uint32(self._first_place())
-        for kernel, places in zip(self._kernels, ((), (made, self._places)), strict=True):
-            self._runtime.launch(kernel, blocks * GROUP, GROUP, *shared, *places)
-        self._summing = self._sum_later(n)
-        self._made += n
-        held, targets = self._room_for(n)
-        return self._places, made, np.uint64(held), *targets
+        items, made, offsets = blocks_to_sum(n) * GROUP, self._first, self._offsets_on_device
+        self._sum_lengths(items, GROUP, lists=n, lengths=lengths)
+        self._place_lists(items, GROUP, lists=n, lengths=lengths, made=made, all_offsets=offsets)
+        held = self._expect(n)
+        arrays = zip(("fronts", "backs", "colors", "optical_depths"), self._targets, strict=True)
+        return {"offsets": offsets, "made": made, "held": held, **dict(arrays)}
 
     def wait(self) -> None:
         """Wait until the lengths of the last slice are summed up."""
@@ -106,24 +104,15 @@ class GrowingLists(ABC):
         return [self._offsets, *arrays]
 
     @abstractmethod
-    def _buffers(self) -> Iterator[DeviceBuffer]:
-        """All buffers, to be released."""
+    def _expect(self, n: int) -> int:
+        """Begin to fetch the sum with n more lists, and make room for them.
 
-    @abstractmethod
-    def _first_place(self) -> int:
-        """Return where in the buffer of offsets that of the next slice is."""
-
-    @abstractmethod
-    def _sum_later(self, n: int) -> Callable[[], int]:
-        """Return what waits for the supersegments of the lists made and of the n behind them."""
+        Returns the supersegments before those that the targets hold.
+        """
 
     @abstractmethod
     def _learned(self, begin: int) -> None:
         """Do what can be done now that it is known which supersegments the last slice has."""
-
-    @abstractmethod
-    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
-        """Return the supersegments before those that the buffers for n lists hold, and these."""
 
     @abstractmethod
     def _collect_all(self) -> None:
@@ -131,7 +120,7 @@ class GrowingLists(ABC):
 
 
 class _ListsInPlace(GrowingLists):
-    """Of a device that uses the arrays in place: all slices are written through the same buffers.
+    """The arrays on a device that uses them in place: all slices are written by the same buffers.
 
     These reach as far as they may; where the lists might pass their end, the host waits for the
     lengths of the slice, and makes others.
@@ -140,45 +129,37 @@ class _ListsInPlace(GrowingLists):
     def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
         super().__init__(runtime, size, limit, slice_lists)
         self._begin = self._end = 0  # supersegments that the buffers hold
-        self._targets: list[tuple[DeviceBuffer, NDArray[Any]]] = []  # and what they are to fill
+        self._parts: list[NDArray[Any]] = []  # and what they are to fill
         with kept_together() as keep:
             keep(self._sums)
-            self._places = keep(runtime.target(self._offsets, "list offsets"))
-            runtime.write(self._places, np.zeros(1, np.uint64), first=0)
+            self._offsets_on_device = keep(runtime.target(self._offsets, "list offsets"))
+            runtime.write(self._offsets_on_device, np.zeros(1, np.uint64), first=0)
             try:
                 self._make_room(0, 1)
             except BaseException:
                 self._release_targets()
                 raise
 
-    def _buffers(self) -> Iterator[DeviceBuffer]:
-        yield from (target for target, _part in self._targets)
-        yield from (self._sums, self._places)
-
-    def _first_place(self) -> int:
-        return self._made
-
-    def _sum_later(self, n: int) -> Callable[[], int]:
+    def _expect(self, n: int) -> int:
         last = np.zeros(1, np.uint64)
-        wait = self._runtime.download_later(self._places, last, first=self._made + n)
+        self._made = self._first = self._made + n
+        wait = self._runtime.download_later(self._offsets_on_device, last, first=self._made)
 
         def summed() -> int:
             wait()
             return int(last[0])
 
-        return summed
+        self._summing = summed
+        if self._known + n * self._limit > self._end:
+            self.wait()
+        return self._begin
 
     def _learned(self, begin: int) -> None:
         if self._known > self._end:
             self._make_room(begin, self._known)
 
-    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
-        if self._known + n * self._limit > self._end:
-            self.wait()
-        return self._begin, [target for target, _part in self._targets]
-
     def _make_room(self, begin: int, end: int) -> None:
-        """Have buffers of the supersegments from ``begin``, those made so far, to ``end``."""
+        """Make buffers of the supersegments from ``begin``, those made so far, to ``end``."""
         self._collect(begin)
         for array in self._arrays.values():
             array.reserve(end, self._most)
@@ -190,27 +171,29 @@ class _ListsInPlace(GrowingLists):
         self._begin, self._end = begin, end
         for name, array in self._arrays.items():
             part: NDArray[Any] = array.part(begin, end)
-            self._targets.append((self._runtime.target(part, name), part))
+            self._targets.append(self._runtime.target(part, name))
+            self._parts.append(part)
 
     def _collect(self, made: int) -> None:
-        """Wait until so many supersegments are in the arrays, and let go of the buffers."""
-        for target, part in self._targets:
+        """Wait until so many supersegments are in the arrays, and release the buffers."""
+        for target, part in zip(self._targets, self._parts, strict=True):
             filled = part[: made - self._begin]
             self._runtime.download(target, filled, count=filled.size)
         self._release_targets()
 
     def _release_targets(self) -> None:
         while self._targets:
-            self._targets[-1][0].release()
+            self._targets[-1].release()
             self._targets.pop()
+        self._parts.clear()
 
     def _collect_all(self) -> None:
         self._collect(self._known)
-        self._runtime.download(self._places, self._offsets)
+        self._runtime.download(self._offsets_on_device, self._offsets)
 
 
 class _CopiedLists(GrowingLists):
-    """Of any other device, which has buffers of a slice at its longest.
+    """The arrays beside any other device, which has buffers of a slice at its longest.
 
     What a slice has is copied from there while the next one is marched, before it is packed.
     """
@@ -219,30 +202,28 @@ class _CopiedLists(GrowingLists):
         super().__init__(runtime, size, limit, slice_lists)
         with kept_together() as keep:
             keep(self._sums)
-            self._places = keep(runtime.buffer((slice_lists + 1,), np.uint64, "list offsets"))
-            runtime.write(self._places, np.zeros(1, np.uint64), first=0)
+            self._offsets_on_device = keep(
+                runtime.buffer((slice_lists + 1,), np.uint64, "list offsets")
+            )
+            runtime.write(self._offsets_on_device, np.zeros(1, np.uint64), first=0)
             self._targets = [
                 keep(runtime.buffer((slice_lists * limit, *item), name=name))
                 for name, item in _LIST_ARRAYS.items()
             ]
         self._copies: list[Callable[[], None]] = []
 
-    def _buffers(self) -> Iterator[DeviceBuffer]:
-        yield from (*self._targets, self._sums, self._places)
-
-    def _first_place(self) -> int:
-        return 0
-
-    def _sum_later(self, n: int) -> Callable[[], int]:
+    def _expect(self, n: int) -> int:
         before, ends = np.split(self._offsets[self._made : self._made + n + 1], [1])
-        wait = self._runtime.download_later(self._places, ends, first=1)
+        wait = self._runtime.download_later(self._offsets_on_device, ends, first=1)
+        self._made += n
 
         def summed() -> int:
             wait()
             np.add(ends, before, out=ends)
             return int(ends[-1])
 
-        return summed
+        self._summing = summed
+        return 0
 
     def _learned(self, begin: int) -> None:
         if any(self._known > array.room for array in self._arrays.values()):
@@ -253,9 +234,6 @@ class _CopiedLists(GrowingLists):
             part: NDArray[Any] = array.part(begin, self._known)
             copies.append(self._runtime.download_later(target, part))
         self._copies = copies  # a copy that nobody remembers is waited for; those before are done
-
-    def _room_for(self, n: int) -> tuple[int, list[DeviceBuffer]]:
-        return 0, self._targets
 
     def _collect_all(self) -> None:
         self._runtime.finish()

@@ -23,8 +23,8 @@ _SLICE_BYTES = 96 * 2**20
 _SLICES_IN_GPU = 16
 #: Slices that a memory limit has room for: the volume gets more than they do.
 _SLICES_IN_LIMIT = 4
-#: Runs that a ray's record keeps for the criteria other than least error: more than a ray through
-#: most data has, so that these cut what was sampled and not what least error has left of it.
+#: Runs that a ray's record keeps for homogeneity: more than a ray through most data has, so that it
+#: cuts what was sampled and not what least error has left of it.
 _UNMERGED_RUNS = 512
 
 
@@ -74,11 +74,9 @@ class Slices:
         limit = options.max_supersegments
         # Twice the budget: the records' thresholds then stay well below the final merges' errors
         self.kept = max(2 * limit, limit + 12)
-        self.capacity = self.kept + more
-        if options.criterion != "least-error":
+        if options.criterion == "homogeneity":
             self.kept = max(self.kept, _UNMERGED_RUNS)
-            self.capacity = self.kept + more + limit  # the kernel cuts into what is free
-        self.capacity = -(-self.capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
+        self.capacity = -(-(self.kept + more) // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
         width, self._height = size
         most = _SLICE_BYTES
         if not runtime.is_cpu:

@@ -36,7 +36,8 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.raycast import draw, render_vdi
-from pyvista_vdi.volume.classified_volume import DeviceVolume, checked_sample_distance
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.rays import checked_sample_distance
 from pyvista_vdi.volume.render import draw_medium, raycast_medium, raycast_volume
 
 #: Who draws, by the keys of the results, and what tables call them.

@@ -20,7 +20,7 @@ MAX_SUPERSEGMENTS = 4096
 
 #: What may decide where a list is cut that must be shortened; ``docs/concepts.md`` says what each
 #: means. The first is the default.
-CRITERIA = ("least-error", "homogeneity", "length", "transmittance", "optical-depth")
+CRITERIA = ("least-error", "homogeneity")
 
 _Options = TypeVar("_Options", bound="MediumOptions")
 
@@ -95,16 +95,12 @@ class GenerationOptions(MediumOptions):
     max_supersegments : int
         Most supersegments in a list, 1 to 4096; never exceeded, and nothing that is not
         transparent is dropped.
-    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+    criterion : {"least-error", "homogeneity"}
         What decides where a list is cut. ``"least-error"``: neighbours are merged at least error.
-        The others are those of the paper's section 2, for comparison. ``"homogeneity"`` (Frey et
-        al. 2013): a supersegment goes on while the medium is like its mean so far, by the least
-        threshold that keeps the budget on this ray. ``"length"`` (Brady et al. 1997): cuts at
-        equal depths from the first to the last of what is not transparent. ``"transmittance"``
-        (Lochmann et al. 2016): cuts where V_O has lost equal shares of the light it loses.
-        ``"optical-depth"``: the same by ratios, so that each lets the same share through. With
-        each of them neighbours within ``tolerance`` are merged; they record up to 512 runs of a
-        ray before unlike ones are merged, which takes more time and, in wide windows, memory.
+        ``"homogeneity"`` (the paper's, after Frey et al. 2013): a supersegment goes on while the
+        medium is like its mean so far, by the least threshold that keeps the budget on this ray.
+        It records up to 512 runs of a ray before unlike ones are merged, which takes more time
+        and, in wide windows, memory. By both, neighbours within ``tolerance`` are merged.
     tolerance : float
         Neighbours are merged even under budget where this changes (opacity-weighted colour,
         opacity) per voxel, in the root of the sum of squares along the ray, by no more than this.
@@ -112,7 +108,7 @@ class GenerationOptions(MediumOptions):
     view_cone : float
         Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
         see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
-        at least error or within ``tolerance``. Other criteria cut without regard to it.
+        at least error or within ``tolerance``. ``"homogeneity"`` cuts without regard to it.
     precision : {"exact", "16-byte", "8-byte"}
         What a supersegment takes; see :meth:`VDI.with_precision`.
     sample_distance, lights, ambient_occlusion, memory_limit

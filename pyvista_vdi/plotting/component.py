@@ -103,9 +103,7 @@ class AddVDI(Component):
         log_scale: bool = False,
         *,
         max_supersegments: int = 20,
-        criterion: Literal[
-            "least-error", "homogeneity", "length", "transmittance", "optical-depth"
-        ] = "least-error",
+        criterion: Literal["least-error", "homogeneity"] = "least-error",
         sample_distance: float | None = None,
         tolerance: float = 0.0,
         view_cone: float = 60.0,
@@ -191,7 +189,7 @@ class AddVDI(Component):
             Map values to colours by their logarithm.
         max_supersegments : int
             Longest list, 1 to 4096.
-        criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
+        criterion : {"least-error", "homogeneity"}
             What decides where a list that must be shortened is cut, see
             :func:`pyvista_vdi.generate`.
         sample_distance : float, optional

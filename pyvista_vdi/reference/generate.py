@@ -19,12 +19,7 @@ from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.reference.criteria import (
-    cut_at_equal_lengths,
-    cut_at_equal_optical_depths,
-    cut_at_equal_transmittance,
-    cut_where_unlike,
-)
+from pyvista_vdi.reference.homogeneity import cut_where_unlike
 from pyvista_vdi.reference.occlusion import NodeOcclusion, mean_transmittance, trilinear
 from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, pixel_ray
 from pyvista_vdi.reference.shading import gradient_factors, lit_colors
@@ -32,7 +27,7 @@ from pyvista_vdi.reference.shading import gradient_factors, lit_colors
 Array = NDArray[np.float64]
 
 #: What decides where lists are cut; the engine's names.
-CRITERIA = ("least-error", "homogeneity", "length", "transmittance", "optical-depth")
+CRITERIA = ("least-error", "homogeneity")
 
 #: How far outside the grid, in points, a position may lie by float64 rounding alone.
 GRID_TOLERANCE = 1e-9
@@ -204,8 +199,8 @@ def build_vdi(
         As for :func:`samples`.
     max_supersegments : int
         N_S: no list gets longer.
-    criterion : {"least-error", "homogeneity", "length", "transmittance", "optical-depth"}
-        What decides where a list is cut; see :mod:`pyvista_vdi.reference.criteria`.
+    criterion : {"least-error", "homogeneity"}
+        What decides where a list is cut; see :mod:`pyvista_vdi.reference.homogeneity`.
     weighting : {"transmittance", "optical_depth"}
         Of the colours; see :func:`pyvista_vdi.model.compositing.merge`.
 
@@ -233,43 +228,20 @@ def build_vdi(
         volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
     )
     for ray in rays:
-        segments = [
+        runs = [
             Segment(float(t0), float(t1), color, float(tau))
             for t0, t1, color, tau in zip(
                 ray.begin, ray.end, ray.color, ray.optical_depth, strict=True
             )
             if tau > 0
         ]
-        per_reference = 0.0  # voxels per unit of view depth
-        if segments:
-            per_depth = float(ray.length[0] / (ray.end[0] - ray.begin[0]))
-            per_reference = per_depth / min(volume.spacing)
-        lists.append(_cut(segments, criterion, max_supersegments, per_reference, weighting))
-    # Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint
-    front, back = [], []
-    for segments in lists:
-        end = np.float32(-np.inf)
-        for segment in segments:
-            begin = max(np.float32(segment.front - depth_origin), end)
-            end = max(
-                np.float32(segment.back - depth_origin), np.nextafter(begin, np.float32(np.inf))
-            )
-            front.append(begin)
-            back.append(end)
-    flat = [segment for segments in lists for segment in segments]
-    return VDI(
-        camera,
-        window_size,
-        np.concatenate(([0], np.cumsum([len(segments) for segments in lists]))).astype(np.uint64),
-        np.array(front, dtype=np.float32),
-        np.array(back, dtype=np.float32),
-        # Means of colours in [0, 1] may round beyond it
-        np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
-        np.array([segment.optical_depth for segment in flat]),
-        volume.bounds,
-        depth_origin=depth_origin,
-        metadata={"criterion": f"reference: {criterion}"},
-    )
+        per_reference = (
+            float(ray.length[0] / (ray.end[0] - ray.begin[0])) / min(volume.spacing)
+            if runs
+            else 0.0
+        )
+        lists.append(_cut(runs, criterion, max_supersegments, per_reference, weighting))
+    return vdi_of_lists(lists, camera, window_size, volume.bounds, depth_origin, criterion)
 
 
 def near_depth(bounds: Sequence[float], camera: Camera) -> float:
@@ -455,20 +427,18 @@ def _steps(start: Array, slope: Array, volume: Volume, parallel: bool, stride: f
 
 
 def _cut(
-    segments: list[Segment], criterion: str, budget: int, per_reference: float, weighting: str
+    runs: list[Segment], criterion: str, budget: int, per_reference: float, weighting: str
 ) -> list[Segment]:
-    """Bring a ray's segments to the budget; ``per_reference``: voxels per unit of view depth."""
+    """Bring a ray's runs to the budget; ``per_reference``: voxels per unit of view depth."""
     if criterion == "homogeneity":
-        return cut_where_unlike(segments, budget, per_reference, weighting)
-    if criterion == "length":
-        return cut_at_equal_lengths(segments, budget, weighting)
-    if criterion == "transmittance":
-        return cut_at_equal_transmittance(segments, budget, weighting)
-    if criterion == "optical-depth":
-        return cut_at_equal_optical_depths(segments, budget, weighting)
-    # Merge neighbours at least cost until there are no more than budget
-    merged = list(segments)
-    parts = [[segment] for segment in segments]  # what each was made of
+        return cut_where_unlike(runs, budget, per_reference, weighting)
+    return _within_budget(runs, budget, weighting)
+
+
+def _within_budget(runs: list[Segment], budget: int, weighting: str) -> list[Segment]:
+    """Merge neighbours at least cost until there are no more than ``budget``."""
+    merged = list(runs)
+    parts = [[run] for run in runs]  # what each was made of
     costs = [_merge_cost(a + b) for a, b in itertools.pairwise(parts)]
     while len(merged) > budget:
         k = int(np.argmin(costs))
@@ -489,3 +459,38 @@ def _merge_cost(parts: list[Segment]) -> float:
     mean = amount.sum(axis=0) / whole
     gap = max(0.0, whole - float(length.sum()))
     return float(np.abs(amount - length[:, None] * mean).sum() + gap * mean.sum())
+
+
+def vdi_of_lists(
+    lists: list[list[Segment]],
+    camera: Camera,
+    window_size: Sequence[int],
+    bounds: Sequence[float],
+    depth_origin: float,
+    criterion: str,
+) -> VDI:
+    """Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint."""
+    front, back = [], []
+    for segments in lists:
+        end = np.float32(-np.inf)
+        for segment in segments:
+            begin = max(np.float32(segment.front - depth_origin), end)
+            end = max(
+                np.float32(segment.back - depth_origin), np.nextafter(begin, np.float32(np.inf))
+            )
+            front.append(begin)
+            back.append(end)
+    flat = [segment for segments in lists for segment in segments]
+    return VDI(
+        camera,
+        window_size,
+        np.concatenate(([0], np.cumsum([len(segments) for segments in lists]))).astype(np.uint64),
+        np.array(front, dtype=np.float32),
+        np.array(back, dtype=np.float32),
+        # Means of colours in [0, 1] may round beyond it
+        np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
+        np.array([segment.optical_depth for segment in flat]),
+        bounds,
+        depth_origin=depth_origin,
+        metadata={"criterion": f"reference: {criterion}"},
+    )

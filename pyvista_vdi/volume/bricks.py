@@ -11,8 +11,7 @@ import itertools
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,8 @@ from numpy.typing import DTypeLike, NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
 from pyvista_vdi.device.work_order import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.volume.kernels import BRICKS, SAMPLE_STEPS, WANT_BRICKS
+from pyvista_vdi.volume.variant import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
 _SHIFTS = (6, 5, 4)
@@ -139,14 +140,10 @@ class BrickLayout:
         return 8 * self.n_bricks
 
     @property
-    def defines(self) -> dict[str, str | int | None]:
-        """``-D`` names of the kernels that read bricks."""
-        return {
-            "BRICK_SHIFT": self.shift,
-            "BRICK_POINTS": self.points,
-            "BRICK_MARGIN": self.before,
-            "INDEX_T": "uint",  # of a brick's points
-        }
+    def numbers(self) -> NDArray[np.void]:
+        """Return it as kernels take it."""
+        counts = (*self.counts, 0)
+        return BRICKS(counts=counts, shift=self.shift, points=self.points, margin=self.before)
 
     def region(self, brick: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
         """Return where a brick lies in the grid and in its own points, both (z, y, x)."""
@@ -321,89 +318,57 @@ class StepSampler:
         The device.
     bricks : DeviceBricks
         The volume.
-    medium : sequence
-        Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
-    defines : mapping
-        What these are compiled with.
-    march : sequence
-        Arguments ``forms`` to ``unit_distance``.
-    size : (int, int)
-        Width and height of the window.
+    medium : mapping
+        Arguments ``kernels.MEDIUM`` of the kernels that march.
+    variant : Variant
+        What these are compiled for.
+    forms : DeviceBuffer
+        Of the rays.
     room : int
         Most steps of all rays that are sampled at a time.
     ends : DeviceBuffer, optional
         Where each ray ends in t, top row first.
+
+    Attributes
+    ----------
+    samples : DeviceBuffer
+        Of the steps that were sampled last, for kernels that march.
     """
 
     def __init__(
         self,
         runtime: Runtime,
         bricks: DeviceBricks,
-        medium: Sequence[Any],
-        defines: Mapping[str, str | int | None],
-        march: Sequence[Any],
-        size: tuple[int, int],
+        medium: Mapping[str, Any],
+        variant: Variant,
+        forms: DeviceBuffer,
         room: int,
         ends: DeviceBuffer | None = None,
     ) -> None:
         self._runtime = runtime
         self._bricks = bricks
-        self._medium = tuple(medium)
-        self._march = tuple(march)
-        self._size = size
-        own = {k: v for k, v in defines.items() if k not in ("SAMPLED", "SKIP_EMPTY")}
-        self._kernels = {
-            name: runtime.kernel("volume/bricks.cl", name, {**own, **bricks.layout.defines})
-            for name in ("want_bricks", "sample_steps")
-        }
-        with ExitStack() as stack:
-            no_ends = stack.enter_context(runtime.buffer((1,), name="no ends"))
-            self._ends = (no_ends, np.int32(0)) if ends is None else (ends, np.int32(1))
-            self._samples = stack.enter_context(runtime.buffer((room, 4), name="samples of steps"))
-            self._buffers = stack.pop_all()
+        self.samples = runtime.buffer((room, 4), name="samples of steps")
+        rays: dict[str, Any] = {"forms": forms, "opaque_depth": ends, "visible": bricks.visible}
+        rays |= {"bricks": bricks.layout.numbers, "samples": self.samples}
+        defines = replace(variant, index="uint").defines  # of a brick's points
+        self._want = runtime.bind(WANT_BRICKS, defines, classified=medium["classified"], **rays)
+        self._take = runtime.bind(SAMPLE_STEPS, defines, **medium, slots=bricks.slots, **rays)
 
     def __enter__(self) -> StepSampler:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()
-        self._buffers.close()
+        self.samples.release()
 
-    def sample(
-        self, first_row: int, rows: int, first_step: int, steps: int
-    ) -> tuple[DeviceBuffer, np.int32, np.int32]:
-        """Sample some steps of the rays in some rows.
-
-        Returns
-        -------
-        tuple
-            Arguments ``samples`` to ``first_sample`` of kernels with ``-D SAMPLED``, which follow
-            those of the medium.
-        """
-        width, height = self._size
-        items = block_items(width, rows)
-        place = tuple(np.int32(n) for n in (width, height, first_row, rows, first_step, steps))
-        counts = np.array([*self._bricks.layout.counts, 0], dtype=np.int32)
-
-        def launch(name: str, table: DeviceBuffer) -> None:
-            self._runtime.launch(
-                self._kernels[name],
-                items,
-                GROUP,
-                *self._medium,
-                *self._march,
-                *place,
-                *self._ends,
-                self._bricks.visible,
-                counts,
-                table,
-                self._samples,
-            )
-
-        wanted = self._bricks.wanted(lambda table: launch("want_bricks", table))
+    def sample(self, view: NDArray[np.void]) -> None:
+        """Sample steps of rays, as their numbers (``kernels.RAYS``) say."""
+        items = block_items(int(view["columns"]), int(view["rows"]))
+        wanted = self._bricks.wanted(
+            lambda table: self._want(items, GROUP, view=view, wanted=table)
+        )
         for _ in self._bricks.rounds(wanted):
-            launch("sample_steps", self._bricks.slots)
-        return self._samples, np.int32(steps), np.int32(first_step)
+            self._take(items, GROUP, view=view)
 
 
 def in_parts(

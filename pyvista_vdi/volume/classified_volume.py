@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
-from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.device.ray_forms import Floats, PixelRays, packed, packed_double_float
 from pyvista_vdi.device.work_order import GROUP
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.float32_limits import MOST_STEPS, compensation, entries, held_unit_distance
-from pyvista_vdi.model.grid import Geometry
+from pyvista_vdi.model.float32_limits import compensation, held_unit_distance
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -33,27 +29,31 @@ from pyvista_vdi.volume.bricks import (
     too_small,
 )
 from pyvista_vdi.volume.grid_part import GridPart
-from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_defines
+from pyvista_vdi.volume.kernels import (
+    CLASSIFIED,
+    MACROCELL_DISTANCES,
+    MACROCELL_VISIBILITY,
+    SCALAR_MEDIA,
+)
+from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_variant
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
+from pyvista_vdi.volume.rays import GridRays, MarchForms, checked_sample_distance
 from pyvista_vdi.volume.upload import (
     ENTRY_BYTES,
     TABLE_BYTES,
+    HeldVoxels,
     Scale,
     described,
     device_bytes,
-    fits_whole,
+    held_voxels,
     integer_ends,
     macrocells_over,
     other_bytes,
-    reads_natively,
-    scale_of,
     upload_blanked,
-    upload_ranges,
-    upload_voxels,
     uploads_of,
-    voxel_defines,
     voxel_reader,
 )
+from pyvista_vdi.volume.variant import Variant
 
 #: Macrocells: farther than this no march looks for what is not transparent.
 _FARTHEST = 16
@@ -61,33 +61,6 @@ _FARTHEST = 16
 #: (docs/decisions/generation.md): where none is, a picture takes 1.2 to 1.35 times as long with the
 #: look as without; from .32 on it takes .4 to .85.
 _WORTH_SKIPPING = 0.15
-
-
-@dataclass(frozen=True)
-class MarchForms:
-    """The rays of a view through a volume, as ``begin_march`` of ``volume/march.cl`` takes them.
-
-    Attributes
-    ----------
-    forms : list of numpy.ndarray
-        Three index positions, three model directions, then the planes to clip to.
-    rays : PixelRays
-        The rays that they belong to.
-    planes : int
-        How many of the forms are planes.
-    defines : dict
-        ``-D`` names of the kernels that read them.
-    """
-
-    forms: list[Floats]
-    rays: PixelRays
-    planes: int
-    defines: dict[str, str | int | None]
-
-    def packed(self, *more: Floats) -> NDArray[np.float32]:
-        """Return the forms, and more of the same rays, as the kernels read them."""
-        pack = packed_double_float if self.defines else packed
-        return pack([*self.forms, *more])
 
 
 class DeviceVolume:
@@ -128,6 +101,8 @@ class DeviceVolume:
     bricks : DeviceBricks or None
         What is on the device, where that is not the whole volume: steps must be sampled by a
         :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
+    variant : Variant
+        What kernels that march through it are compiled for, but for what belongs to a view.
     zero, unit : float
         Scalar of a voxel that is 0 on the device, and scalars per unit of the device's voxels.
 
@@ -160,184 +135,116 @@ class DeviceVolume:
             raise InvalidArgumentError(
                 f"expected a TransferFunction, got {type(transfer_function).__name__}"
             )
-        self.volume = volume
-        self.grid: Geometry = volume if part is None else part.grid
+        self.runtime, self.volume = runtime, volume
+        self._looks, self._lights = transfer_function, options.lights
+        self.grid = volume if part is None else part.grid
         self.sample_distance = checked_sample_distance(self.grid, options.sample_distance)
         self.unit_distance = held_unit_distance(
             transfer_function.unit_distance or self.grid.default_unit_distance, self.sample_distance
         )
-        low, high = transfer_function.scalar_range
         longer = len(transfer_function.opacities) * ENTRY_BYTES - TABLE_BYTES // 10
         if room is not None and longer > 0:
             room = replace(room, working=room.working + longer)
-        native = reads_natively(runtime, volume, transfer_function, room)
-        scale = None if native else scale_of(volume, low, high)
-        self.defines = voxel_defines(volume, native)
-        whole = room is None or fits_whole(runtime, volume, scale, room)
-        if room is None or whole:
-            self._voxels, ranges = upload_voxels(runtime, volume, scale, self.defines)
-        else:
-            ranges = upload_ranges(runtime, volume, scale, self.defines, room)
+
+        # The voxels, the transfer function over them, and what it makes transparent
+        voxels = held_voxels(runtime, volume, transfer_function, room)
+        scale = voxels.scale
         self.zero, self.unit = (0.0, 1.0) if scale is None else (scale.low, scale.unit)
-        self._low, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
-        table = np.column_stack([transfer_function.colors, transfer_function.opacities])
-        self._entries = len(table)
-        self._per_scalar = _per_scalar(self._entries, span)
-        self._table = runtime.upload(np.ascontiguousarray(table), "transfer function")
-        self._visible = self._distances = self._visibility(runtime, ranges, transfer_function)
-        if skip_empty:
-            seen = runtime.download(self._visible)
-            if 1.0 - float(np.mean(seen)) >= _WORTH_SKIPPING:
-                self.defines["SKIP_EMPTY"] = 1
-                self._distances = self._distances_of(runtime, seen)
-        if transfer_function.interpolation == "nearest":
-            self.defines["NEAREST"] = 1
-            if by_scalar and native and (ends := integer_ends(runtime, volume, ranges)):
-                self._look_up_by_scalar(runtime, *ends)
-        self.runtime = runtime
-        self._shading = transfer_function.shading
-        self._lights = options.lights
+        table = _table(runtime, transfer_function, native=scale is None)
+        self._visible = _visibility(runtime, volume, voxels, table, transfer_function)
+        distances = _distances(runtime, volume, self._visible) if skip_empty else None
+        nearest = transfer_function.interpolation == "nearest"
+        ends = None
+        if nearest and by_scalar and scale is None:
+            ends = integer_ends(runtime, volume, voxels.ranges)
+        if ends is not None:
+            table = _media_of_scalars(runtime, table, *ends)
+
+        # What samples are shaded by
+        scalars = volume.finite_range if part is None else lambda: part.scalar_range
+        gradient = _gradient(runtime, volume, transfer_function, scalars, self.unit)
+        shading = shading_variant(transfer_function, self._lights)
+        media = self.grid.length / self.sample_distance
+        self.variant: Variant = replace(
+            voxels.variant,
+            nearest=nearest,
+            by_scalar=ends is not None,
+            part=part is not None,
+            compensated=compensation(media).get("COMPENSATED", 0),
+            **shading,
+        )
+        asked = options.ambient_occlusion
+        occlusion = None if asked is None else OcclusionGrid.of(self.grid, asked)
+        strength = 0.0 if asked is None else asked.strength
+        self._arguments: dict[str, Any] = {
+            "classified": _numbers(volume, table, part, occlusion, strength),
+            "voxels": voxels.buffer,
+            "table": table.buffer,
+            "distances": distances,
+            "blanked": None if volume.blanked is None else upload_blanked(runtime, volume),
+            "gradient": gradient,
+            "lighting": None,
+            "ambient": None,
+        }
         self._lit: tuple[Camera, DeviceBuffer] | None = None
-        self._gradient: tuple[DeviceBuffer, ...] = ()
-        shading = shading_defines(transfer_function, self._lights)
-        if transfer_function.gradient_opacities is not None:
-            scalars = volume.finite_range() if part is None else part.scalar_range
-            per_difference = scale.unit if scale else 1.0
-            gradient = gradient_table(volume.spacing, scalars, transfer_function, per_difference)
-            self._gradient = (runtime.upload(gradient, "gradient opacity"),)
-        self._blanked: tuple[DeviceBuffer, ...] = ()
-        if volume.blanked is not None:
-            self._blanked = (upload_blanked(runtime, volume),)
-            self.defines["BLANKED"] = 1
-        self._part: tuple[Any, ...] = ()
-        if part is not None:
-            self._part = part.arguments
-            self.defines["GRID_PART"] = 1
-        self._occlusion: tuple[Any, ...] = ()
-        unlit = {k: v for k, v in shading.items() if k == "GRADIENT_OPACITY"}
-        self._of_opacities = {**self.defines, **unlit}
-        if options.ambient_occlusion is not None:
-            if not whole:
+        if asked is not None and occlusion is not None:
+            if voxels.buffer is None:
                 raise DeviceMemoryError(
                     f"ambient occlusion needs the volume {volume.name!r} in one piece, "
                     f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
                     "ambient_occlusion out, or use another device"
                 )
-            self._occlusion = self._occluded(options.ambient_occlusion, transfer_function, ambient)
-            shading["OCCLUSION"] = 1
-        self.defines.update(shading)
-        self.defines.update(compensation(self.grid.length / self.sample_distance))
+            self._arguments["ambient"] = (
+                self._occluded(asked, occlusion)
+                if ambient is None
+                else runtime.upload(ambient, "ambient occlusion")
+            )
         # Last: nothing that fails then keeps them for as long as somebody looks at the error
         self.bricks: DeviceBricks | None = None
-        if room is not None and not whole:
-            self.bricks = self._bricks_within(room, scale, transfer_function)
-            self._voxels = self.bricks.pool
-            self.defines["SAMPLED"] = 1
-
-    def _look_up_by_scalar(self, runtime: Runtime, first: int, last: int) -> None:
-        """Replace the table by one of what each scalar from ``first`` to ``last`` looks like."""
-        n = last - first + 1
-        media = runtime.buffer((n, 4), name="media of scalars")
-        with self._table:
-            runtime.launch(
-                runtime.kernel("volume/scalar_media.cl", "scalar_media"),
-                padded(n, GROUP),
-                GROUP,
-                self._table,
-                np.int32(self._entries),
-                np.float32(self._low),
-                np.float32(self._per_scalar),
-                np.int32(first),
-                np.int32(n),
-                media,
+        if voxels.buffer is None:
+            assert room is not None
+            self.bricks = _bricks_within(
+                runtime, volume, room, scale, transfer_function, self._visible
             )
-            runtime.finish()  # the table may be host memory in use
-        self._table, self._entries, self._low, self._per_scalar = media, n, float(first), 1.0
-        self.defines["BY_SCALAR"] = 1
+            self._arguments["voxels"] = self.bricks.pool
 
     def giving_bricks_back(self) -> contextlib.AbstractContextManager[object]:
-        """Give back what bricks take at the end of a ``with`` block, also if it fails."""
+        """Return a context at whose end what bricks take is released."""
         return contextlib.nullcontext() if self.bricks is None else self.bricks
+
+    @property
+    def rays(self) -> GridRays:
+        """What rays are marched through."""
+        return GridRays(self.grid, self.sample_distance, self.unit_distance)
 
     @property
     def most_steps(self) -> int:
         """Steps of the longest ray."""
         return math.ceil(self.grid.length / self.sample_distance) + 1
 
-    def medium_arguments(self, camera: Camera) -> tuple[Any, ...]:
-        """Arguments ``voxels`` to ``forms``, without it, of the kernels that march.
+    def medium_arguments(self, camera: Camera) -> dict[str, Any]:
+        """Return the arguments ``kernels.MEDIUM`` of the kernels that march.
 
         ``camera`` is the view: lights may move with it.
         """
-        return (
-            *self._classified(self._distances),
-            *self._part,
-            *self._lighting(camera),
-            *self._gradient,
-            *self._occlusion,
-            *self._blanked,
-        )
+        if self._looks.shading is None:
+            return self._arguments
+        if self._lit is None or self._lit[0] != camera:
+            table = lighting_table(self.grid, camera, self._looks.shading, self._lights)
+            self._lit = (camera, self.runtime.upload(table, "lights"))
+        return {**self._arguments, "lighting": self._lit[1]}
 
-    def _bricks_within(
-        self, room: Room, scale: Scale | None, transfer_function: TransferFunction
-    ) -> DeviceBricks:
-        """Return room for bricks of the volume, none of which is there yet."""
-        runtime = self.runtime
-        volume = self.volume
-        gradients = (
-            transfer_function.shading is not None
-            or transfer_function.gradient_opacities is not None
-        )
-        dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
-        point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
-        others = other_bytes(volume)
-        left = room.for_bricks(runtime, others)
-        largest = runtime.info.max_allocation
-        found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
-        if found is None:
-            least = least_brick_bytes(volume.dimensions, point_bytes, gradients) + others
-            whole = device_bytes(volume, scale) + others
-            raise too_small(described(volume), room, runtime, whole, least)
-        return DeviceBricks(
-            runtime,
-            volume.array,
-            voxel_reader(scale),
-            dtype,
-            *found,
-            room.limit,
-            self._visible,
-            volume.name,
-        )
+    def forms(
+        self, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()
+    ) -> MarchForms:
+        """Return what the kernels march along in a view."""
+        return self.rays.forms(camera, window_size, clipping_planes)
 
-    def _classified(self, macrocells: DeviceBuffer) -> tuple[Any, ...]:
-        """Arguments ``voxels`` to ``macrocells``; ``macrocells`` says what may be skipped."""
-        return (
-            self._voxels,
-            np.array([*self.volume.dimensions, 0], dtype=np.int32),
-            self._table,
-            np.int32(self._entries),
-            np.float32(self._low),
-            np.float32(self._per_scalar),
-            macrocells,
-            np.array([*macrocells_over(self.volume), 0], dtype=np.int32),
-        )
-
-    def _occluded(
-        self,
-        occlusion: AmbientOcclusion,
-        transfer_function: TransferFunction,
-        ambient: NDArray[np.float32] | None,
-    ) -> tuple[Any, ...]:
-        """Return the grid of the occlusion as kernel arguments, made once and kept."""
-        grid = OcclusionGrid.of(self.grid, occlusion)
-        to_nodes = np.array([*(1 / edge for edge in grid.cell), occlusion.strength], np.float32)
-        nodes = np.array([*grid.nodes, 0], dtype=np.int32)
-        if ambient is not None:
-            return self.runtime.upload(ambient, "ambient occlusion"), nodes, to_nodes
+    def _occluded(self, occlusion: AmbientOcclusion, grid: OcclusionGrid) -> DeviceBuffer:
+        """Return the mean transmittances around the occlusion's nodes, made once and kept."""
         # Colours and shading have no part in it
-        opacity = transfer_function.replace(
-            colors=np.zeros_like(transfer_function.colors), shading=None
-        )
+        looks = self._looks
+        opacity = looks.replace(colors=np.zeros_like(looks.colors), shading=None)
         radius, directions = occlusion.radius_in(self.volume), occlusion.directions
         key = (opacity, radius, directions, self.sample_distance)
         uploads = uploads_of(self.volume)
@@ -346,17 +253,9 @@ class DeviceVolume:
             if kept is None or kept[0] != key:
                 uploads.occlusions.pop(self.runtime, None)  # its memory goes first
                 kept = None
-                found = ambient_transmittances(
-                    self.runtime,
-                    grid,
-                    (*self._classified(self._visible), *self._gradient, *self._blanked),
-                    self._classified(self._visible)[-2:],
-                    self._of_opacities,
-                    self.sample_distance,
-                    self.unit_distance,
-                )
+                found = ambient_transmittances(self.runtime, grid, **self._opacity_arguments())
                 uploads.occlusions[self.runtime] = kept = (key, found)
-        return kept[1], nodes, to_nodes
+        return kept[1]
 
     def part_opacities(
         self,
@@ -368,142 +267,176 @@ class DeviceVolume:
 
         ``first``: the first of ``nodes``, both along x, y and z; float32 (nz, ny, nx).
         """
+        points = self.grid.dimensions
         return opacities_of_part(
-            self.runtime,
-            grid,
-            (*self._classified(self._visible), *self._part, *self._gradient),
-            self._of_opacities,
-            (self.sample_distance, self.unit_distance),
-            self.grid.dimensions,
-            first,
-            nodes,
+            self.runtime, grid, points, first, nodes, **self._opacity_arguments()
         )
 
-    def _lighting(self, camera: Camera) -> tuple[DeviceBuffer, ...]:
-        """Return the lights of a view on the device, if the volume is shaded."""
-        if self._shading is None:
-            return ()
-        if self._lit is None or self._lit[0] != camera:
-            table = lighting_table(self.grid, camera, self._shading, self._lights)
-            self._lit = (camera, self.runtime.upload(table, "lights"))
-        return (self._lit[1],)
-
-    def _visibility(
-        self, runtime: Runtime, ranges: DeviceBuffer, transfer_function: TransferFunction
-    ) -> DeviceBuffer:
-        """Return which macrocells hold anything that is not transparent, uint8 on the device."""
-        n = int(np.prod(macrocells_over(self.volume)))
-        visible = runtime.buffer((n,), np.uint8, "visible macrocells")
-        before = np.zeros(self._entries + 1, np.uint32)
-        np.cumsum(transfer_function.opacities > 0, out=before[1:])
-        kernel = runtime.kernel("volume/macrocells.cl", "macrocell_visibility", self.defines)
-        with runtime.upload(before, "visible entries") as visible_before:
-            runtime.launch(
-                kernel,
-                padded(n, GROUP),
-                GROUP,
-                ranges,
-                np.uint32(n),
-                visible_before,
-                np.int32(self._entries),
-                np.float32(self._low),
-                np.float32(self._per_scalar),
-                visible,
-            )
-            runtime.finish()  # the table above may be host memory in use
-        return visible
-
-    def _distances_of(self, runtime: Runtime, seen: NDArray[np.uint8]) -> DeviceBuffer:
-        """Return how far each macrocell is from one that may be visible, uint8 on the device."""
-        n = np.uint32(seen.size)
-        kernel = runtime.kernel("volume/macrocells.cl", "macrocell_distances", self.defines)
-        far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
-        distances = runtime.upload(far, "empty macrocells")
-        apart = 1
-        for along in macrocells_over(self.volume):
-            with distances as before:
-                distances = runtime.buffer((seen.size,), np.uint8, "distances of macrocells")
-                runtime.launch(
-                    kernel,
-                    padded(seen.size, GROUP),
-                    GROUP,
-                    before,
-                    n,
-                    np.uint32(apart),
-                    np.int32(along),
-                    np.int32(_FARTHEST),
-                    distances,
-                )
-                runtime.finish()  # what was read is released
-            apart *= along
-        return distances
-
-    def forms(
-        self, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()
-    ) -> MarchForms:
-        """Return what the kernels march along in a view."""
-        return march_forms(self.grid, camera, window_size, clipping_planes)
+    def _opacity_arguments(self) -> dict[str, Any]:
+        """Return what the opacities of an occlusion's nodes are made of: lights have no part."""
+        names = ("classified", "voxels", "table", "blanked", "gradient")
+        return {
+            "medium": {**{k: self._arguments[k] for k in names}, "visible": self._visible},
+            "variant": replace(self.variant, shaded=0, compensated=0, sharp=False),
+            "lengths": (self.sample_distance, self.unit_distance),
+        }
 
 
 @dataclass(frozen=True)
-class GridRays:
-    """The rays of a classified volume whose values are elsewhere, as of a :class:`DeviceVolume`."""
+class _Table:
+    """A transfer function on a device, or the media of scalars that it makes."""
 
-    grid: Geometry
-    sample_distance: float
-    unit_distance: float
-    defines: dict[str, str | int | None] = field(default_factory=dict)
-
-    def forms(self, camera: Camera, window_size: Sequence[int]) -> MarchForms:
-        """Return what the kernels march along in a view."""
-        return march_forms(self.grid, camera, window_size)
+    buffer: DeviceBuffer
+    entries: int
+    low: float
+    per_scalar: float  # entries per scalar; a huge number where the range is a single one
 
 
-def march_forms(
-    grid: Geometry, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()
-) -> MarchForms:
-    """Return what the kernels march along in a view of a grid."""
-    pixel_rays = rays.pixel_rays(camera, window_size, grid.bounds)
-    to_index = rays.inverse_affine(grid.index_to_model)
-    index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
-    direction = [pixel_rays.form(axis) for axis in np.eye(3)]
-    planes = []
-    for form, points in zip(index, grid.dimensions, strict=True):
-        far = -form
-        far[0] += points - 1
-        planes += [form, far]
-    planes += rays.eye_plane(camera, pixel_rays)
-    planes += rays.user_planes(camera, pixel_rays, clipping_planes)
-    reach = rays.largest_value(camera, window_size, grid.bounds, index)
-    defines = entries(reach, max(grid.dimensions))
-    return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), defines)
+def _table(runtime: Runtime, transfer_function: TransferFunction, *, native: bool) -> _Table:
+    """Upload a transfer function, over scalars as they are or scaled to its range."""
+    low, high = transfer_function.scalar_range
+    first, span = (low, high - low) if native else (0.0, 1.0 if high > low else 0.0)
+    values = np.column_stack([transfer_function.colors, transfer_function.opacities])
+    entries, largest = len(values), float(np.finfo(np.float32).max)
+    per_scalar = 0.0 if entries == 1 else largest
+    if entries > 1 and span > 0:
+        per_scalar = min((entries - 1) / span, largest)
+    buffer = runtime.upload(np.ascontiguousarray(values), "transfer function")
+    return _Table(buffer, entries, first, per_scalar)
 
 
-def checked_sample_distance(volume: Geometry, sample_distance: float | None) -> float:
-    """Return the length of a step in model units; half the smallest spacing by default."""
-    least = volume.length / MOST_STEPS
-    if sample_distance is None:
-        step = min(volume.spacing) / 2
-        if step < least:
-            raise InvalidArgumentError(
-                f"half the smallest spacing, {step:.3g}, is less than 2^-19 of the volume's "
-                f"diagonal, {least:.3g}: float32 cannot sum up so many steps; give a longer "
-                "sample_distance, or resample the volume"
-            )
-        return step
-    step = as_float(sample_distance)
-    if not (np.isfinite(step) and step >= least):
-        raise InvalidArgumentError(
-            f"sample_distance must be a length of at least {least:.3g} model units "
-            f"(2^-19 of the volume's diagonal); got {sample_distance!r}"
+def _media_of_scalars(runtime: Runtime, table: _Table, first: int, last: int) -> _Table:
+    """Return what each scalar from ``first`` to ``last`` looks like, in place of a table."""
+    n = last - first + 1
+    media = runtime.buffer((n, 4), name="media of scalars")
+    with table.buffer as classified:
+        launch = runtime.bind(SCALAR_MEDIA, table=classified, media=media)
+        numbers = {"entries": table.entries, "low": table.low, "per_scalar": table.per_scalar}
+        launch(padded(n, GROUP), GROUP, **numbers, first=first, count=n)
+        runtime.finish()  # the table may be host memory in use
+    return _Table(media, n, float(first), 1.0)
+
+
+def _gradient(
+    runtime: Runtime,
+    volume: Volume,
+    transfer_function: TransferFunction,
+    scalar_range: Callable[[], tuple[float, float]],
+    per_difference: float,
+) -> DeviceBuffer | None:
+    """Upload gradient opacities, if there are any."""
+    if transfer_function.gradient_opacities is None:
+        return None
+    scalars = scalar_range()
+    values = gradient_table(volume.spacing, scalars, transfer_function, per_difference)
+    return runtime.upload(values, "gradient opacity")
+
+
+def _numbers(
+    volume: Volume,
+    table: _Table,
+    part: GridPart | None,
+    occlusion: OcclusionGrid | None,
+    strength: float,
+) -> NDArray[np.void]:
+    """Return the numbers of a classified volume as kernels take them."""
+    infinite, size = (math.inf,) * 4, (*volume.dimensions, 0)
+    nodes: tuple[float, ...] = (0,) * 4
+    to_nodes: tuple[float, ...] = (0,) * 4
+    if occlusion is not None:
+        nodes = (*occlusion.nodes, 0)
+        to_nodes = (*(1 / edge for edge in occlusion.cell), strength)
+    return CLASSIFIED(
+        size=size,
+        held=size,
+        macrocells=(*macrocells_over(volume), 0),
+        part_first=(0,) * 4 if part is None else (*part.first, 0),
+        part_lower=infinite if part is None else (*part.lower, 0),
+        part_upper=infinite if part is None else (*part.upper, 0),
+        nodes=nodes,
+        to_nodes=to_nodes,
+        entries=table.entries,
+        low=table.low,
+        per_scalar=table.per_scalar,
+    )
+
+
+def _visibility(
+    runtime: Runtime,
+    volume: Volume,
+    voxels: HeldVoxels,
+    table: _Table,
+    transfer_function: TransferFunction,
+) -> DeviceBuffer:
+    """Return which macrocells hold anything that is not transparent, uint8 on the device."""
+    n = math.prod(macrocells_over(volume))
+    visible = runtime.buffer((n,), np.uint8, "visible macrocells")
+    before = np.zeros(table.entries + 1, np.uint32)
+    np.cumsum(transfer_function.opacities > 0, out=before[1:])
+    with runtime.upload(before, "visible entries") as visible_before:
+        launch = runtime.bind(
+            MACROCELL_VISIBILITY,
+            voxels.variant.defines,
+            ranges=voxels.ranges,
+            macrocells=n,
+            visible_before=visible_before,
+            entries=table.entries,
+            low=table.low,
+            per_scalar=table.per_scalar,
+            visible=visible,
         )
-    # No ray is longer than the diagonal; float32 may not hold how much longer the step is
-    return min(step, 2 * volume.length)
+        launch(padded(n, GROUP), GROUP)
+        runtime.finish()  # the table above may be host memory in use
+    return visible
 
 
-def _per_scalar(entries: int, span: float) -> float:
-    """Table positions per unit of scalar; a huge number where the range is a single scalar."""
-    if entries == 1:
-        return 0.0
-    largest = float(np.finfo(np.float32).max)
-    return min((entries - 1) / span, largest) if span > 0 else largest
+def _distances(runtime: Runtime, volume: Volume, visible: DeviceBuffer) -> DeviceBuffer | None:
+    """Return how far each macrocell is from one that may be visible, uint8 on the device.
+
+    ``None`` where too few are transparent for looking for them to pay.
+    """
+    seen = runtime.download(visible)
+    if 1.0 - float(np.mean(seen)) < _WORTH_SKIPPING:
+        return None
+    far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
+    distances = runtime.upload(far, "empty macrocells")
+    launch = runtime.bind(
+        MACROCELL_DISTANCES, Variant().defines, macrocells=seen.size, most=_FARTHEST
+    )
+    apart = 1
+    for along in macrocells_over(volume):
+        with distances as before:
+            distances = runtime.buffer((seen.size,), np.uint8, "distances of macrocells")
+            group = padded(seen.size, GROUP), GROUP
+            launch(*group, before=before, apart=apart, along=along, distances=distances)
+            runtime.finish()  # what was read is released
+        apart *= along
+    return distances
+
+
+def _bricks_within(
+    runtime: Runtime,
+    volume: Volume,
+    room: Room,
+    scale: Scale | None,
+    transfer_function: TransferFunction,
+    visible: DeviceBuffer,
+) -> DeviceBricks:
+    """Return room for bricks of a volume, none of which is there yet."""
+    gradients = (
+        transfer_function.shading is not None or transfer_function.gradient_opacities is not None
+    )
+    dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
+    point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
+    others = other_bytes(volume)
+    left = room.for_bricks(runtime, others)
+    largest = runtime.info.max_allocation
+    found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
+    if found is None:
+        least = least_brick_bytes(volume.dimensions, point_bytes, gradients) + others
+        whole = device_bytes(volume, scale) + others
+        raise too_small(described(volume), room, runtime, whole, least)
+    read = voxel_reader(scale)
+    return DeviceBricks(
+        runtime, volume.array, read, dtype, *found, room.limit, visible, volume.name
+    )

@@ -1,11 +1,8 @@
-"""A part of a grid whose points alone are on a device: ``-D GRID_PART`` of ``volume/march.cl``."""
+"""A part of a grid whose points alone are on a device (``GRID_PART`` of ``volume/medium.cl``)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from pyvista_vdi.model.grid import Grid
 
@@ -34,12 +31,3 @@ class GridPart:
     lower: Ends
     upper: Ends
     scalar_range: tuple[float, float]
-
-    @property
-    def arguments(self) -> tuple[Any, ...]:
-        """Arguments ``part_first`` to ``part_upper`` of the kernels that march."""
-        return (
-            np.array([*self.first, 0], np.int32),
-            np.array([*self.lower, 0], np.float32),
-            np.array([*self.upper, 0], np.float32),
-        )

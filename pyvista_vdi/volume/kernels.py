@@ -4,112 +4,101 @@ from __future__ import annotations
 
 from pyvista_vdi.device import KernelDeclaration, Struct
 
-#: A volume and its transfer function.
-CLASSIFIED: dict[str, str | Struct] = {
-    "voxels": "VOXEL_T*",
-    "size": "int4",
-    "table": "float4*",
-    "entries": "int",
-    "low": "float",
-    "per_scalar": "float",
-}
-#: What of a grid is there, where that is part of one.
-GRID_PART: dict[str, str | Struct] = {
-    "part_first": "int4 if GRID_PART",
-    "part_lower": "float4 if GRID_PART",
-    "part_upper": "float4 if GRID_PART",
-}
-#: What samples are shaded by (``volume/shading.cl``), and which are blank.
-_SHADING: dict[str, str | Struct] = {
-    "lighting": "float* if SHADED",
-    "gradient": "float* if GRADIENT_OPACITY",
-}
-_OCCLUSION: dict[str, str | Struct] = {
-    "ambient": "float* if OCCLUSION",
-    "nodes": "int4 if OCCLUSION",
-    "to_nodes": "float4 if OCCLUSION",
-}
-_BLANKING: dict[str, str | Struct] = {"blanked": "uchar* if BLANKED"}
-#: What is sampled on the way (``volume/march.cl``), unless it has been before.
-_SAMPLED_NOW: dict[str, str | Struct] = {
-    **CLASSIFIED,
-    "distances": "uchar*",
-    "macrocells": "int4",
-    **GRID_PART,
-    **_SHADING,
-    **_OCCLUSION,
-    **_BLANKING,
-}
+#: The numbers of a volume, its classification, its ambient occlusion, and the part that is there.
+CLASSIFIED = Struct(
+    "Classified",
+    size="int4",
+    held="int4",
+    macrocells="int4",
+    part_first="int4",
+    part_lower="float4",
+    part_upper="float4",
+    nodes="int4",
+    to_nodes="float4",
+    entries="int",
+    low="float",
+    per_scalar="float",
+)
+#: A classified volume (``Medium`` of ``volume/medium.cl``).
 MEDIUM: dict[str, str | Struct] = {
-    **_SAMPLED_NOW,
-    "samples": "float4* if SAMPLED",
-    "held_samples": "int if SAMPLED",
-    "first_sample": "int if SAMPLED",
+    "classified": CLASSIFIED,
+    "voxels": "VOXEL_T*",
+    "table": "float4*",
+    "distances": "uchar*",
+    "blanked": "uchar*",
+    "gradient": "float*",
+    "lighting": "float*",
+    "ambient": "float*",
 }
-#: The rays of a view.
-VIEW: dict[str, str | Struct] = {
-    "forms": "float*",
-    "planes": "int",
-    "sample_distance": "float",
-    "unit_distance": "float",
-    "width": "int",
-    "height": "int",
-}
-#: The steps of some rows' rays that are sampled brick by brick.
-_WALK: dict[str, str | Struct] = {
-    **VIEW,
-    "first_row": "int",
-    "rows": "int",
-    "first_step": "int",
-    "steps": "int",
-    "opaque_depth": "float*",
-    "has_opaque_depth": "int",
-    "seen": "uchar*",
-    "bricks": "int4",
-}
+#: The numbers of the rays of a view, or of part of its window, and which of their steps are taken.
+RAYS = Struct(
+    "RaysOfView",
+    width="int",
+    height="int",
+    first_column="int",
+    columns="int",
+    first_row="int",
+    rows="int",
+    first_step="int",
+    steps="int",
+    planes="int",
+    sample_distance="float",
+    unit_distance="float",
+)
+#: These, and their forms.
+VIEW: dict[str, str | Struct] = {"view": RAYS, "forms": "float*"}
+#: How a volume is cut into bricks.
+BRICKS = Struct("Bricks", counts="int4", shift="int", points="int", margin="int")
 
+_DRAWN: dict[str, str | Struct] = {
+    **MEDIUM,
+    **VIEW,
+    "opaque_depth": "float*",
+    "transmittance_cutoff": "float",
+    "opacity_multiplier": "float",
+    "regions": "uint",
+}
 RENDER_VOLUME = KernelDeclaration(
     "volume/render_volume.cl",
     "render_volume",
-    **MEDIUM,
-    **VIEW,
-    opaque_depth="float*",
-    has_opaque_depth="int",
-    transmittance_cutoff="float",
-    regions="uint if CROPPED",
-    opacity_multiplier="float if OPACITY_MULTIPLIER",
-    first_row="int if SAMPLED",
-    rows="int if SAMPLED",
-    first_step="int if SAMPLED",
-    steps="int if SAMPLED",
-    states="float4* if SAMPLED",
+    **_DRAWN,
+    samples="float4*",
+    states="float4*",
     image="float4*",
 )
-PROJECT = KernelDeclaration(
-    "volume/project.cl",
-    "project",
+RENDER_VOLUME_16 = KernelDeclaration(
+    "cpu16/volume_render.cl", "render_volume", **_DRAWN, image="float4*"
+)
+_PROJECTED: dict[str, str | Struct] = {
     **MEDIUM,
     **VIEW,
-    opaque_depth="float*",
-    has_opaque_depth="int",
-    regions="uint if CROPPED",
-    per_range="float",
-    at_zero="float",
-    image="float4*",
-)
+    "opaque_depth": "float*",
+    "regions": "uint",
+    "per_range": "float",
+    "at_zero": "float",
+    "image": "float4*",
+}
+PROJECT = KernelDeclaration("volume/project.cl", "project", **_PROJECTED)
+PROJECT_16 = KernelDeclaration("cpu16/volume_project.cl", "project", **_PROJECTED)
 WANT_BRICKS = KernelDeclaration(
     "volume/bricks.cl",
     "want_bricks",
-    **_SAMPLED_NOW,
-    **_WALK,
+    classified=CLASSIFIED,
+    **VIEW,
+    opaque_depth="float*",
+    visible="uchar*",
+    bricks=BRICKS,
     wanted="uint*",
     samples="float4*",
 )
 SAMPLE_STEPS = KernelDeclaration(
     "volume/bricks.cl",
     "sample_steps",
-    **_SAMPLED_NOW,
-    **_WALK,
+    **MEDIUM,
+    **VIEW,
+    opaque_depth="float*",
+    visible="uchar*",
+    bricks=BRICKS,
     slots="int*",
     samples="float4*",
 )
@@ -156,12 +145,12 @@ SCALAR_MEDIA = KernelDeclaration(
 STEP_OPACITIES = KernelDeclaration(
     "volume/ambient_occlusion.cl",
     "step_opacities",
-    **CLASSIFIED,
+    classified=CLASSIFIED,
+    voxels="VOXEL_T*",
+    table="float4*",
+    blanked="uchar*",
+    gradient="float*",
     visible="uchar*",
-    macrocells="int4",
-    **GRID_PART,
-    **_SHADING,
-    **_BLANKING,
     points="int4",
     first_node="int4",
     nodes="int4",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +23,14 @@ _LEAST_POWER = 1e-30
 _NO_CONE = -2.0
 
 
-def shading_defines(transfer_function: TransferFunction, lights: Lights) -> dict[str, int]:
-    """Return the ``-D`` names that compile what is asked for, and nothing else."""
-    defines = {}
-    if transfer_function.shading is not None:
-        defines["SHADED"] = 1
-        if lights.headlight_only:
-            defines["HEADLIGHT"] = 1
-        elif lights.positional:
-            defines["POSITIONAL_LIGHTS"] = 1
-        if transfer_function.shading.specular_power > LARGEST_POWER:
-            defines["SHARP_HIGHLIGHTS"] = 1
-    if transfer_function.gradient_opacities is not None:
-        defines["GRADIENT_OPACITY"] = 1
-    return defines
+def shading_variant(transfer_function: TransferFunction, lights: Lights) -> dict[str, Any]:
+    """Return the fields of a :class:`Variant` that say how samples are lit."""
+    shading = transfer_function.shading
+    return {
+        "shaded": 0 if shading is None else 2 if lights.headlight_only else 1,
+        "sharp": shading is not None and shading.specular_power > LARGEST_POWER,
+        "gradient_opacity": transfer_function.gradient_opacities is not None,
+    }
 
 
 def lighting_table(
@@ -63,6 +58,7 @@ def lighting_table(
         shading.specular,
         max(shading.specular_power, _LEAST_POWER),
         float(lights.two_sided),
+        float(shading.specular_power > LARGEST_POWER),
         len(lights.lights),
     ]
     return np.array(

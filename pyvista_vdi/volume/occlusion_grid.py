@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, padded
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
+from pyvista_vdi.volume.kernels import AMBIENT_TRANSMITTANCES, STEP_OPACITIES
+from pyvista_vdi.volume.variant import Variant
 
-_KERNELS = "volume/ambient_occlusion.cl"
-Defines = dict[str, str | int | None]
 Triple = tuple[int, int, int]
 
 #: Nodes along x in a work-group.
@@ -26,11 +26,10 @@ _MOST_NODES = 2**31 - 1
 def ambient_transmittances(
     runtime: Runtime,
     grid: OcclusionGrid,
-    medium: Sequence[Any],
-    visible: tuple[Any, Any],
-    defines: Defines,
-    sample_distance: float,
-    unit_distance: float,
+    *,
+    medium: Mapping[str, Any],
+    variant: Variant,
+    lengths: tuple[float, float],
 ) -> DeviceBuffer:
     """Return the mean transmittance around each node, float32 (nz, ny, nx) on the device.
 
@@ -40,14 +39,13 @@ def ambient_transmittances(
         The device.
     grid : OcclusionGrid
         Nodes and marches.
-    medium : sequence
-        Arguments ``voxels`` to ``gradient`` of the kernels that march, without lights.
-    visible : tuple
-        Two of them: macrocells that are not transparent, and how many there are.
-    defines : dict
-        What the kernels are compiled with: of the medium, without lights.
-    sample_distance, unit_distance : float
-        Length of the volume's own steps, and its opacity unit distance; model units.
+    medium : mapping
+        Arguments of the kernels that say what the medium is, and the macrocells that are not
+        transparent.
+    variant : Variant
+        What the kernels are compiled for.
+    lengths : (float, float)
+        Of the volume's own steps, and its opacity unit distance; model units.
 
     Raises
     ------
@@ -57,32 +55,33 @@ def ambient_transmittances(
     opacities, ambient = _grids(runtime, grid)
     with opacities:
         runtime.fill(opacities, np.float32(0))
-        lengths = (sample_distance, unit_distance)
-        all_of_it = (medium[1], (0, 0, 0), grid.nodes, grid.margin, grid.padded)
-        _fill(runtime, grid, medium, defines, lengths, all_of_it, opacities)
-        _march(runtime, grid, opacities, visible, defines, ambient)
+        points = medium["classified"]["size"][:3]
+        where = (points, (0, 0, 0), grid.nodes, grid.margin, grid.padded)
+        _fill(runtime, grid, medium, variant, lengths, where, opacities)
+        macrocells = medium["classified"]["macrocells"]
+        _march(runtime, grid, opacities, medium["visible"], macrocells, variant, ambient)
     return ambient
 
 
 def opacities_of_part(
     runtime: Runtime,
     grid: OcclusionGrid,
-    medium: Sequence[Any],
-    defines: Defines,
-    lengths: tuple[float, float],
     points: Triple,
     first: Triple,
     nodes: Triple,
+    *,
+    medium: Mapping[str, Any],
+    variant: Variant,
+    lengths: tuple[float, float],
 ) -> NDArray[np.float32]:
     """Return what part of a volume has of the opacities of nodes, float32 (nz, ny, nx).
 
-    Parameters are those of :func:`ambient_transmittances`; ``lengths``: of a step, and the opacity
-    unit distance; ``points``: of the whole volume; ``first``: the first of ``nodes``, both along x,
-    y and z.
+    Parameters are those of :func:`ambient_transmittances`; ``points``: of the whole volume;
+    ``first``: the first of ``nodes``, both along x, y and z.
     """
     with runtime.buffer(nodes[::-1], name="opacities for ambient occlusion") as opacities:
-        where = (_int4(points), first, nodes, (0, 0, 0), nodes)
-        _fill(runtime, grid, medium, defines, lengths, where, opacities)
+        where = (points, first, nodes, (0, 0, 0), nodes)
+        _fill(runtime, grid, medium, variant, lengths, where, opacities)
         return runtime.download(opacities)
 
 
@@ -95,47 +94,44 @@ def ambient_of_opacities(
     """
     around, ambient = _grids(runtime, grid)
     margins = [(m, m) for m in grid.margin[::-1]]
-    defines: Defines = {"VOXEL_T": "uchar", "INDEX_T": "uint", "MACROCELL_SHIFT": 0}
     with (
         around,
         ambient,
         runtime.upload(np.pad(opacities, margins), "opacities for ambient occlusion") as known,
         runtime.upload(np.ones(1, np.uint8), "visible macrocells") as visible,
     ):
-        _march(runtime, grid, known, (visible, _int4((1, 1, 1))), defines, ambient)
+        _march(runtime, grid, known, visible, (1, 1, 1, 0), Variant(), ambient)
         return runtime.download(ambient)
 
 
 def _fill(
     runtime: Runtime,
     grid: OcclusionGrid,
-    medium: Sequence[Any],
-    defines: Defines,
+    medium: Mapping[str, Any],
+    variant: Variant,
     lengths: tuple[float, float],
     where: tuple[Any, Triple, Triple, Triple, Triple],
     opacities: DeviceBuffer,
 ) -> None:
-    """Give nodes the mean opacities of their boxes.
+    """Fill in the mean opacities of the nodes' boxes.
 
     ``where``: the grid's points, the first node, nodes, and those around them and in all.
     """
     sample_distance, unit_distance = lengths
     points, first, nodes, margin, in_all = where
-    runtime.launch(
-        runtime.kernel(_KERNELS, "step_opacities", defines),
+    launch = runtime.bind(STEP_OPACITIES, variant.defines, **medium, opacities=opacities)
+    launch(
         (*padded(nodes[0], _GROUP), *nodes[1:]),
         (_GROUP, 1, 1),
-        *medium,
-        points,
-        _int4(first),
-        _int4(nodes),
-        _int4(grid.cell),
-        _int4(grid.samples),
-        _int4(margin),
-        _int4(in_all),
-        np.float32(sample_distance / unit_distance),
-        np.float32(grid.step / sample_distance),
-        opacities,
+        points=(*points, 0),
+        first_node=(*first, 0),
+        nodes=(*nodes, 0),
+        cell=(*grid.cell, 0),
+        samples=(*grid.samples, 0),
+        margin=(*margin, 0),
+        padded=(*in_all, 0),
+        units=sample_distance / unit_distance,
+        steps=grid.step / sample_distance,
     )
 
 
@@ -143,8 +139,9 @@ def _march(
     runtime: Runtime,
     grid: OcclusionGrid,
     opacities: DeviceBuffer,
-    visible: tuple[Any, Any],
-    defines: Defines,
+    visible: DeviceBuffer,
+    macrocells: Any,
+    variant: Variant,
     ambient: DeviceBuffer,
 ) -> None:
     """Fill in the mean transmittances around the nodes."""
@@ -154,18 +151,21 @@ def _march(
         runtime.upload(places, "places of steps") as place_buffer,
         runtime.upload(shares, "weights of steps") as share_buffer,
     ):
-        runtime.launch(
-            runtime.kernel(_KERNELS, "ambient_transmittances", defines),
+        launch = runtime.bind(AMBIENT_TRANSMITTANCES, variant.defines, opacities=opacities)
+        launch(
             (*padded(grid.nodes[0], _GROUP), *grid.nodes[1:]),
             (_GROUP, 1, 1),
-            opacities,
-            *(_int4(v) for v in (grid.nodes, grid.cell, grid.margin, grid.padded)),
-            *visible,
-            place_buffer,
-            share_buffer,
-            np.int32(directions),
-            np.int32(steps),
-            ambient,
+            nodes=(*grid.nodes, 0),
+            cell=(*grid.cell, 0),
+            margin=(*grid.margin, 0),
+            padded=(*grid.padded, 0),
+            visible=visible,
+            macrocells=macrocells,
+            places=place_buffer,
+            shares=share_buffer,
+            directions=directions,
+            steps=steps,
+            ambient=ambient,
         )
         runtime.finish()  # the tables may be host memory in use, and other queues read the result
 
@@ -193,7 +193,3 @@ def _taps(grid: OcclusionGrid) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     nx, ny, _ = grid.padded
     places = floor.astype(np.int64) @ np.array([1, nx, nx * ny])
     return places.astype(np.int32), (offsets - floor).astype(np.float32)
-
-
-def _int4(values: Sequence[int]) -> NDArray[np.int32]:
-    return np.array([*values, 0], dtype=np.int32)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,8 +15,12 @@ from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.march_step import march_step
+from pyvista_vdi.volume.kernels import PROJECT, PROJECT_16
 from pyvista_vdi.volume.render import ClippedRays
+from pyvista_vdi.volume.variant import RayLaunch
+
+#: In the kernel's order (``volume/projection.cl``), from 1 on.
+_BLEND_MODES = ("maximum", "minimum", "average", "additive")
 
 
 def project_volume(
@@ -36,33 +42,31 @@ def project_volume(
     )
     clipped = ClippedRays(medium, request)
     width, height = request.size
-    defines = {**medium.defines, **clipped.defines, blending.upper(): 1}
     low, high = volume.finite_range()
     span = high - low or 1.0
-    with (
-        runtime.upload(clipped.forms, "rays") as forms,
-        runtime.upload(
-            np.zeros(1, np.float32) if clipped.ends is None else clipped.ends, "opaque depth"
-        ) as depth,
-        runtime.result((height, width, 4), name="image") as image,
-    ):
-        march_step(runtime, "volume/project.cl", "project", defines).launch(
+    with ExitStack() as stack:
+        keep = stack.enter_context
+        forms = keep(runtime.upload(clipped.forms, "rays"))
+        ends = None
+        if clipped.ends is not None:
+            ends = keep(runtime.upload(clipped.ends, "opaque depth"))
+        image = keep(runtime.result((height, width, 4), name="image"))
+        launch = RayLaunch(
             runtime,
-            block_items(width, height),
-            *medium.medium_arguments(request.camera),
-            forms,
-            np.int32(clipped.planes),
-            np.float32(medium.sample_distance),
-            np.float32(medium.unit_distance),
-            np.int32(width),
-            np.int32(height),
-            depth,
-            np.int32(clipped.ends is not None),
-            *clipped.cropped.arguments,
-            np.float32(medium.unit / span),
-            np.float32((medium.zero - low) / span),
-            image,
+            PROJECT,
+            PROJECT_16,
+            {**clipped.variant.defines, "BLEND_MODE": _BLEND_MODES.index(blending) + 1},
+            one_by_one=clipped.variant.one_by_one,
+            **medium.medium_arguments(request.camera),
+            view=medium.rays.view(request.size, clipped.planes),
+            forms=forms,
+            opaque_depth=ends,
+            regions=clipped.regions,
+            per_range=medium.unit / span,
+            at_zero=(medium.zero - low) / span,
+            image=image,
         )
+        launch(block_items(width, height))
         return runtime.download(image)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import Any
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,8 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.march_step import march_step
+from pyvista_vdi.volume.kernels import RENDER_VOLUME, RENDER_VOLUME_16
+from pyvista_vdi.volume.variant import RayLaunch
 
 #: Steps of a ray that are sampled at a time where the volume is on the device brick by brick.
 _PART_STEPS = 128
@@ -42,20 +43,23 @@ class ClippedRays:
         How many of them clip.
     ends : numpy.ndarray or None
         Where opaque geometry ends the rays.
-    cropped : device.ray_forms.Cropped
-        The regions that are kept, as kernels take them.
-    defines : dict
-        ``-D`` names of the kernels that read them.
+    regions : int
+        Those that cropping keeps.
+    variant : Variant
+        What kernels that march along them through the volume are compiled for.
     """
 
     def __init__(self, medium: DeviceVolume, request: FrameRequest) -> None:
         options = request.options
         march = medium.forms(request.camera, request.size, options.clipping_planes)
         self.ends = rays.checked_opaque_depth(request.opaque_depth, request.size, march.rays)
-        self.cropped = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
-        self.planes = march.planes + len(self.cropped.planes)
-        self.forms = march.packed(*self.cropped.planes, *self.cropped.forms)
-        self.defines = {**march.defines, **self.cropped.defines}
+        cropped = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
+        self.planes = march.planes + len(cropped.planes)
+        self.forms = march.packed(*cropped.planes, *cropped.forms)
+        self.regions = cropped.regions
+        self.variant = replace(
+            medium.variant, double_float=march.double_float, cropped=bool(cropped.forms)
+        )
 
 
 def raycast_volume(
@@ -126,66 +130,47 @@ def draw_medium(
     runtime, camera, options = medium.runtime, request.camera, request.options
     width, height = size = request.size
     clipped = ClippedRays(medium, request)
-    ends, cropped = clipped.ends, clipped.cropped
-    defines = {**medium.defines, **clipped.defines}
-    multiplier: tuple[np.float32, ...] = ()
-    if options.opacity_multiplier != 1.0:
-        defines["OPACITY_MULTIPLIER"] = 1
-        multiplier = (np.float32(options.opacity_multiplier),)
-    step = march_step(runtime, "volume/render_volume.cl", "render_volume", defines)
-    medium_arguments = medium.medium_arguments(lit_from or camera)
+    bricks = medium.bricks
     with ExitStack() as stack:
         keep = stack.enter_context
-        form_buffer = keep(runtime.upload(clipped.forms, "rays"))
-        no_ends = np.zeros(1, np.float32)
-        depth = keep(runtime.upload(no_ends if ends is None else ends, "opaque depth"))
-        begin = (
-            form_buffer,
-            np.int32(clipped.planes),
-            np.float32(medium.sample_distance),
-            np.float32(medium.unit_distance),
+        forms = keep(runtime.upload(clipped.forms, "rays"))
+        ends = None
+        if clipped.ends is not None:
+            ends = keep(runtime.upload(clipped.ends, "opaque depth"))
+        medium_arguments = medium.medium_arguments(lit_from or camera)
+        draw = partial(
+            RayLaunch,
+            runtime,
+            RENDER_VOLUME,
+            RENDER_VOLUME_16,
+            clipped.variant.defines,
+            one_by_one=clipped.variant.one_by_one or bricks is not None,
+            **medium_arguments,
+            forms=forms,
+            opaque_depth=ends,
+            transmittance_cutoff=options.transmittance_cutoff or -1.0,
+            opacity_multiplier=options.opacity_multiplier,
+            regions=clipped.regions,
+            image=image,
         )
-
-        def launch(items: int, sampled: Sequence[Any], part: Sequence[Any]) -> None:
-            step.launch(
-                runtime,
-                items,
-                *medium_arguments,
-                *sampled,
-                *begin,
-                np.int32(width),
-                np.int32(height),
-                depth,
-                np.int32(ends is not None),
-                np.float32(options.transmittance_cutoff or -1.0),
-                *cropped.arguments,
-                *multiplier,
-                *part,
-                image,
-            )
-
-        if medium.bricks is None:
-            launch(block_items(width, height), (), ())
-        else:
-            # Some steps of some rows at a time; the state of the rays goes on from step to step
-            rows = _rows_of_part(size, medium.bricks.memory_limit)
-            items = block_items(width, rows)
-            states = keep(runtime.buffer((items, 2, 4), name="states of rays"))
-            sampler = keep(
-                StepSampler(
-                    runtime,
-                    medium.bricks,
-                    medium_arguments,
-                    defines,
-                    begin,
-                    size,
-                    items * _PART_STEPS,
-                    None if ends is None else depth,
-                )
-            )
-            for first_row in range(0, height, rows):
-                now = min(rows, height - first_row)
-                for first_step in range(0, medium.most_steps, _PART_STEPS):
-                    sampled = sampler.sample(first_row, now, first_step, _PART_STEPS)
-                    part = (np.int32(n) for n in (first_row, now, first_step, _PART_STEPS))
-                    launch(block_items(width, now), sampled, (*part, states))
+        if bricks is None:
+            view = medium.rays.view(size, clipped.planes)
+            draw(samples=None, states=None)(block_items(width, height), view=view)
+            return
+        # Some steps of some rows at a time; the state of the rays goes on from step to step
+        rows = _rows_of_part(size, bricks.memory_limit)
+        items = block_items(width, rows)
+        states = keep(runtime.buffer((items, 2, 4), name="states of rays"))
+        room = items * _PART_STEPS
+        sampler = keep(
+            StepSampler(runtime, bricks, medium_arguments, clipped.variant, forms, room, ends)
+        )
+        launch = draw(samples=sampler.samples, states=states)
+        for first_row in range(0, height, rows):
+            now = min(rows, height - first_row)
+            for first_step in range(0, medium.most_steps, _PART_STEPS):
+                part = {"first_row": first_row, "rows": now}
+                part |= {"first_step": first_step, "steps": _PART_STEPS}
+                view = medium.rays.view(size, clipped.planes, None, **part)
+                sampler.sample(view)
+                launch(block_items(width, now), view=view)

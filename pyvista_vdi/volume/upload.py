@@ -6,17 +6,21 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
+from pyvista_vdi.device.constants import MACROCELL_SHIFT
 from pyvista_vdi.device.work_order import GROUP
 from pyvista_vdi.model.float32_limits import LARGEST_VOXEL, scalars_suit_float32
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import Room, in_parts
+from pyvista_vdi.volume.kernels import MACROCELL_RANGES
+from pyvista_vdi.volume.variant import Variant
 
 #: Voxel types that the kernels read as they are; the others are scaled to float32 on the host.
 _DEVICE_TYPES = {
@@ -26,8 +30,6 @@ _DEVICE_TYPES = {
     "int16": "short",
     "float32": "float",
 }
-#: Logarithm to base 2 of the points along each edge of a macrocell that can be skipped.
-_MACROCELL_SHIFT = 3
 #: Most bytes of a volume that are looked through at a time for the ranges of its macrocells, and
 #: how many such parts there must be room for.
 _PART_BYTES, _PARTS = 64 * 2**20, 4
@@ -48,16 +50,48 @@ _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionar
 _uploads_lock = threading.Lock()
 
 
-def voxel_defines(volume: Volume, native: bool) -> dict[str, str | int | None]:
-    """Return the ``-D`` names by which kernels find and read a voxel."""
-    defines: dict[str, str | int | None] = {
-        "VOXEL_T": _DEVICE_TYPES[volume.array.dtype.name] if native else "float",
-        "INDEX_T": "ulong" if volume.array.size >= 2**32 else "uint",
-        "MACROCELL_SHIFT": _MACROCELL_SHIFT,
-    }
-    if volume.rgba:
-        defines["RGBA"] = 1
-    return defines
+def voxel_variant(volume: Volume, native: bool) -> Variant:
+    """Return how kernels find and read a voxel."""
+    return Variant(
+        voxel=_DEVICE_TYPES[volume.array.dtype.name] if native else "float",
+        index="ulong" if volume.array.size >= 2**32 else "uint",
+        components=4 if volume.rgba else 1,
+    )
+
+
+@dataclass(frozen=True)
+class HeldVoxels:
+    """A volume's voxels on a device.
+
+    Attributes
+    ----------
+    buffer : DeviceBuffer or None
+        All of them, where there is room.
+    ranges : DeviceBuffer
+        Least and largest scalar of each macrocell.
+    scale : Scale or None
+        How they are taken; None: as they are.
+    variant : Variant
+        How kernels find and read one.
+    """
+
+    buffer: DeviceBuffer | None
+    ranges: DeviceBuffer
+    scale: Scale | None
+    variant: Variant
+
+
+def held_voxels(
+    runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
+) -> HeldVoxels:
+    """Upload a volume for a transfer function, or what is known of it where it does not fit."""
+    native = reads_natively(runtime, volume, transfer_function, room)
+    scale = None if native else scale_of(volume, *transfer_function.scalar_range)
+    variant = voxel_variant(volume, native)
+    if room is None or fits_whole(runtime, volume, scale, room):
+        return HeldVoxels(*upload_voxels(runtime, volume, scale, variant), scale, variant)
+    ranges = upload_ranges(runtime, volume, scale, variant, room)
+    return HeldVoxels(None, ranges, scale, variant)
 
 
 def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = None) -> int:
@@ -95,11 +129,11 @@ def _too_large(runtime: Runtime, volume: Volume, room: Room | None = None) -> bo
     """Whether differences of a float32 volume's finite voxels may overflow; found once."""
     uploads = uploads_of(volume)
     if uploads.too_large is None:
-        defines = voxel_defines(volume, True)
+        variant = voxel_variant(volume, True)
         if room is None or fits_whole(runtime, volume, None, room):
-            ends = runtime.download(upload_voxels(runtime, volume, None, defines)[1])
+            ends = runtime.download(upload_voxels(runtime, volume, None, variant)[1])
         else:
-            ends = _ranges_in_parts(runtime, volume, None, defines, room)
+            ends = _ranges_in_parts(runtime, volume, None, variant, room)
         largest = np.abs(ends).max(initial=0.0, where=np.isfinite(ends))
         uploads.too_large = bool(largest > LARGEST_VOXEL)
     return uploads.too_large
@@ -138,7 +172,7 @@ def macrocells_over(volume: Volume) -> tuple[int, int, int]:
 
 def _macrocells_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
     """Macrocells along x, y and z that cover the cells of a grid of so many points."""
-    x, y, z = (-(-(points - 1) // 2**_MACROCELL_SHIFT) for points in dimensions)
+    x, y, z = (-(-(points - 1) // 2**MACROCELL_SHIFT) for points in dimensions)
     return x, y, z
 
 
@@ -187,7 +221,7 @@ def upload_voxels(
     runtime: Runtime,
     volume: Volume,
     scale: Scale | None,
-    defines: dict[str, str | int | None],
+    variant: Variant,
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
     """Return voxels and the scalar range of each macrocell, made once per device and scaling."""
     uploads = uploads_of(volume)
@@ -201,7 +235,7 @@ def upload_voxels(
             array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
             with kept_together() as keep:
                 voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
-                ranges = keep(_macrocell_ranges(runtime, volume.dimensions, voxels, defines))
+                ranges = keep(_macrocell_ranges(runtime, volume.dimensions, voxels, variant))
                 runtime.finish()  # a thread with another queue may use them next
             made[key] = (voxels, ranges)
         return made[key]
@@ -223,7 +257,7 @@ def upload_ranges(
     runtime: Runtime,
     volume: Volume,
     scale: Scale | None,
-    defines: dict[str, str | int | None],
+    variant: Variant,
     room: Room,
 ) -> DeviceBuffer:
     """Return the scalar range of each macrocell of a volume that a device holds in bricks."""
@@ -233,7 +267,7 @@ def upload_ranges(
             del uploads.made[other]  # its memory goes to the bricks
         if scale not in uploads.ranges:
             _require_a_number(runtime, volume)
-            uploads.ranges = {scale: _ranges_in_parts(runtime, volume, scale, defines, room)}
+            uploads.ranges = {scale: _ranges_in_parts(runtime, volume, scale, variant, room)}
         return runtime.upload(uploads.ranges[scale], "ranges of macrocells")
 
 
@@ -241,7 +275,7 @@ def _ranges_in_parts(
     runtime: Runtime,
     volume: Volume,
     scale: Scale | None,
-    defines: dict[str, str | int | None],
+    variant: Variant,
     room: Room,
 ) -> NDArray[np.float32]:
     """Return the scalar range of each macrocell, float32 (n, 2), from parts of the volume."""
@@ -249,13 +283,13 @@ def _ranges_in_parts(
     ranges = aligned_empty((*reversed(macrocells), 2), np.float32)
     point_bytes = device_bytes(volume, scale) // math.prod(volume.dimensions)
     nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
-    for place, points in in_parts(macrocells, 2**_MACROCELL_SHIFT, point_bytes, nbytes):
+    for place, points in in_parts(macrocells, 2**MACROCELL_SHIFT, point_bytes, nbytes):
         runtime.give_way()
         part = np.ascontiguousarray(read(volume.array[points]))
         nz, ny, nx = part.shape[:3]
         with (
             runtime.upload(part, f"part of volume {volume.name!r}") as voxels,
-            _macrocell_ranges(runtime, (nx, ny, nz), voxels, defines) as found,
+            _macrocell_ranges(runtime, (nx, ny, nz), voxels, variant) as found,
         ):
             ranges[place] = runtime.download(found).reshape(ranges[place].shape)
     return ranges.reshape(-1, 2)
@@ -265,21 +299,14 @@ def _macrocell_ranges(
     runtime: Runtime,
     dimensions: Sequence[int],
     voxels: DeviceBuffer,
-    defines: dict[str, str | int | None],
+    variant: Variant,
 ) -> DeviceBuffer:
     """Return the scalar range of each macrocell of a grid of so many points along x, y and z."""
     macrocells = _macrocells_of(dimensions)
     n = int(np.prod(macrocells))
     ranges = runtime.buffer((n, 2), name="ranges of macrocells")
-    runtime.launch(
-        runtime.kernel("volume/macrocells.cl", "macrocell_ranges", defines),
-        padded(n, GROUP),
-        GROUP,
-        voxels,
-        np.array([*dimensions, 0], dtype=np.int32),
-        np.array([*macrocells, 0], dtype=np.int32),
-        ranges,
-    )
+    launch = runtime.bind(MACROCELL_RANGES, variant.defines, voxels=voxels, ranges=ranges)
+    launch(padded(n, GROUP), (GROUP,), size=(*dimensions, 0), macrocells=(*macrocells, 0))
     return ranges
 
 

@@ -16,6 +16,7 @@ from pyvista_vdi.device import (
 )
 from pyvista_vdi.device.programs import define_options
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
+from pyvista_vdi.volume.variant import Variant
 
 AFFINE = Struct("Affine", n="int", weights="float4", factor="float")
 SOURCE = """\
@@ -102,10 +103,9 @@ def test_wrong_arguments_are_refused_by_name(runtime, affine):
 
 #: Rooms whose module ``kernels`` declares what is in their folder of ``opencl/``.
 ROOMS = ("generation", "raycasting", "volume", "extensions.large", "extensions.series")
-#: ``-D`` options that every program may have, and those that kernels must have beside them.
-OPTIONS = {"VOXEL_T": "ushort", "INDEX_T": "uint", "MACROCELL_SHIFT": 2, "OFFSET_T": "int"}
+#: ``-D`` options that every program of a room may have, and those that kernels must have beside.
+OPTIONS = {room: Variant("ushort").defines for room in ("generation", "volume", "extensions.large")}
 OF_KERNELS = {
-    "CUT_LISTS": {"CRITERION": "HOMOGENEITY"},
     "FIRST_HITS": {"FIRST_HIT": 1},
     "SEGMENTS": {"SEGMENTS": 1},
     "SEGMENTS_BLOCKS": {"SEGMENTS": 2, "LANES": 16},
@@ -115,9 +115,8 @@ OF_KERNELS = {
     "RAYCAST_PACKETS": {"LANES": 16},
     "RAYCAST_ALIGNED_VIEW": {"LANES": 16},
     "PREPARE_PACKED": {"PACKED": 8},
-    "WANT_BRICKS": {"BRICK_SHIFT": 3, "BRICK_POINTS": 12, "BRICK_MARGIN": 1},
-    "SAMPLE_STEPS": {"BRICK_SHIFT": 3, "BRICK_POINTS": 12, "BRICK_MARGIN": 1},
-    "PROJECT": {"MAXIMUM": 1},
+    "PROJECT": {"BLEND_MODE": 1},
+    "PROJECT_16": {"BLEND_MODE": 3},
     "OPTICAL_DEPTHS": {"GRID_PART": 1},
     "DECODE_LISTS": {"GRID": 16, "TAU_BASE": 16256, "TAU_CODES": 4096},
 }
@@ -131,7 +130,7 @@ def declared():
             if isinstance(declaration, KernelDeclaration):
                 kinds = [str(kind).split(" if ") for kind in declaration.arguments.values()]
                 options = {each.removeprefix("not ") for kind in kinds for each in kind[1:]}
-                own = {**OPTIONS, **OF_KERNELS.get(name, {})}
+                own = {"OFFSET_T": "int", **OPTIONS.get(room, {}), **OF_KERNELS.get(name, {})}
                 if name.endswith("BLOCKS"):  # of whole supersegments alone
                     options = {each for each in options if "PACKED" not in each}
                 values = [dict([each.split("=")]) for each in sorted(options) if "=" in each]

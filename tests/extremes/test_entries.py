@@ -25,9 +25,11 @@ from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume, ref
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model import float32_limits as numerics
 from pyvista_vdi.model.cropping import PRESETS
+from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.reference.rays import pixel_ray
-from pyvista_vdi.volume.classified_volume import DeviceVolume, march_forms
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.rays import GridRays
 
 pytestmark = pytest.mark.extremes
 
@@ -36,7 +38,7 @@ SHINY = Shading(0.2, 0.6, 0.5, 30.0)
 
 def is_far(runtime, volume, camera, window=WINDOW):
     medium = DeviceVolume(runtime, volume, transfer())
-    return "DOUBLE_FLOAT_RAYS" in medium.forms(camera, window).defines
+    return medium.forms(camera, window).double_float
 
 
 @pytest.mark.parametrize(
@@ -69,7 +71,7 @@ def test_what_is_not_very_thin_is_computed_in_float32_alone(runtime, dimensions)
     for azimuth in range(0, 91, 15):
         for options in ({}, {"distance": 1.3}, {"parallel": True}):
             camera = view(volume, azimuth, 35, **options)
-            assert not march_forms(volume, camera, (640, 480)).defines
+            assert not GridRays(volume, 1.0, 1.0).forms(camera, (640, 480)).double_float
 
 
 def test_needles(runtime, worst):
@@ -89,7 +91,7 @@ def test_needles(runtime, worst):
 
 
 @pytest.mark.every(3)
-@pytest.mark.parametrize("criterion", strategies.criteria())
+@pytest.mark.parametrize("criterion", CRITERIA)
 def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst, criterion):
     """Steps of few units in the last place of their depth, which rounding could make nothing."""
     volume = field_volume((1e-3, 1, 1e3))

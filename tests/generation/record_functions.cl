@@ -1,5 +1,5 @@
-// Entry points to opencl/generation/runs.cl and shorten_lists.cl, one work-item per case or record.
-#include "generation/shorten_lists.cl"
+// Entry points to opencl/generation/runs.cl, shorten_lists.cl and homogeneity.cl, one work-item per case or record.
+#include "generation/homogeneity.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void merged(int count, __global const float8 *a, __global const float8 *b, __global float8 *results)
@@ -21,6 +21,7 @@ __kernel void merge_errors(int count, __global const float8 *a, __global const f
 #define WITHIN 0
 #define ROOM 1
 #define LIMIT 2
+#define ALIKE 3
 
 // Shorten record i by one of these; `runs` are in (record, k) order, before and after.
 __kernel void shortened(int count, int way, int limit, int capacity, float per_reference, float hidden_weight,
@@ -35,15 +36,14 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     for (int k = 0; k < n; ++k)
         store_run(record, k, runs[(size_t)i * capacity + k]);
     __global float *errors = all_errors + errors_start((uint)i, capacity);
-    const Places start = {0};
-    float threshold = thresholds[i];
     if (way == WITHIN)
-        n = merge_within(record, &start, n, threshold, 1, per_reference, hidden_weight);
+        n = merge_within(record, n, thresholds[i], per_reference, hidden_weight);
     else if (way == ROOM)
-        n = make_room(record, &start, errors, n, limit, &threshold, per_reference, hidden_weight);
+        n = make_room(record, errors, n, limit, thresholds + i, per_reference, hidden_weight);
+    else if (way == ALIKE)
+        n = cut_to_limit(record, n, limit, per_reference);
     else
-        n = merge_to_limit(record, &start, errors, n, limit, per_reference, hidden_weight);
-    thresholds[i] = threshold;
+        n = merge_to_limit(record, errors, n, limit, per_reference, hidden_weight);
     lengths[i] = n;
     for (int k = 0; k < n; ++k)
         runs[(size_t)i * capacity + k] = load_run(record, k);

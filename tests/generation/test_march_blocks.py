@@ -63,7 +63,6 @@ def test_nearest_samples_that_are_classified(check, dtype):
         {"max_supersegments": 200},
         {"view_cone": 0.0},
         {"criterion": "homogeneity"},
-        {"criterion": "length"},
         {"memory_limit": "4 MiB"},  # slices of four rows
     ],
     ids=str,

@@ -1,10 +1,10 @@
-"""Records of runs (opencl/generation/runs.cl, shorten_lists.cl and criteria.cl): what merging two
-runs gives and costs, the three ways of shortening a record, and the criteria that cut one.
+"""Records of runs (opencl/generation/runs.cl, shorten_lists.cl and homogeneity.cl): what merging
+two runs gives and costs, and the four ways of shortening a record.
 
 The reference is float64 and written from docs/conventions.md and the head of the kernel file: a run
 is a homogeneous medium of straight colour c and optical depth tau over a length; it looks like
 (c f, f) per reference length l with f = tau / (tau + l); merging costs what the sum of squares
-about the mean, along the ray, grows by. Cuts are those of pyvista_vdi.reference.criteria.
+about the mean, along the ray, grows by. Cuts are those of pyvista_vdi.reference.homogeneity.
 """
 
 from __future__ import annotations
@@ -28,18 +28,11 @@ from recorded_runs import (
 
 from pyvista_vdi.model import compositing
 from pyvista_vdi.model.compositing import Segment
-from pyvista_vdi.reference import criteria
+from pyvista_vdi.reference.homogeneity import cut_where_unlike
 
 FILE = "record_functions.cl"
 #: Ways of shortening a record.
-WITHIN, ROOM, LIMIT = range(3)
-#: The kernels' names of the criteria that cut one, and the reference of each.
-CUTS = {
-    "EQUAL_LENGTH": criteria.cut_at_equal_lengths,
-    "EQUAL_TRANSMITTANCE": criteria.cut_at_equal_transmittance,
-    "EQUAL_OPTICAL_DEPTH": criteria.cut_at_equal_optical_depths,
-    "HOMOGENEITY": criteria.cut_where_unlike,
-}
+WITHIN, ROOM, LIMIT, ALIKE = range(4)
 ERRORS_AT_A_TIME = 8  # see generation/runs.cl
 
 
@@ -74,23 +67,18 @@ def greedy(segments, limit, per_reference, hidden_weight):
 
 
 def shortened(call, way, records, limit, *, per_reference=1.0, hidden_weight=0.5, threshold=1e-6):
-    """Records (float32 (n, 8) each) shortened on the device, and the thresholds they ended with.
-
-    ``way`` is one of three, or the name of a criterion.
-    """
-    cut = way in CUTS
-    n, capacity = len(records), max(len(r) for r in records) + (limit if cut else 0)
+    """Records (float32 (n, 8) each) shortened on the device, and the thresholds they ended with."""
+    n, capacity = len(records), max(len(r) for r in records)
     runs = np.full((n, capacity, 8), np.nan, np.float32)
     for target, record in zip(runs, records, strict=True):
         target[: len(record)] = record
     padded = -(-capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
     lengths = np.array([len(r) for r in records], np.int32)
-    kernel = ("cut_functions.cl", "cut") if cut else (FILE, "shortened")
     runs, lengths, thresholds, *_ = call(
-        *kernel, n, np.int32(0 if cut else way), np.int32(limit), np.int32(capacity),
+        FILE, "shortened", n, np.int32(way), np.int32(limit), np.int32(capacity),
         np.float32(per_reference), np.float32(hidden_weight), call.out(runs), call.out(lengths),
         call.out(np.full(n, threshold, np.float32)), call.empty(n * capacity * 8),
-        call.empty(n * padded), **({"CRITERION": way} if cut else {}),
+        call.empty(n * padded),
     )  # fmt: skip
     return [r[:k] for r, k in zip(runs, lengths, strict=True)], thresholds
 
@@ -118,20 +106,6 @@ def check_shortened(before, after):
         assert abs(run[TAU] - tau) <= n * EPS * tau
         # Each opacity was rounded once and each merge rounds twice, of numbers up to 1
         assert np.abs(run[4:] - composited(members)).max() <= 4 * n * EPS
-
-
-def check_cut(before, after, limit, name):
-    """The promise; nothing is dropped; and the eye of V_O sees what it saw."""
-    assert 1 <= len(after) <= limit, name
-    assert disjoint(after), name
-    assert after[0, FRONT] == before[0, FRONT], name
-    assert after[-1, BACK] == before[-1, BACK], name
-    assert (after[:, [TAU, OPACITY]] > 0).all(), name
-    # Each cut rounds both parts' optical depths, each merge their sum, all relative to the whole
-    n = len(before) + 2 * limit
-    total = before[:, TAU].sum(dtype=float)
-    assert abs(after[:, TAU].sum(dtype=float) - total) <= n * EPS * total, name
-    assert np.abs(composited(before) - composited(after)).max() <= 8 * n * EPS, name
 
 
 def pairs(seed, n=2000):
@@ -272,69 +246,25 @@ def test_merge_to_limit_is_greedy(call, limit, hidden_weight):
     assert clear > len(records) / 2, clear
 
 
-@pytest.mark.every(4)
 @pytest.mark.parametrize("limit", [1, 2, 5, 20])
-@pytest.mark.parametrize("criterion", CUTS)
-def test_cuts_are_the_references(call, criterion, limit):
-    """As many supersegments, at the same depths, with the same optical depth in each."""
+def test_homogeneity_cuts_where_the_reference_does(call, limit):
     records = [as_runs(s) for s in random_records(71, 64, 40)]
-    equal = criterion != "HOMOGENEITY"
-    found, _ = shortened(call, criterion, records, limit, per_reference=0.7)
+    found, _ = shortened(call, ALIKE, records, limit, per_reference=0.7)
     same = 0
-    for k, (before, after) in enumerate(zip(records, found, strict=True)):
-        check_cut(before, after, limit, k)
+    for before, after in zip(records, found, strict=True):
+        assert 1 <= len(after) <= limit
+        check_shortened(before, after)
         exact = [  # the very numbers that the device has
             Segment(r[FRONT], r[BACK], r[COLOR] / r[OPACITY], r[TAU]) for r in before.astype(float)
         ]
-        expected = CUTS[criterion](exact, limit, *([] if equal else [0.7]))
-        if not equal and len(before) <= limit:
-            np.testing.assert_array_equal(after, before)
-        if len(expected) != len(after):
-            continue  # a cut within rounding of a face
-        faces = np.array([(s.front, s.back) for s in expected])
-        if not equal:
-            # Whole runs are merged, so that a face is one of theirs or another choice was made:
-            # the thresholds are a thousandth apart at most; a difference may lie between them
-            same += (after[:, [FRONT, BACK]] == np.float32(faces)).all()
-            continue
-        same += 1
-        # A depth moves by the rounding of the share, relative to the densest run's: measured,
-        # 3e-5 of a depth of up to 100 at most; the same of its optical depth
-        np.testing.assert_allclose(after[:, [FRONT, BACK]], faces, atol=2e-2, rtol=1e-5)
-        tau = [s.optical_depth for s in expected]
-        np.testing.assert_allclose(after[:, TAU], tau, atol=1e-3 * before[:, TAU].sum())
+        expected = cut_where_unlike(exact, limit, 0.7)
+        # Thresholds are a thousandth apart at most; a difference may lie between them
+        faces = np.float32([(s.front, s.back) for s in expected])
+        same += np.array_equal(after[:, [FRONT, BACK]], faces)
     assert same >= 0.9 * len(records), same
 
 
-@pytest.mark.parametrize("criterion", list(CUTS)[:3])
-def test_one_medium_is_cut_into_equal_shares(call, criterion):
-    whole = Segment(2.0, 10.0, np.array([0.2, 0.5, 0.9]), 3.0)
-    ((after,), _) = shortened(call, criterion, [as_runs([whole])], 8)
-    assert len(after) == 8
-    alpha = compositing.opacity(after[:, TAU].astype(float))
-    before = np.exp(-np.concatenate([[0], np.cumsum(after[:-1, TAU].astype(float))]))
-    share = {
-        "EQUAL_LENGTH": after[:, BACK] - after[:, FRONT],
-        "EQUAL_TRANSMITTANCE": before * alpha,
-        "EQUAL_OPTICAL_DEPTH": after[:, TAU],
-    }[criterion]
-    # A share is the difference of two of eight roundings or so
-    np.testing.assert_allclose(share, share.mean(), rtol=64 * EPS * 8)
-    np.testing.assert_array_equal(after[1:, FRONT], after[:-1, BACK])
-    np.testing.assert_allclose(after[:, TRANSMITTANCE], before, rtol=32 * EPS)
-    np.testing.assert_allclose(
-        after[:, COLOR] / after[:, OPACITY, None], np.tile(whole.color, (8, 1)), rtol=8 * EPS
-    )
-
-
-def test_empty_stretches_make_no_supersegment(call):
-    """Two thin media far apart: of ten equal lengths only the two that hold something are left."""
-    parts = [Segment(0.0, 1.0, np.ones(3), 1.0), Segment(19.5, 20.0, np.ones(3), 1.0)]
-    ((after,), _) = shortened(call, "EQUAL_LENGTH", [as_runs(parts)], 10)
-    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 1], [19.5, 20]])
-
-
-@pytest.mark.parametrize("way", [LIMIT, "HOMOGENEITY"])
+@pytest.mark.parametrize("way", [LIMIT, ALIKE])
 def test_what_differs_most_is_kept(call, way):
     """Dense red in thin grey survives down to three runs, and no threshold need be told."""
     parts = [Segment(k, k + 1, np.full(3, 0.5 * (1 + 1e-3 * (k % 3))), 0.01) for k in range(60)]
@@ -345,14 +275,14 @@ def test_what_differs_most_is_kept(call, way):
 
 @pytest.mark.extremes
 @pytest.mark.every(2)
-@pytest.mark.parametrize("way", [WITHIN, ROOM, LIMIT, *CUTS])
-@pytest.mark.parametrize("limit", [1, 7, 39, 64])
+@pytest.mark.parametrize("way", [WITHIN, ROOM, LIMIT, ALIKE])
+@pytest.mark.parametrize("limit", [1, 7, 39])
 def test_any_finite_record_is_shortened(call, way, limit):
     """It ends (pytest's timeout says so), within the limit, in order, with the ends it had.
 
     Errors are finite, or there would be no least one.
     """
-    limit = limit if way in CUTS else min(limit, 39)
+    limit = min(limit, 39)
     for per_reference in (1e-30, 1.0, 1e30):
         how = {"per_reference": per_reference, "hidden_weight": 0.25}
         found, _ = shortened(call, way, list(EXTREMES.values()), limit, **how)
@@ -364,14 +294,12 @@ def test_any_finite_record_is_shortened(call, way, limit):
             assert after[0, FRONT] == before[0, FRONT], name
             assert after[-1, BACK] == before[-1, BACK], name
             assert (after[1:, FRONT] >= after[:-1, BACK]).all(), name
-            if way not in CUTS:  # whole neighbours
-                starts = np.searchsorted(before[:, FRONT], after[:, FRONT])
-                np.testing.assert_array_equal(after[:, FRONT], before[starts, FRONT], name)
-                ends = np.append(starts[1:], len(before)) - 1
-                np.testing.assert_array_equal(after[:, BACK], before[ends, BACK], name)
+            starts = np.searchsorted(before[:, FRONT], after[:, FRONT])  # whole neighbours
+            np.testing.assert_array_equal(after[:, FRONT], before[starts, FRONT], name)
+            ends = np.append(starts[1:], len(before)) - 1
+            np.testing.assert_array_equal(after[:, BACK], before[ends, BACK], name)
             total, tau = before[:, TAU].sum(dtype=float), after[:, TAU].sum(dtype=float)
-            n = len(before) + (2 * limit if way in CUTS else 0)
-            assert tau == pytest.approx(total, rel=n * EPS, abs=1e-37), name
+            assert tau == pytest.approx(total, rel=len(before) * EPS, abs=1e-37), name
             for hidden_weight in (0.0, 0.5):
                 parts = before[:-1].copy(), before[1:].copy(), per_reference, hidden_weight
                 assert np.isfinite(errors(call, *parts)).all(), name

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from recorded_runs import EXTREMES, as_runs, random_records
 
-from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi import Volume
+from pyvista_vdi.device.work_order import GROUP, Rectangle, block_items
+from pyvista_vdi.generation.kernels import RECORDING, SHORTEN_LISTS, SHORTEN_LISTS_16
+from pyvista_vdi.volume.rays import GridRays
 
 LANES = 16
 WINDOW = (13, 23)  # blocks of rays reach beyond it
@@ -21,7 +24,7 @@ def forms():
 
 def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, reference=0.7):
     """Counts, thresholds and records after one launch, by work-item; counts by list."""
-    width, height = WINDOW
+    width, _ = WINDOW
     items = block_items(width, ROWS)
     capacity = -(-max(map(len, records)) // 8) * 8
     rng = np.random.default_rng(4)
@@ -40,7 +43,10 @@ def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, re
         counts[y[at], x[at]] = len(record)
     thresholds = np.full(items, 1e-6, np.float32)
     thresholds[::3] = 1e-2
-    function = runtime.kernel("generation/shorten_lists.cl", "shorten_lists", {"LANES": lanes})
+    declaration = SHORTEN_LISTS if lanes == 1 else SHORTEN_LISTS_16
+    grid = GridRays(Volume(np.zeros((2, 2, 2))), 1.0, 1.0)
+    window = Rectangle(0, width, FIRST_ROW, FIRST_ROW + ROWS)
+    numbers = {"capacity": capacity, "limit": limit, "grain": 1, "window_row": 0, "finest": 1e-6}
     with (
         runtime.upload(forms()) as rays,
         runtime.buffer(thresholds.shape) as of_items,
@@ -51,13 +57,19 @@ def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, re
         runtime.write(of_items, thresholds)
         runtime.write(all_records, runs)
         runtime.write(lengths, counts)
-        runtime.launch(
-            function, items // lanes, GROUP // lanes,
-            *(np.int32(n) for n in (limit, exactly, width, height, 0, width, FIRST_ROW, ROWS)),
-            rays,
-            np.int32(capacity), np.float32(reference), np.float32(hidden_weight), of_items,
-            all_records, errors, lengths,
-        )  # fmt: skip
+        launch = runtime.bind(
+            declaration,
+            {"DOUBLE_FLOAT_RAYS": 0},
+            view=grid.view(WINDOW, 0, window),
+            forms=rays,
+            recording=RECORDING(**numbers, reference_length=reference, hidden_weight=hidden_weight),
+            exactly=exactly,
+            thresholds=of_items,
+            records=all_records,
+            errors=errors,
+            counts=lengths,
+        )
+        launch(items // lanes, GROUP // lanes)
         after = runtime.download(lengths)
         left = runtime.download(all_records)
         kept = [left[at, : after[y[at], x[at]]] for at in inside]

@@ -168,7 +168,7 @@ REFUSED = {
         ({"max_supersegments": 2.5}, "max_supersegments.*got 2.5"),
         ({"tolerance": -1.0}, "tolerance.*got -1"),
         ({"view_cone": 91.0}, "view_cone.*got 91"),
-        ({"criterion": "depth"}, "criterion must be one of least-error, .*got 'depth'"),
+        ({"criterion": "depth"}, "criterion must be .least-error. or .homogeneity.; got .depth."),
     ],
     MediumOptions: [({"memory_limit": HUGE}, "memory_limit must be a number of bytes")],
     Light: [({"position": (HUGE, 0, 0)}, "a light's position must be three finite numbers")],

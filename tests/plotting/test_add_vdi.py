@@ -261,7 +261,7 @@ def test_what_has_changed_is_made_anew_from_the_frame_s_view(plotter, calls):
 
 def test_settings_reach_the_generator(plotter):
     settings = {
-        "criterion": "transmittance",
+        "criterion": "homogeneity",
         "sample_distance": 0.1,
         "tolerance": 0.01,
         "view_cone": 30.0,

@@ -57,15 +57,15 @@ def both_ways(monkeypatch, runtime, name, make):
     if not runtime.is_cpu:
         pytest.skip("only CPU devices march in blocks")
     launches = {GROUP: 0, GROUP // BLOCK_RAYS: 0}
-    launch = Runtime.launch
+    enqueue = Runtime.enqueue
 
-    def counted(self, kernel, size, group, *arguments, **options):
+    def counted(self, kernel, driver_kernel, size, group, buffers):
         if kernel.name == name:
             launches[group] += 1
-        launch(self, kernel, size, group, *arguments, **options)
+        enqueue(self, kernel, driver_kernel, size, group, buffers)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Runtime, "launch", counted)
+        patch.setattr(Runtime, "enqueue", counted)
         found = make()
         patch.setattr(runtime, "is_cpu", False)
         expected = make()

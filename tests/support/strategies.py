@@ -10,11 +10,9 @@ import itertools
 import math
 
 import numpy as np
-import pytest
 from hypothesis import strategies as st
 
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
@@ -300,18 +298,6 @@ def random_transfer_function(rng, volume, *, interpolation=None, max_opacity=0.9
         unit_distance=float(rng.uniform(0.5, 3)) if rng.random() < 0.7 else None,
         interpolation=interpolation or str(rng.choice(["nearest", "linear"])),
     )
-
-
-# -- parameters ------------------------------------------------------------------------------------
-
-
-def criteria():
-    """Parameters for what holds by every criterion, whatever that criterion cuts.
-
-    Three cut at equal shares and differ in what is shared: one of them is quick.
-    """
-    slow = ("transmittance", "optical-depth")
-    return [pytest.param(c, marks=pytest.mark.slow) if c in slow else c for c in CRITERIA]
 
 
 # -- hypothesis ------------------------------------------------------------------------------------

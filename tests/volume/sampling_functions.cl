@@ -1,6 +1,6 @@
 // Entry point to opencl/volume/sampling.cl, one work-item per sample.
 //
-// -D VOXEL_T, INDEX_T, NEAREST: see volume/sampling.cl
+// -D VOXEL_T, INDEX_T, COMPONENTS, NEAREST: see volume/sampling.cl
 #include "volume/sampling.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -11,5 +11,6 @@ __kernel void samples(int count, __global const VOXEL_T *voxels, int4 size, __gl
     if (i >= count)
         return;
     const float3 at = vload3(i, positions);
-    results[i] = sample_volume(voxels, size, at.x, at.y, at.z);
+    const Points points = {size, size};
+    results[i] = sample_volume(voxels, &points, at.x, at.y, at.z);
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from dataclasses import replace
 
 import march_ways
 import numpy as np
@@ -11,7 +11,6 @@ import strategies
 from drawing import raycast_volume, render_vdi
 
 from pyvista_vdi import (
-    AmbientOcclusion,
     Light,
     Lights,
     Shading,
@@ -23,6 +22,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.reference.generate import medium_at
 from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.variant import Variant
 
 WINDOW = (7, 6)
 
@@ -201,26 +201,30 @@ def test_gradient_opacity_multiplies_the_step_s_opacity():
     np.testing.assert_allclose(tau, -np.log(1 - magnitude / 20 * alpha), rtol=1e-6)
 
 
-def compiled(runtime, lights=None, *, occlusion=None, **options):
-    """The names by which kernels are told what they need for these looks."""
+def compiled(runtime, lights=None, **options):
+    """What kernels are compiled for with these looks."""
     volume = smooth_volume(np.random.default_rng(1))
-    medium = DeviceVolume(
-        runtime, volume, looks(volume, **options), lights=lights, ambient_occlusion=occlusion
-    )
-    return set(medium.defines)
+    return DeviceVolume(runtime, volume, looks(volume, **options), lights=lights).variant
 
 
 def test_kernels_compile_only_what_is_used(default_runtime):
     plain = compiled(default_runtime, shaded=False)
-    assert not re.search("GRADIENT|LIGHT|SHADED|OCCLUSION", " ".join(plain))
+    assert (plain.shaded, plain.gradient_opacity) == (0, False)
     for more, options in (
-        ({"SHADED", "HEADLIGHT"}, {}),
-        ({"SHADED"}, {"lights": LIGHTS["directional"]}),
-        ({"SHADED", "POSITIONAL_LIGHTS"}, {"lights": LIGHTS["positional"]}),
-        ({"GRADIENT_OPACITY"}, {"shaded": False, "gradient": True}),
-        ({"OCCLUSION"}, {"shaded": False, "occlusion": AmbientOcclusion()}),
+        ({"shaded": 2}, {}),
+        ({"shaded": 1}, {"lights": LIGHTS["directional"]}),
+        ({"shaded": 1}, {"lights": LIGHTS["positional"]}),
+        ({"gradient_opacity": True}, {"shaded": False, "gradient": True}),
     ):
-        assert compiled(default_runtime, **options) - plain == more
+        assert compiled(default_runtime, **options) == replace(plain, **more)
+
+
+def test_programs_have_twelve_switches_at_most():
+    """What kernels add themselves: BLEND_MODE, and VECTOR_FUNCTIONS, which goes with one ray's."""
+    assert len(Variant().defines) + 1 <= 12
+    assert Variant().one_by_one is False
+    for alone in ({"double_float": True}, {"sharp": True}, {"compensated": 2}, {"index": "ulong"}):
+        assert Variant(**alone).one_by_one
 
 
 def test_lights_change_nothing_without_shading(runtime):

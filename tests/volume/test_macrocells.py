@@ -10,6 +10,7 @@ from strategies import camera_around
 
 from pyvista_vdi import TransferFunction, Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.variant import Variant
 
 MOST = 16
 
@@ -22,7 +23,7 @@ def test_distances_of_blocks_are_chessboard_distances(runtime, share):
     kernel = runtime.kernel(
         "volume/macrocells.cl",
         "macrocell_distances",
-        {"VOXEL_T": "uchar", "INDEX_T": "uint", "MACROCELL_SHIFT": 3},
+        Variant().defines,
     )
     found = np.where(visible, 0, MOST).astype(np.uint8)
     n, apart = found.size, 1
@@ -66,7 +67,7 @@ def test_integers_look_as_the_same_numbers_in_float32(runtime, dtype, low, high,
     )
     camera = camera_around(rng, Volume(array).bounds, np.eye(4))
     medium = DeviceVolume(runtime, Volume(array), looks)
-    assert ("BY_SCALAR" in medium.defines) == looked_up
+    assert medium.variant.by_scalar == looked_up
     integers, floats = (
         raycast_volume(Volume(values), camera, (40, 30), looks, device=runtime)
         for values in (array, array.astype(np.float32))

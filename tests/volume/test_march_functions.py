@@ -15,17 +15,16 @@ FILE = "march_functions.cl"
 def marched(call, runtime, volume, camera, window, transfer, step, group):
     """For every pixel of a small window the steps of its ray, their media and what is passed by."""
     medium = DeviceVolume(runtime, volume, transfer, sample_distance=step)
-    march = medium.forms(camera, window)
+    march, given = medium.forms(camera, window), medium.medium_arguments(camera)
     x, y = (i.ravel() for i in np.meshgrid(np.arange(window[0]), np.arange(window[1])))
     offsets = np.column_stack([x + 0.5 - window[0] / 2, y + 0.5 - window[1] / 2])
     n, capacity = len(offsets), int(volume.length / medium.sample_distance) + 4
     steps, media, empty = call(
-        FILE, "marches", n, *medium.medium_arguments(camera), march.packed(),
-        np.int32(march.planes), offsets.astype(np.float32), np.float32(medium.sample_distance),
-        np.float32(medium.unit_distance), np.int32(group), np.int32(capacity),
+        FILE, "marches", n, *(given[name] for name in ("classified", "voxels", "table")),
+        given["distances"], medium.rays.view(window, march.planes), march.packed(),
+        offsets.astype(np.float32), np.int32(group), np.int32(capacity),
         call.empty(n, dtype=np.int32), call.empty(n, capacity, 4),
-        call.empty(n, capacity, dtype=np.int32), by_value=(1, 7), **medium.defines,
-        **march.defines,
+        call.empty(n, capacity, dtype=np.int32), by_value=(0, 4), **medium.variant.defines,
     )  # fmt: skip
     assert (steps <= capacity - 1).all()
     return steps, media, empty

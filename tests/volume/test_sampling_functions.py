@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
+from pyvista_vdi.volume.variant import Variant
+
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "sampling_functions.cl"
 TYPES = {"uint8": "uchar", "int8": "char", "uint16": "ushort", "int16": "short", "float32": "float"}
@@ -16,9 +18,7 @@ KINDS = [*((dtype, "uint") for dtype in TYPES), ("uint8", "ulong"), ("float32", 
 def sampled(call, array, positions, nearest=False, index="uint"):
     positions = np.asarray(positions, np.float32)
     size = np.array([*array.shape[::-1], 0], np.int32)
-    defines = {"VOXEL_T": TYPES[array.dtype.name], "INDEX_T": index}
-    if nearest:
-        defines["NEAREST"] = 1
+    defines = Variant(TYPES[array.dtype.name], index, nearest=nearest).defines
     n = len(positions)
     return call(
         FILE, "samples", n, np.ascontiguousarray(array), size, positions, call.empty(n),

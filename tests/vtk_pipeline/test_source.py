@@ -39,7 +39,7 @@ pytestmark = pytest.mark.gl
 def test_it_makes_what_generate_makes():
     settings = {
         "max_supersegments": 7,
-        "criterion": "length",
+        "criterion": "homogeneity",
         "sample_distance": 0.05,
         "tolerance": 0.01,
         "view_cone": 20.0,

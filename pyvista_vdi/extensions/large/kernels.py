@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from pyvista_vdi.device import KernelDeclaration
-from pyvista_vdi.generation.kernels import PLACE, WEIGHTS
+from pyvista_vdi.device import KernelDeclaration, Struct
+from pyvista_vdi.generation.kernels import RECORDING
 from pyvista_vdi.volume.kernels import MEDIUM, VIEW
 
-OPTICAL_DEPTHS = KernelDeclaration(
-    "large/optical_depths.cl",
-    "optical_depths",
+_OPTICAL_DEPTHS: dict[str, str | Struct] = {
     **MEDIUM,
     **VIEW,
-    **PLACE,
-    stride="int",
-    depths="float*",
+    "stride": "int",
+    "depths": "float*",
+}
+OPTICAL_DEPTHS = KernelDeclaration("large/optical_depths.cl", "optical_depths", **_OPTICAL_DEPTHS)
+OPTICAL_DEPTHS_16 = KernelDeclaration(
+    "cpu16/generation_optical_depths.cl", "optical_depths", **_OPTICAL_DEPTHS
 )
 COPY_RUNS = KernelDeclaration(
     "large/runs.cl",
     "copy_runs",
-    records="float*",
+    view=VIEW["view"],
     capacity="int",
-    columns="int",
-    rows="int",
+    records="float*",
     counts="uint*",
     begins="uint*",
     runs="float*",
@@ -29,16 +29,11 @@ COPY_RUNS = KernelDeclaration(
 APPEND_RUNS = KernelDeclaration(
     "large/runs.cl",
     "append_runs",
-    width="int",
-    height="int",
-    **PLACE,
-    forms="float*",
-    capacity="int",
-    **WEIGHTS,
-    finest="float",
+    **VIEW,
+    recording=RECORDING,
     window="int4",
     begins="uint*",
     runs="float*",
-    all_records="float*",
+    records="float*",
     counts="uint*",
 )

@@ -9,7 +9,7 @@ other, and merged to the budget.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,13 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.device.buffers import bytes_text
 from pyvista_vdi.device.constants import RUN_WORDS
-from pyvista_vdi.device.work_order import Rectangle, block_items
+from pyvista_vdi.device.work_order import GROUP, Rectangle, block_items
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.extensions.large.blocks import Blocks, Ends, Halo, Indices, Values, ends_of
+from pyvista_vdi.extensions.large.kernels import (
+    APPEND_RUNS,
+    COPY_RUNS,
+    OPTICAL_DEPTHS,
+    OPTICAL_DEPTHS_16,
+)
 from pyvista_vdi.generation.list_arrays import growing_lists
 from pyvista_vdi.generation.march import March
-from pyvista_vdi.generation.merge import Merge
-from pyvista_vdi.generation.pack import Pack
 from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
@@ -34,14 +38,11 @@ from pyvista_vdi.model.float32_limits import held_unit_distance
 from pyvista_vdi.model.options import GenerationOptions, MediumOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.volume.classified_volume import (
-    DeviceVolume,
-    GridRays,
-    checked_sample_distance,
-)
+from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.grid_part import GridPart
-from pyvista_vdi.volume.march_step import march_step
 from pyvista_vdi.volume.occlusion_grid import ambient_of_opacities
+from pyvista_vdi.volume.rays import GridRays, checked_sample_distance
+from pyvista_vdi.volume.variant import RayLaunch
 
 Opacities = tuple[tuple[int, int, int], NDArray[np.float32]]
 
@@ -362,28 +363,27 @@ class _Marched:
     def optical_depths(self) -> NDArray[np.float32]:
         """Return those of the window's rays, (rows, columns)."""
         task, runtime, medium, window = self._task, self._runtime, self._medium, self._window
-        rays = medium.forms(task.camera, task.size)
-        defines = {**medium.defines, **rays.defines}
-        step = march_step(runtime, "large/optical_depths.cl", "optical_depths", defines)
+        march = medium.forms(task.camera, task.size)
+        variant = replace(medium.variant, double_float=march.double_float)
         columns, rows = self._size
-        place = (*task.size, window.x0, columns, window.y0, rows)
         voxel = min(medium.grid.spacing) / medium.sample_distance * (1 + 1e-9)
         with (
-            runtime.upload(rays.packed(), "rays") as forms,
+            runtime.upload(march.packed(), "rays") as forms,
             runtime.buffer((rows, columns), name="optical depths") as depths,
         ):
-            step.launch(
+            launch = RayLaunch(
                 runtime,
-                block_items(columns, rows),
-                *medium.medium_arguments(task.camera),
-                forms,
-                np.int32(rays.planes),
-                np.float32(medium.sample_distance),
-                np.float32(medium.unit_distance),
-                *(np.int32(n) for n in place),
-                np.int32(max(1, min(voxel, CHUNK_STEPS))),
-                depths,
+                OPTICAL_DEPTHS,
+                OPTICAL_DEPTHS_16,
+                variant.defines,
+                one_by_one=variant.one_by_one,
+                **medium.medium_arguments(task.camera),
+                view=medium.rays.view(task.size, march.planes, window),
+                forms=forms,
+                stride=int(max(1, min(voxel, CHUNK_STEPS))),
+                depths=depths,
             )
+            launch(block_items(columns, rows))
             return runtime.download(depths)
 
     def lists(self, light: NDArray[np.float16]) -> Piece:
@@ -394,18 +394,17 @@ class _Marched:
         with (
             runtime.upload(light.astype(np.float32), "light that enters") as entering,
             Records(
-                runtime, medium, task.camera, task.size, slices, task.options, self._window
+                runtime, medium.rays, task.camera, task.size, slices, task.options, self._window
             ) as records,
             March(records, medium, task.camera, entering) as march,
         ):
-            merge = Merge(records, task.options)
             for part in slices:
-                records.clear()
+                records.begin(part)
                 for chunk in march.chunks(part):
-                    march.advance(part, chunk)
-                    merge.make_room(part, chunk)
+                    march.advance(chunk)
+                    records.make_room(last=chunk.last)
                 if task.options.criterion == "least-error":
-                    merge.to_budget(part)
+                    records.fit()
                 of_part, runs_of_part = _downloaded(records, part)
                 counts.append(of_part)
                 runs.append(runs_of_part)
@@ -448,22 +447,18 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
     np.cumsum(counts[:-1], out=begins[1:])
     made = int(counts.sum())
     if made:
-        kernel = runtime.kernel("large/runs.cl", "copy_runs", {**records.of_rays, "LANES": 1})
         with (
             runtime.upload(begins, "places of runs") as places,
             runtime.buffer((made, RUN_WORDS), name="runs") as runs,
         ):
-            runtime.launch(
-                kernel,
-                block_items(columns, part.rows),
-                64,
-                records.runs,
-                np.int32(records.slices.capacity),
-                np.int32(columns),
-                np.int32(part.rows),
-                records.counts,
-                places,
-                runs,
+            launch = runtime.bind(COPY_RUNS, records.defines, records=records.runs, runs=runs)
+            launch(
+                records.items,
+                GROUP,
+                view=records.view,
+                capacity=records.slices.capacity,
+                counts=records.counts,
+                begins=places,
             )
             found = runtime.download(runs)
     else:
@@ -475,54 +470,47 @@ def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece])
     width = task.size[0]
     window, options = Rectangle(0, width, y0, y1), task.options
     slices = _slices_to_merge(task, runtime, y1 - y0)
-    medium = task.rays()
     with (
-        Records(runtime, medium, task.camera, task.size, slices, options, window) as records,
+        Records(runtime, task.rays(), task.camera, task.size, slices, options, window) as records,
         growing_lists(
             runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
         ) as lists,
     ):
-        merge, pack = Merge(records, options), Pack(records, lists)
         for part in slices:
-            records.clear()
+            records.begin(part)
             first = y0 + part.first_row
             for piece in pieces:
                 of_part = piece.rows(first, first + part.rows)
                 if len(of_part.runs):
-                    _append(records, part, of_part)
-                    merge.shorten(part)  # each ray by what it has itself, whatever the rows
-            merge.to_budget(part)
+                    _append(records, of_part)
+                    records.shorten()  # each ray by what it has itself, whatever the rows
+            records.fit()
             if part.number > 0:
                 lists.wait()
-            pack.append(part)
+            records.pack(lists)
         offsets, *arrays = lists.finished()
     return Rows(np.diff(offsets).astype(np.uint32), *arrays)
 
 
-def _append(records: Records, part: Slice, piece: Piece) -> None:
+def _append(records: Records, piece: Piece) -> None:
     runtime, window = records.runtime, piece.window
     columns = window.x1 - window.x0
     begins = np.zeros(piece.counts.size + 1, np.uint32)
     np.cumsum(piece.counts.ravel(), out=begins[1:])
-    defines = {**records.of_rays, "LANES": 1}
     with (
         runtime.upload(begins, "places of runs") as places,
         runtime.upload(np.ascontiguousarray(piece.runs), "runs") as runs,
     ):
-        runtime.launch(
-            runtime.kernel("large/runs.cl", "append_runs", defines),
-            block_items(records.window.x1 - records.window.x0, part.rows),
-            64,
-            *records.place(part),
-            records.forms,
-            np.int32(records.slices.capacity),
-            *records.weights,
-            records.finest,
-            np.array([window.x0, window.y0, columns, window.y1 - window.y0], np.int32),
-            places,
-            runs,
-            records.runs,
-            records.counts,
+        launch = runtime.bind(APPEND_RUNS, records.defines, records=records.runs, runs=runs)
+        launch(
+            records.items,
+            GROUP,
+            view=records.view,
+            forms=records.forms,
+            recording=records.recording,
+            window=(window.x0, window.y0, columns, window.y1 - window.y0),
+            begins=places,
+            counts=records.counts,
         )
         runtime.finish()  # the runs may be host memory in use
 

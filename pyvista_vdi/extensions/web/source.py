@@ -28,7 +28,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.volume.classified_volume import checked_sample_distance
+from pyvista_vdi.volume.rays import checked_sample_distance
 from pyvista_vdi.volume.render import raycast_volume
 
 _T = TypeVar("_T")

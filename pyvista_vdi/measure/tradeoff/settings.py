@@ -23,7 +23,7 @@ _AXES: Mapping[str, tuple[str, tuple[float, float] | None, tuple[Any, ...]]] = {
     "precision": ("{}", None, ("16-byte", "8-byte")),
     "skip_empty": ("{}", None, (False,)),
     "preview": ("preview x{:g}", (0.02, 1.0), (0.7, 0.5, 0.35)),
-    "criterion": ("{}", None, ("homogeneity", "length", "transmittance", "optical-depth")),
+    "criterion": ("{}", None, ("homogeneity",)),
     "view_cone": ("view cone {:g}", (0.0, 90.0), (0.0, 30.0, 90.0)),
     "sample_distance": ("steps {:g}", (1e-3, 100.0), (0.25, 1.0)),
 }
