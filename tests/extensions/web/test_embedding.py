@@ -86,9 +86,10 @@ def test_memory_is_that_of_the_viewers_in_sight(around):
             page.ready()
             page.page.wait_for_timeout(2500)
             assert page.evaluate(f"({COVERED})(viewer)") > 0.2
+            # Five are in sight and five beside them, each with three textures of lists and two of
+            # pictures; a browser may be late to say which have left
+            page.wait_for(f"alive.Texture <= {10 * 5}")
             textures.append(page.evaluate("alive.Texture"))
-    # Five are in sight and five beside them, each with three textures of lists and two of pictures
-    assert max(textures) <= 10 * 5, textures
     assert max(textures[5:]) <= max(textures[:5]), textures
 
 
