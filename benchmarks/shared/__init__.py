@@ -12,21 +12,13 @@ from tqdm import tqdm
 
 from pyvista_vdi import Volume, examples
 from pyvista_vdi.cli.declare import parse_size
-from pyvista_vdi.measure.harness import (
-    ROOMS,
-    Bench,
-    Case,
-    Latest,
-    SampledMean,
-    estimate,
-    run,
-    sample,
-)
+from pyvista_vdi.measure.harness import ROOMS, Bench, Case, Latest, run
 from pyvista_vdi.measure.paper import find_dataset
 from pyvista_vdi.measure.report import closing, write_text
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
+from shared.sampling import SampledMean, estimate, sample
 
 #: Where results go by default.
 RESULTS = Path(__file__).parents[1] / "results"

@@ -209,8 +209,7 @@ class StoredVolume(Volume):
 def is_store(path: str | os.PathLike[str]) -> bool:
     """Whether a path looks like one that :func:`open_volume` opens, by its name or its files."""
     outer, inner = _parts(path)
-    suffixes = (".zarr", *_HDF5)
-    if inner or outer.rstrip("/\\").lower().endswith(suffixes):
+    if inner or outer.rstrip("/\\").lower().endswith((".zarr", *_HDF5)):
         return True
     return os.path.isdir(outer) and any(  # noqa: PTH112 - pathlib's raises for too long names
         (Path(outer) / name).is_file() for name in ZARR_FILES
@@ -471,15 +470,9 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
         if "t" in axes and scale[axes.index("t")] > 0:
             clock = float(scale[axes.index("t")]), float(translation[axes.index("t")])
     names = [channel.get("label") for channel in described.get("omero", {}).get("channels", ())]
-    return Store(
-        path,
-        tuple(levels),
-        axes,
-        units[-1] or "",
-        tuple(str(name) for name in names) if all(names) else (),
-        f"OME-Zarr {version}",
-        clock,
-    )
+    channels = tuple(map(str, names)) if all(names) else ()
+    kind = f"OME-Zarr {version}"
+    return Store(path, tuple(levels), axes, units[-1] or "", channels, kind, clock)
 
 
 def _placed(

@@ -1,14 +1,12 @@
-"""What every measurement shares: cases, a draw of them, who draws them, and the run over them."""
+"""What every measurement shares: cases, who draws them, and the run over them."""
 
 from __future__ import annotations
 
-import hashlib
 import math
 import statistics
 import tempfile
 import time
-from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -119,68 +117,6 @@ class Case:
         """Return its view, where V_O is another."""
         turned = view.azimuth(self.angle or 0.0)
         return turned.replace(view_angle=turned.view_angle / self.zoom)
-
-
-def sample(
-    cases: Iterable[Case], count: int, key: Callable[[Case], Hashable] = lambda case: case.volume
-) -> list[Case]:
-    """Draw cases so that they speak for all: the same ones in every run, in their order.
-
-    Every stratum, a volume's cases unless ``key`` says otherwise, has one case drawn while there
-    are enough, and then as many as its share. Which ones, a hash of their names decides.
-    """
-    cases = list(cases)
-    strata: dict[Hashable, list[Case]] = defaultdict(list)
-    for case in sorted(cases, key=lambda case: hashlib.sha256(case.name.encode()).digest()):
-        strata[key(case)].append(case)
-    order = [
-        (rank > 0, (rank + 0.5) / len(members), case)
-        for members in strata.values()
-        for rank, case in enumerate(members)
-    ]
-    drawn = {case for *_, case in sorted(order, key=lambda entry: entry[:2])[:count]}
-    return [case for case in cases if case in drawn]
-
-
-@dataclass(frozen=True)
-class SampledMean:
-    """A mean over all cases from those that were measured, ``count`` of ``of``.
-
-    Its standard ``error`` is 0 where all were.
-    """
-
-    mean: float
-    error: float
-    count: int
-    of: int
-
-    def __str__(self) -> str:
-        if self.count == self.of:
-            return f"{self.mean:.3g}"
-        return f"{self.mean:.3g} ± {self.error:.1g} ({self.count} of {self.of} cases)"
-
-
-def estimate(
-    values: Mapping[Hashable, Sequence[float]], sizes: Mapping[Hashable, int]
-) -> SampledMean:
-    """Return the mean of all cases by a stratified sample of them, with its standard error.
-
-    ``values`` holds what was measured by stratum, ``sizes`` how many cases a stratum has; one of
-    which nothing was measured is left out. Where a single case was, it is taken that its stratum
-    varies as all that was measured does.
-    """
-    measured = {stratum: list(found) for stratum, found in values.items() if len(found)}
-    every = [value for found in measured.values() for value in found]
-    everywhere = statistics.variance(every) if len(every) > 1 else math.nan
-    total = sum(sizes[stratum] for stratum in measured)
-    mean = variance = 0.0
-    for stratum, found in measured.items():
-        n, size = len(found), sizes[stratum]
-        mean += size / total * statistics.fmean(found)
-        if n < size:
-            within = statistics.variance(found) if n > 1 else everywhere
-            variance += (size / total) ** 2 * (1 - n / size) * within / n
-    return SampledMean(mean, math.sqrt(variance), len(every), sum(sizes.values()))
 
 
 def run(
@@ -388,12 +324,12 @@ class Bench:
         window_size: tuple[int, int] | None = None,
         *,
         before: Mapping[str, Step] | None = None,
-        forms: Sequence[str] = (),
+        precisions: Sequence[str] = (),
         **options: Any,
     ) -> tuple[dict[str, VDI], dict[str, Times]]:
         """Generate a VDI as often as is timed, in turn with other work; kernels are compiled first.
 
-        Returns it as ``exact``, and in packed ``forms`` under their precisions; and the times of
+        Returns it as ``exact``, and packed under its ``precisions``; and the times of
         ``generate``, of packing, and of the other work.
         """
         made: dict[str, VDI] = {}
@@ -406,7 +342,7 @@ class Bench:
             made[precision] = made["exact"].with_precision(precision)
 
         self.generate(WARM_UP_SIZE, **options)
-        packing = {form: partial(pack, form) for form in forms if form != "exact"}
+        packing = {name: partial(pack, name) for name in precisions if name != "exact"}
         work: dict[str, Step] = {**(before or {}), "generate": generate, **packing}
         return made, take_turns(work, repeats, runtime=self.runtime, warm_up=False)
 

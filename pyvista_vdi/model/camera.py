@@ -45,15 +45,8 @@ def check_window_size(window_size: Sequence[int], *, name: str = "window_size") 
 
 #: What a camera is made of and described by.
 _STATE = (
-    "focal_point",
-    "model_transform",
-    "parallel_projection",
-    "parallel_scale",
-    "position",
-    "use_horizontal_view_angle",
-    "view_angle",
-    "view_up",
-    "window_center",
+    *("focal_point", "model_transform", "parallel_projection", "parallel_scale", "position"),
+    *("use_horizontal_view_angle", "view_angle", "view_up", "window_center"),
 )
 
 
@@ -171,7 +164,19 @@ class Camera:
                 f"expected a pyvista_vdi.Camera, a vtkCamera or a pyvista.Camera; "
                 f"got {type(camera).__name__}"
             )
-        _refuse_unsupported(camera)
+        reasons = []
+        if tuple(camera.GetViewShear()) != (0.0, 0.0, 1.0):
+            reasons.append("a view shear (SetViewShear)")
+        if camera.GetUseExplicitProjectionTransformMatrix():
+            reasons.append("an explicit projection matrix (SetExplicitProjectionTransformMatrix)")
+        if camera.GetUseOffAxisProjection():
+            reasons.append("an off-axis projection (SetUseOffAxisProjection)")
+        if camera.GetUserViewTransform() is not None or camera.GetUserTransform() is not None:
+            reasons.append("a user transform (SetUserTransform, SetUserViewTransform)")
+        if reasons:
+            raise UnsupportedError(
+                f"the camera has {' and '.join(reasons)}, which a VDI cannot honour: remove it"
+            )
         if model_transform is None:
             matrix = camera.GetModelTransformMatrix()
             model_transform = [[matrix.GetElement(i, j) for j in range(4)] for i in range(4)]
@@ -212,11 +217,9 @@ class Camera:
 
     def replace(self, **changes: Any) -> Camera:
         """Return a copy with some arguments of the constructor changed."""
-        state = {name: getattr(self, name) for name in _STATE}
-        unknown = sorted(set(changes) - set(state))
-        if unknown:
+        if unknown := sorted(set(changes) - set(_STATE)):
             raise InvalidCameraError(f"a Camera has no {', '.join(unknown)}")
-        return Camera(**{**state, **changes})
+        return Camera(**{name: getattr(self, name) for name in _STATE} | changes)
 
     def azimuth(self, degrees: float) -> Camera:
         """Return the view turned about ``view_up`` through the focal point (as VTK's Azimuth)."""
@@ -289,10 +292,8 @@ class Camera:
     def view_matrix(self) -> Matrix:
         """World to view space (X right, Y up, Z forward, world units), float64 (4, 4)."""
         axes = self.axes
-        matrix = np.eye(4)
-        matrix[:3, :3] = axes
-        matrix[:3, 3] = -axes @ np.asarray(self.position)
-        return matrix
+        shift = -axes @ np.asarray(self.position)
+        return np.vstack([np.column_stack([axes, shift]), [0, 0, 0, 1]])
 
     @property
     def model_to_view(self) -> Matrix:
@@ -388,10 +389,9 @@ class Camera:
         return (Camera.from_dict, (self.to_dict(),))
 
     def __repr__(self) -> str:
+        lens = f"view_angle={self.view_angle:g}"
         if self.parallel_projection:
             lens = f"parallel_projection=True, parallel_scale={self.parallel_scale:g}"
-        else:
-            lens = f"view_angle={self.view_angle:g}"
         return (
             f"Camera(position={self.position}, focal_point={self.focal_point}, "
             f"view_up={self.view_up}, {lens})"
@@ -442,16 +442,12 @@ class Camera:
 
     def _turned(self, axis: Matrix, degrees: float) -> Camera:
         """Rotate the eye about ``axis`` through the focal point (Rodrigues' formula)."""
-        axis = _unit(axis)
-        angle = math.radians(as_float(degrees))
+        axis, angle = _unit(axis), math.radians(as_float(degrees))
         if not math.isfinite(angle):
             raise InvalidCameraError(f"a view is turned by a finite angle; got {degrees!r}")
         arm = np.subtract(self.position, self.focal_point)
-        turned = (
-            arm * math.cos(angle)
-            + _cross(axis, arm) * math.sin(angle)
-            + axis * (axis @ arm) * (1 - math.cos(angle))
-        )
+        turned = arm * math.cos(angle) + _cross(axis, arm) * math.sin(angle)
+        turned = turned + axis * (axis @ arm) * (1 - math.cos(angle))
         return self.replace(position=np.asarray(self.focal_point) + turned)
 
 
@@ -500,19 +496,3 @@ def _length(vector: Matrix) -> float:
 def _cross(a: Matrix, b: Matrix) -> Matrix:
     (x, y, z), (u, v, w) = a.tolist(), b.tolist()
     return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
-
-
-def _refuse_unsupported(camera: Any) -> None:
-    reasons = []
-    if tuple(camera.GetViewShear()) != (0.0, 0.0, 1.0):
-        reasons.append("a view shear (SetViewShear)")
-    if camera.GetUseExplicitProjectionTransformMatrix():
-        reasons.append("an explicit projection matrix (SetExplicitProjectionTransformMatrix)")
-    if camera.GetUseOffAxisProjection():
-        reasons.append("an off-axis projection (SetUseOffAxisProjection)")
-    if camera.GetUserViewTransform() is not None or camera.GetUserTransform() is not None:
-        reasons.append("a user transform (SetUserTransform, SetUserViewTransform)")
-    if reasons:
-        raise UnsupportedError(
-            f"the camera has {' and '.join(reasons)}, which a VDI cannot honour: remove it"
-        )

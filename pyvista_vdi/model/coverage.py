@@ -1,15 +1,17 @@
-"""Which part of the screen's pixel grid a generating view covers."""
+"""What a generating view covers: of the screen's pixel grid, and of another view's rays."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
+from pyvista_vdi.model.vdi import VDI
 
 #: Most lists that a covering view may have, as a multiple of the window's pixels.
 MAX_LISTS_PER_PIXEL = 4.0
@@ -20,6 +22,10 @@ _NEAREST = 1e-3
 
 #: A corner this little beyond a pixel's border, in pixels, does not need another row of lists.
 _SLACK = 1e-6
+
+#: Rays along an edge of the window that tell what is covered, and by how much of V_O's window a
+#: point may lie outside of it by rounding.
+_COVERAGE_RAYS, _COVERAGE_SLACK = 33, 1e-5
 
 
 def covering_view(
@@ -106,6 +112,63 @@ def view_in_sight(
         return None
     corner = (int(low[0]), size[1] - int(high[1]))
     return camera.tile(size, corner, (width, height)), (width, height)
+
+
+def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
+    """Return the share of a view's rays through the volume that the VDI has all of.
+
+    Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
+
+    ``vdi``: its camera and window say what it has. ``camera``: the new view V_N. ``window_size``:
+    width and height of its picture in pixels. Returns: 0 to 1, of 33 x 33 rays that reach from edge
+    to edge of the window, and of those through the corners of the bounds; 1 where none of them
+    meets the volume.
+
+    V_O's window and what lies before its eye are convex: they contain a part of a ray if they
+    contain its two ends.
+    """
+    box = _homogeneous(bounds_corners(vdi.bounds))
+    to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
+    if _in_window(to_lists @ box).all():  # all of the volume, as with coverage="bounds"
+        return 1.0
+    camera = Camera.from_any(camera)
+    to_window = camera.viewport_matrix(window_size) @ camera.model_to_view
+    u, v, _, w = to_window @ box
+    before = w > 0
+    corners = np.stack([u[before], v[before]]) / w[before]
+    across = np.linspace(-1.0, 1.0, _COVERAGE_RAYS)
+    places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
+    places = places[:, (np.abs(places) <= 1).all(axis=0)]
+    # Points and directions in view space, taken to the model frame
+    to_model = np.linalg.inv(camera.model_to_view)
+    rays_of = np.vstack([np.ones(places.shape[1]), places]).T
+    origins, directions = (rays_of @ part for part in camera.ray_coefficients(window_size))
+    origins = (to_model @ _homogeneous(origins))[:3]
+    directions = to_model[:3, :3] @ directions.T
+    # The part of each that lies within the bounds, and before the eye
+    low, high = np.reshape(vdi.bounds, (3, 2)).T[:, :, np.newaxis]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.sort(np.stack([low - origins, high - origins]) / directions, axis=0)
+    ends = np.nan_to_num(ends, nan=0.0, posinf=np.inf, neginf=-np.inf)
+    first, last = ends[0].max(axis=0), ends[1].min(axis=0)
+    if not camera.parallel_projection:
+        first = np.maximum(first, 0.0)
+    meets = last > first
+    if not meets.any():
+        return 1.0
+    near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
+    held = _in_window(to_lists @ _homogeneous(np.hstack([near, far]).T))
+    return float(held.reshape(2, -1).all(axis=0).mean())
+
+
+def _in_window(places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether points in homogeneous viewport coordinates, (4, n), lie in the window."""
+    u, v, _, w = places
+    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max())
+
+
+def _homogeneous(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.vstack([points.T, np.ones(len(points))])
 
 
 #: Which of the six numbers of bounds are x, y and z of each corner, int (3, 8).

@@ -7,9 +7,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.view_error import ViewError, angle_from_generating_view, coverage
+from pyvista_vdi.quality.view_error import ViewError, angle_from_generating_view
 
 #: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn where the volume is at
 #: hand, and by what share the contrast within 4 x 4 pixels may differ, where nobody said otherwise.

@@ -21,7 +21,6 @@ from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_whole
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -51,9 +50,6 @@ TILE_SIZE = 24
 
 #: Most pixels of a coarse picture in one launch, so that a frame does not wait long for its end.
 _COARSE_LAUNCH = 2048
-#: Rays along an edge of the window that tell what is covered, and by how much of V_O's window a
-#: point may lie outside of it by rounding.
-_COVERAGE_RAYS, _COVERAGE_SLACK = 33, 1e-5
 #: Distance of an eye from the centre, in diagonals of the bounds, below which it has no direction.
 _AT_CENTRE = 1e-6
 
@@ -155,63 +151,6 @@ def magnification(vdi: VDI, camera: Any, window_size: Sequence[int] | None = Non
     if pixel == math.inf:
         return 0.0
     return width / pixel
-
-
-def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
-    """Return the share of a view's rays through the volume that the VDI has all of.
-
-    Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
-
-    ``vdi``: its camera and window say what it has. ``camera``: the new view V_N. ``window_size``:
-    width and height of its picture in pixels. Returns: 0 to 1, of 33 x 33 rays that reach from edge
-    to edge of the window, and of those through the corners of the bounds; 1 where none of them
-    meets the volume.
-
-    V_O's window and what lies before its eye are convex: they contain a part of a ray if they
-    contain its two ends.
-    """
-    box = _homogeneous(bounds_corners(vdi.bounds))
-    to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
-    if _in_window(to_lists @ box).all():  # all of the volume, as with coverage="bounds"
-        return 1.0
-    camera = Camera.from_any(camera)
-    to_window = camera.viewport_matrix(window_size) @ camera.model_to_view
-    u, v, _, w = to_window @ box
-    before = w > 0
-    corners = np.stack([u[before], v[before]]) / w[before]
-    across = np.linspace(-1.0, 1.0, _COVERAGE_RAYS)
-    places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
-    places = places[:, (np.abs(places) <= 1).all(axis=0)]
-    # Points and directions in view space, taken to the model frame
-    to_model = np.linalg.inv(camera.model_to_view)
-    rays_of = np.vstack([np.ones(places.shape[1]), places]).T
-    origins, directions = (rays_of @ part for part in camera.ray_coefficients(window_size))
-    origins = (to_model @ _homogeneous(origins))[:3]
-    directions = to_model[:3, :3] @ directions.T
-    # The part of each that lies within the bounds, and before the eye
-    low, high = np.reshape(vdi.bounds, (3, 2)).T[:, :, np.newaxis]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.sort(np.stack([low - origins, high - origins]) / directions, axis=0)
-    ends = np.nan_to_num(ends, nan=0.0, posinf=np.inf, neginf=-np.inf)
-    first, last = ends[0].max(axis=0), ends[1].min(axis=0)
-    if not camera.parallel_projection:
-        first = np.maximum(first, 0.0)
-    meets = last > first
-    if not meets.any():
-        return 1.0
-    near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
-    held = _in_window(to_lists @ _homogeneous(np.hstack([near, far]).T))
-    return float(held.reshape(2, -1).all(axis=0).mean())
-
-
-def _in_window(places: Floats) -> NDArray[np.bool_]:
-    """Whether points in homogeneous viewport coordinates, (4, n), lie in the window."""
-    u, v, _, w = places
-    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max())
-
-
-def _homogeneous(points: Floats) -> Floats:
-    return np.vstack([points.T, np.ones(len(points))])
 
 
 class ViewErrorEstimator:

@@ -1,4 +1,4 @@
-"""The harness: draws of cases, estimates over them, files of results, and a run that goes on."""
+"""The harness: files of results, and a run that goes on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.measure.clock import rank_sum_chance
-from pyvista_vdi.measure.harness import Case, Latest, estimate, run, sample
+from pyvista_vdi.measure.harness import Case, Latest, run
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.camera import Camera
 
@@ -30,39 +30,6 @@ def begun(default_runtime, tmp_path):
         return Results.begun("test", **{**arguments, **changes})
 
     return begin
-
-
-@pytest.mark.fast
-def test_a_draw_is_the_same_in_every_run_and_has_all_strata():
-    drawn = sample(CASES, 5)
-    assert drawn == sample(CASES, 5) == sorted(drawn, key=CASES.index)
-    # A fifth of the cases are of the small volume
-    assert [sum(case.volume == name for case in drawn) for name in ("small", "large")] == [1, 4]
-    assert {case.volume for case in sample(CASES, 2)} == {"small", "large"}
-    assert {case.angle for case in sample(CASES, 3, lambda case: case.angle)} == {0.0, 5.0, 30.0}
-    assert sample(CASES, 99) == CASES
-
-
-@pytest.mark.fast
-def test_an_estimate_covers_the_mean_of_all_cases():
-    rng = np.random.default_rng(7)
-    sizes = {"a": 40, "b": 10}
-    values = {"a": rng.normal(3, 1, 40), "b": rng.normal(9, 2, 10)}
-    everything = estimate(values, sizes)
-    assert everything.mean == pytest.approx(np.concatenate([*values.values()]).mean())
-    assert (everything.error, everything.count, everything.of) == (0, 50, 50)
-    off = []
-    for _ in range(400):
-        drawn = {"a": rng.choice(values["a"], 8, False), "b": rng.choice(values["b"], 2, False)}
-        found = estimate(drawn, sizes)
-        off.append((found.mean - everything.mean) / found.error)
-    # In units of its standard error, of which 2 of b's 10 cases tell but roughly
-    assert abs(np.median(off)) < 0.2
-    assert 0.8 < np.percentile(np.abs(off), 68) < 1.3
-    one = estimate({"a": [1.0, 3.0], "b": [2.0]}, sizes)
-    # (40/50)^2 (1 - 2/40) 2 / 2 + (10/50)^2 (1 - 1/10) 1 / 1
-    assert one.error == pytest.approx(math.sqrt(0.608 + 0.036))
-    assert str(one) == "2 ± 0.8 (3 of 50 cases)"
 
 
 @pytest.mark.fast

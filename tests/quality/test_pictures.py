@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.pictures import SIMILAR, Pictures
 from pyvista_vdi.quality.tiles import contrast_ratio
-from pyvista_vdi.quality.view_error import ViewError, coverage
+from pyvista_vdi.quality.view_error import ViewError
 
 SIZE = (64, 64)
 BOUNDS = (-1.0, 1.0) * 3

@@ -280,7 +280,7 @@ class _Rows:
             self._plan["generations"],
             _share(bench.size, generated.lists),
             before={"volume": partial(bench.image, bench.view)},
-            forms=precisions,
+            precisions=precisions,
             max_supersegments=generated.max_supersegments,
             criterion=generated.criterion,
             sample_distance=generated.sample_distance * bench.voxel,

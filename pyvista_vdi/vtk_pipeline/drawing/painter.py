@@ -14,9 +14,10 @@ import numpy as np
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
 from pyvista_vdi.extensions.sets.render import blended
+from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.view_error import angle_from_generating_view, coverage, magnification
+from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.box import Box

@@ -14,6 +14,7 @@ from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
 from pyvista_vdi.extensions.series.player import Player
 from pyvista_vdi.extensions.sets.shower import SetShower
+from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import TRIAL_SIZE
@@ -23,7 +24,6 @@ from pyvista_vdi.quality.render_mode import RenderModeChooser
 from pyvista_vdi.quality.view_error import (
     ViewError,
     angle_from_generating_view,
-    coverage,
     magnification,
 )
 from pyvista_vdi.quality.worker import Job, Worker
