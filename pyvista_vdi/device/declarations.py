@@ -65,7 +65,7 @@ class Struct:
             raise InvalidArgumentError(
                 f"fields of {self.name} that are missing or unknown: {wrong}"
             )
-        return np.array(tuple(values[name] for name in self.fields), self.dtype)
+        return np.array(tuple(map(values.__getitem__, self.fields)), self.dtype)
 
 
 class Parameter:
