@@ -326,6 +326,13 @@ __kernel void group_numbers(__global uint *x)
 """
 
 
+def declared(path, name):
+    """The kernel ``index`` or ``chase`` of a file."""
+    index = {"x": "uint*", "wide": "uint"}
+    chase = {"next": "uint*", "end": "uint*", "steps": "uint"}
+    return ocl.KernelDeclaration(path, name, **(index if name == "index" else chase))
+
+
 @pytest.fixture
 def kernels(tmp_path):
     path = tmp_path / "kernels.cl"
@@ -341,12 +348,11 @@ def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch,
     pieces = []
     monkeypatch.setattr(turns.Worker, "piece", lambda *_: 2048)
     monkeypatch.setattr(turns.Worker, "took", lambda self, kind, items, _: pieces.append(items))
-    kernel = runtime.kernel(kernels, "index")
     n = int(np.prod(size))
     with runtime.buffer((n,), np.uint32) as x:
         with runtime.background():
             runtime.fill(x, 0)
-            runtime.launch(kernel, size, group, x, np.uint32(size[0]))
+            runtime.bind(declared(kernels, "index"), x=x, wide=size[0])(size, group)
         np.testing.assert_array_equal(runtime.download(x), np.arange(1, n + 1))
     assert sum(pieces) == n
     assert n <= 4096 or len(pieces) > 1
@@ -392,7 +398,7 @@ def test_copies_in_pieces(runtime):
 
 
 def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernels):
-    kernel = runtime.kernel(kernels, "index")
+    launch = runtime.bind(declared(kernels, "index"), wide=64)
     array = np.zeros(2**21, np.uint32)
     unwanted = threading.Event()
     with runtime.background(unwanted.is_set), runtime.buffer(array.shape, np.uint32) as x:
@@ -401,7 +407,7 @@ def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernel
         unwanted.set()
         errors = []  # kept, and with them what their frames hold
         for use in (
-            lambda: runtime.launch(kernel, 64, 64, x, np.uint32(64)),
+            lambda: launch(64, 64, x=x),
             lambda: runtime.write(x, array),
             lambda: runtime.download(x),
             lambda: runtime.upload(unaligned),
@@ -439,17 +445,17 @@ def ring():
 
 
 def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels):
-    kernel = runtime.kernel(kernels, "chase")
+    chase = declared(kernels, "chase")
     with runtime.upload(ring()) as shared, runtime.buffer((64,), np.uint32) as own:
-        launch = (kernel, 64, 64, shared, own, np.uint32(1))
+        launch = runtime.bind(chase, next=shared, end=own, steps=1)
         assert own.readers is None
         assert shared.readers == (set() if runtime.is_cpu else None)
         if not runtime.is_cpu:
             return
         with runtime.queue_scope():
-            runtime.launch(*launch)
+            launch(64, 64)
             (inner,) = shared.readers
-        runtime.launch(*launch)
+        launch(64, 64)
         assert len(shared.readers) == 1  # the other queue is gone
         assert inner not in shared.readers
 
@@ -457,14 +463,14 @@ def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels):
 @pytest.mark.parametrize("own_queue", [False, True])
 def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, own_queue):
     """Whatever thread releases it, and whichever queue reads it."""
-    kernel = runtime.kernel(kernels, "chase")
     array, steps = ring(), 2**20  # tens of milliseconds: the kernel runs when release() is called
     with (
         runtime.buffer((64,), np.uint32) as end,
         runtime.queue_scope() if own_queue else contextlib.nullcontext(),
     ):
         shared = runtime.upload(array)
-        runtime.launch(kernel, 64, 64, shared, end, np.uint32(steps))
+        launch = runtime.bind(declared(kernels, "chase"), next=shared, end=end, steps=steps)
+        launch(64, 64)
         InThread(shared.release).value()
         array[...] = 0  # in place of freeing it, which would crash some time later, or not
         np.testing.assert_array_equal(runtime.download(end), (np.arange(64) + steps) % 64)
@@ -503,10 +509,9 @@ def test_a_thread_waits_for_its_own_queue_only(runtime, finished):
 
 
 def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime, kernels, finished):
-    kernel = runtime.kernel(kernels, "index")
     with runtime.queue_scope():
         buffer = runtime.result((64,), np.uint32)
-        runtime.launch(kernel, 64, 64, buffer, np.uint32(64))
+        runtime.bind(declared(kernels, "index"), x=buffer, wide=64)(64, 64)
         runtime.finish()
         before = sum(finished)
         buffer.release()
