@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -68,17 +67,30 @@ class Struct:
         return np.array(tuple(values[name] for name in self.fields), self.dtype)
 
 
-@dataclass(frozen=True)
 class Parameter:
     """An argument of a compiled kernel: its place and type, and the numbers that it consists of.
 
-    ``number`` is None where that is not known: of a type that the kernel's file defines.
+    Attributes
+    ----------
+    index, kind, number, count : int, str, numpy.dtype or None, int
+        ``number`` is None where it is not known: of a type that the kernel's file defines.
+    held : set of numpy.dtype or None
+        Of a pointer: what buffers may hold, which are its numbers, or parts of them such as two
+        floats for a ulong; None where that is not known.
+    scalar : type or None
+        Of a single number: NumPy's type of it.
     """
 
-    index: int
-    kind: str
-    number: np.dtype[Any] | None
-    count: int = 1
+    def __init__(self, index: int, kind: str, number: np.dtype[Any] | None, count: int = 1) -> None:
+        self.index, self.kind, self.number, self.count = index, kind, number, count
+        local, pointer = kind.startswith("local "), kind.endswith("*")
+        single = number is not None and number.names is None and count == 1
+        self.scalar: Any = number.type if number is not None and single and not pointer else None
+        self.held: set[np.dtype[Any]] | None = set()
+        if pointer and not local:
+            whole = 0 if number is None else number.itemsize
+            parts = {n for n in SCALARS.values() if whole % (2 * n.itemsize) == 0}
+            self.held = None if number is None else {number, *parts}
 
 
 class KernelDeclaration:

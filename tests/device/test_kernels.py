@@ -10,7 +10,6 @@ import pytest
 from pyvista_vdi.device import (
     KernelDeclaration,
     Struct,
-    constants,
     devices,
     list_devices,
     sources,
@@ -156,7 +155,7 @@ def test_declarations_are_as_compilers_see_kernels(compiler, declaration, define
     """Programs from a cache have no names on Intel's, so that every one is compiled here."""
     cl = devices.opencl()
     program = cl._cl._Program(cl.Context([compiler]), sources.expand(declaration.path))
-    options = (*define_options({**constants.KERNEL_CONSTANTS, **defines}), "-cl-kernel-arg-info")
+    options = (*define_options(defines), "-cl-kernel-arg-info")
     program._build(options=" ".join(("-cl-std=CL1.2", *options)).encode(), devices=[compiler])
     kernel = cl.Kernel(program, declaration.name)
     info, space = cl.kernel_arg_info, cl.kernel_arg_address_qualifier
