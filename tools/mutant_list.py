@@ -45,7 +45,7 @@ LISTS, RAYS = "opencl/raycasting/lists.cl", "opencl/raycasting/list_rays.cl"
 DECODE = "opencl/series/decode.cl"
 LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
     ("extensions/large",),
-    "opencl/large/optical_depths.cl",
+    "opencl/cpu16/generation_optical_depths.cl",
     "opencl/large/runs.cl",
 )
 
@@ -188,14 +188,14 @@ KERNEL_MUTANTS = (
     _m(
         "compositing: what is in front does not hide",
         "opencl/lib/compositing.cl",
-        "SELECT((Real)(0.0f), seen->sums.w * ",
-        "SELECT((Real)(0.0f), 1.0f * ",
+        "const Real weight = seen->sums.w * opacity_of(",
+        "const Real weight = opacity_of(",
     ),
     _m(
         "compositing: green by red",
         "opencl/lib/compositing.cl",
-        "seen->sums.y += weight * color.y;",
-        "seen->sums.y += weight * color.x;",
+        "seen->compensation.y, weight * color.y);",
+        "seen->compensation.y, weight * color.x);",
     ),
     _m(
         "list search: the guess before is one too far",
@@ -349,7 +349,7 @@ KERNEL_MUTANTS = (
     _m(
         "large: runs are joined whatever they look like",
         LARGE_RUNS,
-        "hidden_weight) <= finest)",
+        "hidden_weight) <= recording.finest)",
         "hidden_weight) <= INFINITY)",
     ),
     _m(
@@ -362,22 +362,22 @@ KERNEL_MUTANTS = (
     _m(
         "large: a step at a face belongs to two blocks",
         MARCH,
-        "WHILE((end > begin) & behind_part(march, medium, end - 1), end -= COUNT(moves))",
+        "WHILE((end > begin) & behind_part(march, of, end - 1), end -= COUNT(moves))",
         "",
         LARGE,
     ),
     _m(
         "large: macrocells are the whole grid's",
         MARCH,
-        "TO_REAL(((n) << MACROCELL_SHIFT) + FIRST_OF_PART(axis))",
+        "TO_REAL(((n) << MACROCELL_SHIFT) + (GRID_PART ? of->part_first.axis : 0))",
         "TO_REAL((n) << MACROCELL_SHIFT)",
         LARGE,
     ),
     _m(
         "large: occlusion by samples in a neighbour's cells",
         "opencl/volume/ambient_occlusion.cl",
-        "(position) < part_upper.axis)",
-        "true)",
+        "(position) < classified.part_upper.axis))",
+        "true))",
         LARGE,
     ),
     _m(

@@ -1,5 +1,5 @@
-// Volume to records of runs, one march per ray (paper section 2; docs/conventions.md, "Merging"). One ray for each work-item;
-// sixteen: cpu16/generation_march.cl.
+// Volume to records of runs, one march per ray (paper, section 2; docs/conventions.md, "Merging samples into a
+// supersegment"). One ray for each work-item; sixteen: cpu16/generation_march.cl.
 //
 // -D COMPENSATED: see lib/compositing.cl; the volume's: see volume/march.cl
 //

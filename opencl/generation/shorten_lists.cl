@@ -1,5 +1,5 @@
 // Fit: records that have grown too long, brought to a number of runs, by merging neighbours within a threshold that is raised
-// until they fit, or, for the budget, at least error (docs/conventions.md, "Merging", "Budget"). One ray for each work-item;
+// until they fit, or, for the budget, at least error (docs/concepts.md, "The budget"). One ray for each work-item;
 // sixteen: cpu16/generation_shorten.cl.
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl

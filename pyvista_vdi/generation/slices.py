@@ -52,14 +52,10 @@ class Slices:
 
     Attributes
     ----------
-    kept : int
-        Runs that a record is shortened to between chunks of its ray's march.
-    capacity : int
-        Runs that a record has room for.
-    rows : int
-        Rows of lists in a slice; the last one may have fewer.
-    items : int
-        Records of a slice: work-items that cover it in blocks.
+    kept, capacity : int
+        Runs that a record is shortened to between chunks of its ray's march, and has room for.
+    rows, items : int
+        Rows of lists in a slice, the last one may have fewer; and its work-items.
     bytes : int
         On the device, of records, lists and all else but the volume.
     """

@@ -39,18 +39,10 @@ Read = Callable[[NDArray[Any]], NDArray[Any]]
 
 @dataclass(frozen=True)
 class Room:
-    """Device memory for a volume, and what else there is on the device meanwhile.
+    """Device memory for a volume: the limit, if any, and what else is on the device meanwhile.
 
-    Attributes
-    ----------
-    limit : int or None
-        Most bytes in all; ``None``: what the device has.
-    working : int
-        Bytes of the buffers that the rays need.
-    steps : int
-        Steps whose samples bricks hold at a time, of all rays.
-    rays : str
-        What the rays are of, for messages.
+    ``working``: bytes of the buffers that the rays need; ``steps``: of all rays, whose samples
+    bricks hold at a time; ``rays``: what they are of, for messages.
     """
 
     limit: int | None
@@ -89,16 +81,9 @@ class Room:
 class BrickLayout:
     """How a grid is cut into bricks.
 
-    Attributes
-    ----------
-    shift : int
-        Logarithm to base 2 of the cells along an edge.
-    gradients : bool
-        Whether samples need the points that gradients read.
-    counts : (int, int, int)
-        Bricks along x, y and z.
-    point_bytes : int
-        Bytes of a point on the device.
+    ``shift``: logarithm to base 2 of the cells along an edge; ``gradients``: whether samples need
+    the points that gradients read; ``counts``: bricks along x, y and z; ``point_bytes``: of a point
+    on the device.
     """
 
     shift: int
@@ -158,25 +143,9 @@ class BrickLayout:
 def fitting_layout(
     dimensions: Sequence[int], point_bytes: int, gradients: bool, nbytes: int, largest: int
 ) -> tuple[BrickLayout, int] | None:
-    """Return how to cut a grid, and how many bricks the device holds at once.
+    """Return how to cut a grid, and how many bricks the device holds at once; None: not even one.
 
-    Parameters
-    ----------
-    dimensions : (int, int, int)
-        Points along x, y and z.
-    point_bytes : int
-        Bytes of a point on the device.
-    gradients : bool
-        Whether samples need gradients.
-    nbytes : int
-        What bricks and their tables may take.
-    largest : int
-        What one buffer may take.
-
-    Returns
-    -------
-    (BrickLayout, int) or None
-        ``None`` where not even one brick fits.
+    Bricks and their tables may take ``nbytes``, and one buffer ``largest``.
     """
     best = None
     for shift in _SHIFTS:
@@ -199,26 +168,9 @@ def least_brick_bytes(dimensions: Sequence[int], point_bytes: int, gradients: bo
 class DeviceBricks:
     """The bricks of a volume that are on a device.
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    array : numpy.ndarray, shape (nz, ny, nx) or (nz, ny, nx, 4)
-        The voxels; read as they are needed.
-    read : callable
-        Turns part of them into what the kernels read.
-    dtype : dtype_like
-        Of that.
-    layout : BrickLayout
-        How they are cut.
-    slots : int
-        Bricks on the device at once.
-    memory_limit : int or None
-        Most bytes on the device in all, as it was asked for.
-    visible : DeviceBuffer
-        Which macrocells hold anything that is not transparent; other bricks are never copied.
-    name : str
-        Of the volume, for messages.
+    Parameters are the voxels, read as they are needed; what turns part of them into what kernels
+    read, of ``dtype``; how they are cut, how many ``slots`` there are, and the ``memory_limit``
+    that was asked for; and which macrocells are ``visible``: other bricks are never copied.
 
     Attributes
     ----------
@@ -312,27 +264,9 @@ class DeviceBricks:
 class StepSampler:
     """Samples the steps of rays in a volume that is on the device brick by brick.
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    bricks : DeviceBricks
-        The volume.
-    medium : mapping
-        Arguments ``kernels.MEDIUM`` of the kernels that march.
-    variant : Variant
-        What these are compiled for.
-    forms : DeviceBuffer
-        Of the rays.
-    room : int
-        Most steps of all rays that are sampled at a time.
-    ends : DeviceBuffer, optional
-        Where each ray ends in t, top row first.
-
-    Attributes
-    ----------
-    samples : DeviceBuffer
-        Of the steps that were sampled last, for kernels that march.
+    ``medium``: arguments ``kernels.MEDIUM``; ``variant``: what kernels are compiled for; ``room``:
+    most steps of all rays at a time; ``ends``: where each ray ends in t, top row first. ``samples``
+    are those of the steps that were sampled last, for kernels that march.
     """
 
     def __init__(
@@ -374,23 +308,10 @@ class StepSampler:
 def in_parts(
     macrocells: tuple[int, int, int], macrocell_points: int, point_bytes: int, nbytes: int
 ) -> Iterator[tuple[tuple[slice, ...], tuple[slice, ...]]]:
-    """Cut a grid into parts of whole macrocells, along z first.
+    """Yield parts of whole macrocells of up to ``nbytes``, or one macrocell, cut along z first.
 
-    Parameters
-    ----------
-    macrocells : (int, int, int)
-        Macrocells along x, y and z.
-    macrocell_points : int
-        Points along a macrocell's edge; macrocells share the points on their faces.
-    point_bytes : int
-        Bytes of a point.
-    nbytes : int
-        Most bytes of a part, if that is enough for a macrocell.
-
-    Yields
-    ------
-    (tuple of slice, tuple of slice)
-        Which macrocells, and which points, both (z, y, x).
+    Of each which macrocells, and which points, both (z, y, x); macrocells share the points on their
+    faces.
     """
     lengths = list(reversed(macrocells))
     for axis in range(3):
@@ -417,16 +338,7 @@ def in_parts(
 def too_small(what: str, room: Room, runtime: Runtime, whole: int, brick: int) -> DeviceMemoryError:
     """Return the error for a volume of which not even one brick has room.
 
-    Parameters
-    ----------
-    what : str
-        The volume.
-    room : Room
-        What there is.
-    runtime : Runtime
-        The device.
-    whole, brick : int
-        Bytes of the volume, and of one brick, each with what it needs beside.
+    ``whole``, ``brick``: bytes of the volume, and of one brick, each with what it needs beside.
     """
     info = runtime.info
     given = (

@@ -152,7 +152,7 @@ class DeviceVolume:
         self.zero, self.unit = (0.0, 1.0) if scale is None else (scale.low, scale.unit)
         table = _table(runtime, transfer_function, native=scale is None)
         self._visible = _visibility(runtime, volume, voxels, table, transfer_function)
-        distances = _distances(runtime, volume, self._visible) if skip_empty else None
+        distances = _distances(runtime, volume, voxels, self._visible) if skip_empty else None
         nearest = transfer_function.interpolation == "nearest"
         ends = None
         if nearest and by_scalar and scale is None:
@@ -390,7 +390,9 @@ def _visibility(
     return visible
 
 
-def _distances(runtime: Runtime, volume: Volume, visible: DeviceBuffer) -> DeviceBuffer | None:
+def _distances(
+    runtime: Runtime, volume: Volume, voxels: HeldVoxels, visible: DeviceBuffer
+) -> DeviceBuffer | None:
     """Return how far each macrocell is from one that may be visible, uint8 on the device.
 
     ``None`` where too few are transparent for looking for them to pay.
@@ -400,9 +402,8 @@ def _distances(runtime: Runtime, volume: Volume, visible: DeviceBuffer) -> Devic
         return None
     far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
     distances = runtime.upload(far, "empty macrocells")
-    launch = runtime.bind(
-        MACROCELL_DISTANCES, Variant().defines, macrocells=seen.size, most=_FARTHEST
-    )
+    defines = voxels.variant.defines
+    launch = runtime.bind(MACROCELL_DISTANCES, defines, macrocells=seen.size, most=_FARTHEST)
     apart = 1
     for along in macrocells_over(volume):
         with distances as before:

@@ -13,17 +13,9 @@ Ends = tuple[float, float, float]
 class GridPart:
     """Where points that are at hand lie in their grid, and which of its cells belong to them.
 
-    Attributes
-    ----------
-    grid : Grid
-        The whole grid.
-    first : (int, int, int)
-        Index x, y, z of the first point at hand.
-    lower, upper : (float, float, float)
-        Index positions between which the part's own cells lie, the upper ones excluded; infinite
-        at the ends of the grid, where rounding may put a midpoint outside.
-    scalar_range : (float, float)
-        Of the whole grid's values.
+    ``first``: index x, y, z of the first point at hand; ``lower``, ``upper``: index positions
+    between which the part's own cells lie, the upper ones excluded, infinite at the ends of the
+    grid, where rounding may put a midpoint outside; ``scalar_range``: of the whole grid's values.
     """
 
     grid: Grid

@@ -33,24 +33,9 @@ def ambient_transmittances(
 ) -> DeviceBuffer:
     """Return the mean transmittance around each node, float32 (nz, ny, nx) on the device.
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    grid : OcclusionGrid
-        Nodes and marches.
-    medium : mapping
-        Arguments of the kernels that say what the medium is, and the macrocells that are not
-        transparent.
-    variant : Variant
-        What the kernels are compiled for.
-    lengths : (float, float)
-        Of the volume's own steps, and its opacity unit distance; model units.
-
-    Raises
-    ------
-    DeviceMemoryError
-        If the grid does not fit.
+    ``medium``: arguments of the kernels that say what the medium is, and ``visible`` macrocells;
+    ``lengths``: of the volume's own steps, and its opacity unit distance. DeviceMemoryError if the
+    grid does not fit.
     """
     opacities, ambient = _grids(runtime, grid)
     with opacities:

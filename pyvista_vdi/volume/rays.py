@@ -28,16 +28,8 @@ ALL_STEPS = 2**31 - 1
 class MarchForms:
     """The rays of a view through a volume, as ``begin_march`` of ``volume/march.cl`` takes them.
 
-    Attributes
-    ----------
-    forms : list of numpy.ndarray
-        Three index positions, three model directions, then the planes to clip to.
-    rays : PixelRays
-        The rays that they belong to.
-    planes : int
-        How many of the forms are planes.
-    double_float : bool
-        Whether the forms are of two floats each.
+    ``forms``: three index positions, three model directions, then the planes to clip to, of which
+    there are ``planes``; ``rays``: those that they belong to; ``double_float``: of two floats each.
     """
 
     forms: list[Floats]

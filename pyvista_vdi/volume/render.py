@@ -35,18 +35,9 @@ _PIXEL_BYTES = 16 + 4
 class ClippedRays:
     """A view's rays through a volume, clipped and cropped as a request says.
 
-    Attributes
-    ----------
-    forms : numpy.ndarray
-        As ``begin_march`` takes them, the planes of cropping behind.
-    planes : int
-        How many of them clip.
-    ends : numpy.ndarray or None
-        Where opaque geometry ends the rays.
-    regions : int
-        Those that cropping keeps.
-    variant : Variant
-        What kernels that march along them through the volume are compiled for.
+    ``forms``: as ``begin_march`` takes them, the planes of cropping behind; ``planes``: how many of
+    them clip; ``ends``: where opaque geometry ends the rays; ``regions``: what cropping keeps;
+    ``variant``: what kernels that march along them are compiled for.
     """
 
     def __init__(self, medium: DeviceVolume, request: FrameRequest) -> None:

@@ -61,18 +61,10 @@ def voxel_variant(volume: Volume, native: bool) -> Variant:
 
 @dataclass(frozen=True)
 class HeldVoxels:
-    """A volume's voxels on a device.
+    """A volume's voxels on a device, where there is room for all, and how kernels read them.
 
-    Attributes
-    ----------
-    buffer : DeviceBuffer or None
-        All of them, where there is room.
-    ranges : DeviceBuffer
-        Least and largest scalar of each macrocell.
-    scale : Scale or None
-        How they are taken; None: as they are.
-    variant : Variant
-        How kernels find and read one.
+    ``ranges``: least and largest scalar of each macrocell; ``scale``: how voxels are taken; None:
+    as they are.
     """
 
     buffer: DeviceBuffer | None
@@ -172,8 +164,8 @@ def macrocells_over(volume: Volume) -> tuple[int, int, int]:
 
 def _macrocells_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
     """Macrocells along x, y and z that cover the cells of a grid of so many points."""
-    x, y, z = (-(-(points - 1) // 2**MACROCELL_SHIFT) for points in dimensions)
-    return x, y, z
+    (x, y, z), edge = dimensions, 2**MACROCELL_SHIFT
+    return -(-(x - 1) // edge), -(-(y - 1) // edge), -(-(z - 1) // edge)
 
 
 def device_bytes(volume: Volume, scale: Scale | None) -> int:
@@ -339,14 +331,8 @@ def _require_a_number(runtime: Runtime, volume: Volume) -> None:
 class Scale(NamedTuple):
     """How voxels are taken relative to a transfer function's range.
 
-    Attributes
-    ----------
-    low : float
-        The scalar that becomes 0.
-    unit : float
-        Scalars per unit of the device's voxels.
-    step : bool
-        Whether ``low`` is the whole range, so that being above it is what counts.
+    ``low``: the scalar that becomes 0; ``unit``: scalars per unit of the device's voxels; ``step``:
+    whether ``low`` is the whole range, so that being above it is what counts.
     """
 
     low: float

@@ -17,28 +17,21 @@ class Variant:
 
     Attributes
     ----------
-    voxel : str
-        OpenCL's type of a voxel's component.
-    index : {"uint", "ulong"}
-        That of a voxel's address.
+    voxel, index : str
+        OpenCL's types of a voxel's component, and of a voxel's address.
     components : {1, 4}
         A scalar, or colours and a scalar.
     nearest, by_scalar : bool
         The nearest point is sampled; the medium of its scalar is looked up.
     shaded : {0, 1, 2}
         Samples are not lit, lit, or lit by one headlight and nothing else.
-    gradient_opacity : bool
-        Opacity depends on the gradient.
-    part : bool
-        The voxels are part of a grid.
-    double_float : bool
-        Rays enter the volume so far from where they are formed that float32 does not hold it.
-    compensated : {0, 1, 2}
-        How sums along a ray are kept (``lib/compositing.cl``).
-    cropped : bool
-        What cropping keeps is no box.
+    gradient_opacity, part, cropped : bool
+        Opacity depends on the gradient; voxels are part of a grid; what cropping keeps is no box.
+    double_float, compensated
+        Rays enter the volume so far from where they are formed that float32 does not hold it; how
+        sums along a ray are kept (``lib/compositing.cl``).
     sharp : bool
-        A specular power is so large that cosines round it off.
+        A specular power is so large that cosines round it off; no ``-D`` option.
     """
 
     voxel: str = "uchar"
@@ -86,19 +79,9 @@ class Variant:
 class RayLaunch:
     """A launch of a kernel for rays: one for each work-item, or sixteen (``opencl/cpu16/``).
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device. CPUs follow sixteen rays; the bits are the same.
-    one, sixteen : KernelDeclaration
-        The kernel in both forms.
-    defines : mapping
-        Its ``-D`` options.
-    one_by_one : bool
-        There is no other way.
-    **arguments
-        Those that are known already, as of :meth:`Runtime.bind`. A null pointer that the other form
-        alone takes is left out.
+    CPUs follow sixteen, unless there is no way but ``one_by_one``; the bits are the same. Other
+    arguments are those of :meth:`Runtime.bind`; a null pointer that the other form alone takes is
+    left out.
     """
 
     def __init__(
