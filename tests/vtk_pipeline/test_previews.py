@@ -23,7 +23,7 @@ from watched_windows import (
 import pyvista_vdi as pvdi
 from pyvista_vdi.device.ray_forms import pixel_rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.quality import ways
+from pyvista_vdi.quality import render_mode
 from pyvista_vdi.vtk_pipeline.drawing import few_lists
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
@@ -308,7 +308,7 @@ def test_frames_keep_the_rate_where_rays_get_dearer_as_views_turn_away(plotter, 
     frame(plotter)
     rates = []
     for _ in range(20):
-        counted.dear = 0.2 * ways.rise(actor.status.angle + 2)
+        counted.dear = 0.2 * render_mode.rise(actor.status.angle + 2)
         began = counted.now
         turned(plotter, 2, MOVING)
         rates.append(1 / (counted.now - began))
