@@ -27,7 +27,7 @@ _NULL = np.uintp(0)
 
 
 def padded(size: Size, group: Size) -> tuple[int, ...]:
-    """The next multiple of a work-group size in each dimension; kernels leave out the surplus."""
+    """Return the next multiple of a work-group size in each dimension; the surplus is left out."""
     sizes = size if isinstance(size, tuple) else (size,)
     groups = group if isinstance(group, tuple) else (group,)
     return tuple([-(-n // g) * g for n, g in zip(sizes, groups, strict=True)])

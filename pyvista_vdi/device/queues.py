@@ -70,7 +70,7 @@ class Queues(Device, Turns):
 
     @contextlib.contextmanager
     def queue_scope(self, profile: Profile | None = None) -> Iterator[None]:
-        """Give the calling thread an in-order command queue of its own inside the ``with`` block.
+        """Open an in-order command queue of the calling thread's own for the ``with`` block.
 
         What was enqueued before is finished first, and what is enqueued inside is finished at
         the end, so buffers may cross the borders of the block. ``profile`` collects the device

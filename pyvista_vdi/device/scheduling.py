@@ -153,7 +153,7 @@ class Turns:
             self._end_turn(worker)
 
     def give_way(self) -> float:
-        """Let others go first if this thread's turn is over.
+        """Stand aside for others if this thread's turn is over.
 
         Returns the seconds that the next piece may take; raises Cancelled if the work is no longer
         wanted. Background work on the host calls it now and then.
@@ -220,7 +220,7 @@ class Turns:
 
     @contextlib.contextmanager
     def aside(self) -> Iterator[None]:
-        """Let others go on inside the ``with`` block, in which the thread needs no device."""
+        """Leave the device to others inside the ``with`` block, whose work needs none."""
         worker = self.thread.worker
         if worker is not None:
             self._end_turn(worker)

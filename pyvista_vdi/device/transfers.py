@@ -20,7 +20,7 @@ class Transfers(Memory):
     """A device whose buffers are written and read."""
 
     def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
-        """An array's values on the device, for kernels to read; ``name`` says what they are.
+        """Return an array's values on the device, for kernels to read; ``name`` says of what.
 
         A CPU device uses an array that is C-contiguous and aligned for it in place (see
         :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
