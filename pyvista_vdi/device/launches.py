@@ -27,7 +27,7 @@ _NULL = np.uintp(0)
 
 
 def padded(size: Size, group: Size) -> tuple[int, ...]:
-    """The next multiple of a work-group size in each dimension; kernels leave out the surplus."""
+    """Return the next multiple of a work-group size in each dimension; the surplus is left out."""
     sizes = size if isinstance(size, tuple) else (size,)
     groups = group if isinstance(group, tuple) else (group,)
     return tuple([-(-n // g) * g for n, g in zip(sizes, groups, strict=True)])
@@ -197,7 +197,7 @@ class Launch:
                 queues.note_reader(buffer.readers)
 
         # Enqueue it
-        worker = queues.turns.thread.worker
+        worker = queues.thread.worker
         try:
             if worker is not None:
                 self._run_in_pieces(worker, whole, local)
@@ -221,7 +221,7 @@ class Launch:
         first = step * queues.info.compute_units * _FIRST_GROUPS
         done = 0
         while done < rows:
-            seconds = queues.turns.checkpoint()
+            seconds = queues.give_way()
             left = rows - done
             items = worker.piece(name, seconds)
             fitting = first if items is None else items // row_items

@@ -122,7 +122,7 @@ def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
             threading.Event().wait(3 * turns.POLL)  # the frame would be drawn by now
             order.append("piece")
             while order == ["piece"]:
-                each.checkpoint()
+                each.give_way()
             order.append("work")
 
     thread = InThread(work)
@@ -136,7 +136,7 @@ def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
 
 def test_frames_without_pause_leave_a_turn_each(monkeypatch):
     for limit in ("FIRST_TURN", "SHORTEST_TURN", "SHARE"):
-        monkeypatch.setattr(turns, limit, 0.0)  # a turn is over at every checkpoint
+        monkeypatch.setattr(turns, limit, 0.0)  # a turn is over at every give_way
     each, frames_before = Turns(), []
     begun, done = threading.Event(), threading.Event()
 
@@ -145,7 +145,7 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
             begun.set()
             for k in range(20):
                 while frames == k:
-                    each.checkpoint()
+                    each.give_way()
                 frames_before.append(frames)
         done.set()
 
@@ -174,17 +174,17 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
 )
 def test_a_turn_is_a_share_of_a_recent_frame_within_limits(clock, frames, turn):
     each = Turns()
-    assert each.checkpoint() == np.inf  # no background work
+    assert each.give_way() == np.inf  # no background work
     for frame in frames:
         with each.foreground():
             clock[0] += frame
     with each.background(never):
-        assert each.checkpoint() == pytest.approx(turn)
+        assert each.give_way() == pytest.approx(turn)
         if turn < turns.LONGEST_PIECE:
             clock[0] += 0.75 * turn
-            assert each.checkpoint() == pytest.approx(0.25 * turn)
+            assert each.give_way() == pytest.approx(0.25 * turn)
             clock[0] += (0.26 - turns.LEAST_REMAINDER) * turn  # no useful piece fits: a new turn
-            assert each.checkpoint() == pytest.approx(turn)
+            assert each.give_way() == pytest.approx(turn)
 
 
 def test_pieces_follow_the_slowest_of_the_last():
@@ -222,7 +222,7 @@ def test_workers_take_turns_with_each_other():
         with each.background(never):
             while len(set(seen)) < 2:  # without turns, the first would go on for ever
                 seen.append(name)
-                each.checkpoint()
+                each.give_way()
 
     threads = [InThread(work, name) for name in "ab"]
     begun.wait()
@@ -264,9 +264,9 @@ def test_cancelled_work_ends_while_a_frame_waits_for_it():
         with pytest.raises(Cancelled):
             thread.value()
     assert_free(each)
-    # And else at its next checkpoint
+    # And else at its next give_way
     with pytest.raises(Cancelled), each.background(lambda: True):
-        each.checkpoint()
+        each.give_way()
     assert_free(each)
 
 
@@ -288,7 +288,7 @@ def test_a_lock_is_handed_over_between_frame_and_work():
         with each.background(never), each.holding(lock):
             held.set()
             while not in_frame.is_set():
-                each.checkpoint()
+                each.give_way()
             order.append("work")
 
     def frame():

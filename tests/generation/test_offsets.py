@@ -7,7 +7,7 @@ import contextlib
 import numpy as np
 import pytest
 
-from pyvista_vdi.generation import kernels
+from pyvista_vdi.device import LocalMemory
 
 LISTS_PER_ITEM = 16  # see generation/offsets.cl
 UNTOUCHED = np.uint64(0xA5A5A5A5A5A5A5A5)
@@ -24,7 +24,9 @@ def lengths_of(kind, n, seed):
 
 def summed(runtime, slices, group):
     """Offsets that the device makes of slices of lengths, one behind the other."""
-    sum_lengths, list_offsets = map(runtime.bind, (kernels.SUM_LENGTHS, kernels.LIST_OFFSETS))
+    kernels = [
+        runtime.kernel("generation/offsets.cl", name) for name in ("sum_lengths", "list_offsets")
+    ]
     most = max(map(len, slices))
     room = np.full(sum(map(len, slices)) + 3, UNTOUCHED)
     room[0] = 0
@@ -37,9 +39,9 @@ def summed(runtime, slices, group):
         for lengths in slices:
             blocks = -(-len(lengths) // (group * LISTS_PER_ITEM))
             with runtime.upload(lengths) as given:
-                shared = {"lists": len(lengths), "lengths": given, "partial": group, "sums": sums}
-                sum_lengths(blocks * group, group, **shared)
-                list_offsets(blocks * group, group, **shared, made=made, all_offsets=offsets)
+                shared = (np.uint32(len(lengths)), given, LocalMemory(8 * group), sums)
+                runtime.launch(kernels[0], blocks * group, group, *shared)
+                runtime.launch(kernels[1], blocks * group, group, *shared, np.uint32(made), offsets)
             made += len(lengths)
         return runtime.download(offsets)
 
