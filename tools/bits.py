@@ -5,7 +5,7 @@ implementation; the same with the new code, then ``python tools/bits.py --compar
 new.json``. Hashes of two implementations differ: OpenCL C leaves them the last bits of elementary
 functions. Only public names are used, so that one file runs on both versions; scenes are fixed,
 from seeds and from the volumes in the folder that ``PYVISTA_VDI_DATA`` names. Both versions run the
-same file, which takes nothing from ``tests/support``: hence more than 500 lines.
+same file, which takes nothing from ``tests/support``.
 """
 
 # ruff: noqa: T201

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime
+from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, Runtime
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.work_order import GROUP, block_items
 from pyvista_vdi.model.camera import Camera
@@ -16,7 +16,21 @@ from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.reference.raycast import Lists, near_limit
 
-KERNELS = Path(__file__).with_name("world_rays.cl")
+KERNEL = KernelDeclaration(
+    Path(__file__).with_name("world_rays.cl"),
+    "world_rays",
+    offsets="int*",
+    faces="float2*",
+    media="float4*",
+    lists_wide="int",
+    lists_high="int",
+    forms="float*",
+    planes="int",
+    width="int",
+    height="int",
+    cutoff="float",
+    image="float4*",
+)
 
 
 class WorldRays:
@@ -31,7 +45,6 @@ class WorldRays:
     def __init__(self, runtime: Runtime, vdi: VDI, *, binary: bool = True) -> None:
         self._runtime, self._vdi = runtime, vdi
         defines = {"BINARY_SEARCH": 1} if binary else {}
-        self._kernel = runtime.kernel(KERNELS, "world_rays", defines)
         self._wide, self._high = vdi.window_size
         self._parallel = vdi.camera.parallel_projection
         self._nearest = -np.inf if self._parallel else near_limit(vdi) - vdi.depth_origin
@@ -49,7 +62,9 @@ class WorldRays:
         self._to_lists[2, 3] -= vdi.depth_origin
         offsets = vdi.offsets.astype(np.int32)
         self.nbytes = offsets.nbytes + faces.nbytes + media.nbytes
-        self._lists = [self._upload(array) for array in (offsets, faces, media)]
+        offsets, faces, media = map(self._upload, (offsets, faces, media))
+        self._draw = runtime.bind(KERNEL, defines, offsets=offsets, faces=faces, media=media)
+        self._draw.set(lists_wide=self._wide, lists_high=self._high, cutoff=TRANSMITTANCE_CUTOFF)
 
     def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.float32]:
         """Draw a frame; premultiplied RGBA (H, W, 4)."""
@@ -58,17 +73,9 @@ class WorldRays:
             runtime.upload(forms, "rays") as on_device,
             runtime.result((*size[::-1], 4), name="image") as image,
         ):
-            runtime.launch(
-                self._kernel,
-                block_items(*size),
-                GROUP,
-                *self._lists,
-                *map(np.int32, (self._wide, self._high)),
-                on_device,
-                *map(np.int32, (planes, *size)),
-                np.float32(TRANSMITTANCE_CUTOFF),
-                image,
-            )
+            width, height = size
+            of_frame = {"forms": on_device, "planes": planes, "image": image}
+            self._draw(block_items(*size), GROUP, width=width, height=height, **of_frame)
             return runtime.download(image)
 
     def _rays(self, camera: Camera, size: tuple[int, int]) -> tuple[NDArray[np.float32], int]:

@@ -34,7 +34,7 @@ class LocalMemory:
 
 
 def bytes_text(nbytes: int) -> str:
-    """A number of bytes for people: ``"1.50 GiB (1610612736 bytes)"``."""
+    """Return a number of bytes for people: ``"1.50 GiB (1610612736 bytes)"``."""
     for unit, size in (("GiB", 2**30), ("MiB", 2**20), ("KiB", 2**10)):
         if nbytes >= size:
             return f"{nbytes / size:.2f} {unit} ({nbytes} bytes)"
@@ -145,7 +145,7 @@ class DeviceBuffer:
         self._finalizer.atexit = False  # the driver frees everything at exit
 
     def release(self) -> None:
-        """Give the memory back; a second call does nothing. Enqueued work still finishes."""
+        """Return the memory; a second call does nothing. Enqueued work still finishes."""
         self.memory = None
         self._finalizer()
 
@@ -183,7 +183,7 @@ def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
 
 
 def shape_of(nbytes_or_shape: int | tuple[int, ...], dtype: np.dtype[Any]) -> tuple[int, ...]:
-    """Shape for an integer number of *bytes*, or the given shape, checked.
+    """Return the shape for an integer number of *bytes*, or the given shape, checked.
 
     Raises
     ------

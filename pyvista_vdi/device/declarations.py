@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ class Struct:
             raise InvalidArgumentError(
                 f"fields of {self.name} that are missing or unknown: {wrong}"
             )
-        return np.array(tuple(values[name] for name in self.fields), self.dtype)
+        return np.array(tuple(map(values.__getitem__, self.fields)), self.dtype)
 
 
 class Parameter:
@@ -99,7 +100,7 @@ class KernelDeclaration:
     Parameters
     ----------
     path, name : str
-        A file of ``pyvista_vdi.opencl``, and the function in it.
+        A file of ``pyvista_vdi.opencl`` (any other one as a Path), and the function in it.
     **arguments : str or Struct
         A number (``"int"``), a vector (``"float4"``), a pointer to a buffer (``"float4*"``), to
         memory of each work-group (``"local ulong*"``), or a structure. A type may be named by a
@@ -108,7 +109,7 @@ class KernelDeclaration:
         ``" if not OPTION"``; there may be several.
     """
 
-    def __init__(self, path: str, name: str, /, **arguments: str | Struct) -> None:
+    def __init__(self, path: str | Path, name: str, /, **arguments: str | Struct) -> None:
         self.path, self.name, self.arguments = path, name, arguments
 
     def __repr__(self) -> str:

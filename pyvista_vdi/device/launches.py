@@ -11,7 +11,6 @@ import numpy as np
 
 from pyvista_vdi.device.buffers import DeviceBuffer, LocalMemory
 from pyvista_vdi.device.declarations import Parameter
-from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.device.programs import Kernel
 from pyvista_vdi.device.queues import Queues
 from pyvista_vdi.device.scheduling import Worker
@@ -28,10 +27,10 @@ _NULL = np.uintp(0)
 
 
 def padded(size: Size, group: Size) -> tuple[int, ...]:
-    """The next multiple of a work-group size in each dimension; kernels leave out the surplus."""
+    """Return the next multiple of a work-group size in each dimension; the surplus is left out."""
     sizes = size if isinstance(size, tuple) else (size,)
     groups = group if isinstance(group, tuple) else (group,)
-    return tuple(n + -n % g for n, g in zip(sizes, groups, strict=True))
+    return tuple([-(-n // g) * g for n, g in zip(sizes, groups, strict=True)])
 
 
 _RELEASED = "the buffer {!r} was used after its release"
@@ -93,6 +92,8 @@ class Launch:
                         raise TypeError
                 else:
                     given = _given(parameter, value)
+                    if isinstance(given, LocalMemory):
+                        given = queues.cl.LocalMemory(given.nbytes)
                 self._object.set_arg(parameter.index, given)
             except (AttributeError, OverflowError, TypeError, ValueError) as exc:
                 raise TypeError(
@@ -196,7 +197,7 @@ class Launch:
                 queues.note_reader(buffer.readers)
 
         # Enqueue it
-        worker = queues.turns.thread.worker
+        worker = queues.thread.worker
         try:
             if worker is not None:
                 self._run_in_pieces(worker, whole, local)
@@ -220,7 +221,7 @@ class Launch:
         first = step * queues.info.compute_units * _FIRST_GROUPS
         done = 0
         while done < rows:
-            seconds = queues.turns.checkpoint()
+            seconds = queues.give_way()
             left = rows - done
             items = worker.piece(name, seconds)
             fitting = first if items is None else items // row_items
@@ -243,7 +244,7 @@ def _given(parameter: Parameter, value: Any) -> Any:
     kind, number, count = parameter.kind, parameter.number, parameter.count
     if kind.startswith("local "):
         assert number is not None
-        return opencl().LocalMemory(operator.index(value) * count * number.itemsize)
+        return LocalMemory(operator.index(value) * count * number.itemsize)
     if kind.endswith("*"):
         if value is not None:
             raise TypeError

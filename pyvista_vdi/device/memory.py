@@ -69,7 +69,7 @@ class Memory(Queues):
         name: str = "buffer",
         read_only: bool = False,
     ) -> DeviceBuffer:
-        """Uninitialised memory on the device, checked against its limits before it is taken.
+        """Return uninitialised memory on the device, checked against its limits before.
 
         An integer is a number of **bytes**, a tuple a shape in elements; zero is allowed. ``name``
         is what it is for: messages say it. Release it, use it in a ``with`` block, or drop it.
@@ -93,7 +93,7 @@ class Memory(Queues):
         *,
         lasting: bool = False,
     ) -> DeviceBuffer:
-        """Uninitialised memory for kernels to write, downloaded when they have.
+        """Return uninitialised memory for kernels to write, downloaded when they have.
 
         On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
         is copied, and that array holds what is written afterwards, too. ``lasting`` is as for
@@ -108,7 +108,7 @@ class Memory(Queues):
         return self.allocate(flags.READ_WRITE, shape, dtype, name, pooled=pooled)
 
     def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
-        """Memory for kernels to write what an array is to hold; :meth:`download` brings it there.
+        """Return memory for kernels to write what an array is to hold, see :meth:`download`.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
         that very array, or its beginning, copies nothing. The array is C-contiguous and writable

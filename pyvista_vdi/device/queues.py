@@ -13,33 +13,32 @@ from pyvista_vdi.device import devices
 from pyvista_vdi.device.device import Device
 from pyvista_vdi.device.devices import Candidate
 from pyvista_vdi.device.profiling import KernelTime, Profile, profiling_wanted, table
-from pyvista_vdi.device.scheduling import Turns
+from pyvista_vdi.device.scheduling import ThisThread, Turns
 
 
-class _ThisThread(threading.local):
-    """The number of a thread's queue, and where the times of what it enqueues go."""
+class _ThisThread(ThisThread):
+    """Also the number of a thread's queue, and where the times of what it enqueues go."""
 
     number = 1  # the main queue's
     profile: Profile | None = None
 
 
-class Queues(Device):
+class Queues(Device, Turns):
     """A device with a command queue for all threads, and others for those that ask for one.
 
     Attributes
     ----------
-    turns : Turns
-        Who works on the device now.
     thread : object
+        Beside what :class:`Turns` says of it:
         ``number`` of the calling thread's queue, and ``profile``, where its times go.
     profiled : Profile or None
         Where the times of all others go: with ``PYVISTA_VDI_PROFILE``.
     """
 
     def __init__(self, candidate: Candidate, context: Any = None) -> None:
-        super().__init__(candidate, context)
-        self.turns = Turns()
-        self.thread = _ThisThread()
+        Device.__init__(self, candidate, context)
+        Turns.__init__(self)
+        self.thread: _ThisThread = _ThisThread()
         self._queues: dict[int, Any] = {}  # those that exist, numbered as they were made
         self._queues_made = 0
         self._queues_lock = threading.RLock()
@@ -71,7 +70,7 @@ class Queues(Device):
 
     @contextlib.contextmanager
     def queue_scope(self, profile: Profile | None = None) -> Iterator[None]:
-        """Give the calling thread an in-order command queue of its own inside the ``with`` block.
+        """Open an in-order command queue of the calling thread's own for the ``with`` block.
 
         What was enqueued before is finished first, and what is enqueued inside is finished at
         the end, so buffers may cross the borders of the block. ``profile`` collects the device
@@ -117,19 +116,6 @@ class Queues(Device):
             readers.intersection_update(self._queues)
             readers.add(self.thread.number)
 
-    def foreground(self) -> contextlib.AbstractContextManager[None]:
-        """Draw a frame that a person waits for inside the ``with`` block.
-
-        Background work on this device rests meanwhile: put into the block all that must not be
-        disturbed, drawing included. The block begins when the piece of background work in
-        progress is done. If background work could not go on before the last frame, it begins
-        after a turn of it, 0.3 times as long as a recent frame. Blocks of several threads run
-        side by side; inside another, or in background work, a block changes nothing.
-
-        Do not begin one while holding a lock that background work may need.
-        """
-        return self.turns.foreground()
-
     @contextlib.contextmanager
     def background(self, cancelled: Callable[[], bool] = lambda: False) -> Iterator[None]:
         """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
@@ -138,31 +124,8 @@ class Queues(Device):
         that take no longer than a turn; each is finished when the call returns. ``cancelled`` is
         asked between pieces: True ends the work with :class:`Cancelled`, from any method.
         """
-        with self.queue_scope(), self.turns.background(cancelled):
+        with self.queue_scope(), super().background(cancelled):
             yield
-
-    def give_way(self) -> None:
-        """Let frames that wait go first; background work on the host calls it now and then."""
-        self.turns.checkpoint()
-
-    def aside(self) -> contextlib.AbstractContextManager[None]:
-        """Let frames go on inside the ``with`` block, whose background work needs no device."""
-        return self.turns.aside()
-
-    def clock(self) -> float:
-        """Return seconds that go by for the calling thread's work, to be subtracted.
-
-        In background work they stand still while frames go first.
-        """
-        return self.turns.clock()
-
-    def holding(self, lock: threading.Lock) -> contextlib.AbstractContextManager[None]:
-        """Hold a lock under which device work is done.
-
-        Whoever holds it may be waiting for this thread's frame or turn to end, so a thread that
-        finds it taken leaves either until it gets it.
-        """
-        return self.turns.holding(lock)
 
     def profile(self) -> list[KernelTime]:
         """Device time per kernel so far; empty unless ``PYVISTA_VDI_PROFILE`` was set."""

@@ -122,8 +122,8 @@ class Runtime(Transfers):
         if key in known:
             return known[key]
         # Compilers take seconds, and not the device
-        background = self.turns.thread.worker is not None
-        with self.turns.aside() if background else contextlib.nullcontext():
+        background = self.thread.worker is not None
+        with self.aside() if background else contextlib.nullcontext():
             known[key] = self._programs.kernel(path, name, defines)
         return known[key]
 

@@ -2,7 +2,7 @@
 
 A frame that a person waits for is drawn inside ``Turns.foreground``; a thread whose work may take
 its time works inside ``Turns.background``. Background work runs in *turns*, only while no frame is
-in progress; within its turn it passes a ``checkpoint`` between two *pieces* of work. A frame that
+in progress; within its turn it calls ``give_way`` between two *pieces* of work. A frame that
 arrives waits for the piece in progress. Where frames follow each other without pause, background
 work still gets a turn after each, as long as a fixed share of a recent frame.
 """
@@ -70,7 +70,7 @@ class Worker:
         rates.append(items / max(seconds, 1e-9))
 
 
-class _ThisThread(threading.local):
+class ThisThread(threading.local):
     """The calling thread, as one that works in turns, and whether it draws a frame."""
 
     worker: Worker | None = None
@@ -89,7 +89,7 @@ class Turns:
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        self.thread = _ThisThread()
+        self.thread = ThisThread()
         self._frames = 0  # in progress
         self._arriving = 0  # frames that wait to begin
         self._waiting: deque[Worker] = deque()
@@ -99,7 +99,16 @@ class Turns:
 
     @contextlib.contextmanager
     def foreground(self) -> Iterator[None]:
-        """See :meth:`pyvista_vdi.device.Runtime.foreground`."""
+        """Draw a frame that a person waits for inside the ``with`` block.
+
+        Background work on this device rests meanwhile: put into the block all that must not be
+        disturbed, drawing included. The block begins when the piece of background work in
+        progress is done. If background work could not go on before the last frame, it begins
+        after a turn of it, 0.3 times as long as a recent frame. Blocks of several threads run
+        side by side; inside another, or in background work, a block changes nothing.
+
+        Do not begin one while holding a lock that background work may need.
+        """
         if self.thread.worker is not None or self.thread.in_frame:
             yield
             return
@@ -131,7 +140,7 @@ class Turns:
 
     @contextlib.contextmanager
     def background(self, cancelled: Callable[[], bool]) -> Iterator[None]:
-        """See :meth:`pyvista_vdi.device.Runtime.background`."""
+        """Work inside the ``with`` block only when no frame is in progress, see `foreground`."""
         if self.thread.worker is not None or self.thread.in_frame:
             raise RuntimeError("background work cannot begin inside a frame or background work")
         worker = Worker(cancelled)
@@ -143,18 +152,11 @@ class Turns:
             self.thread.worker = None
             self._end_turn(worker)
 
-    def checkpoint(self) -> float:
-        """Let others go first if this thread's turn is over.
+    def give_way(self) -> float:
+        """Stand aside for others if this thread's turn is over.
 
-        Returns
-        -------
-        float
-            Seconds that the next piece may take.
-
-        Raises
-        ------
-        Cancelled
-            If the work is no longer wanted.
+        Returns the seconds that the next piece may take; raises Cancelled if the work is no longer
+        wanted. Background work on the host calls it now and then.
         """
         worker = self.thread.worker
         if worker is None:
@@ -172,7 +174,10 @@ class Turns:
         return min(turn if over else left, LONGEST_PIECE)
 
     def clock(self) -> float:
-        """See :meth:`pyvista_vdi.device.Runtime.clock`."""
+        """Return seconds that go by for the calling thread's work, to be subtracted.
+
+        In background work they stand still while frames go first.
+        """
         worker, now = self.thread.worker, time.perf_counter()
         return now if worker is None else worker.worked + now - worker.turn_began
 
@@ -215,7 +220,7 @@ class Turns:
 
     @contextlib.contextmanager
     def aside(self) -> Iterator[None]:
-        """Let others go on while the calling thread needs no device or waits for another thread."""
+        """Leave the device to others inside the ``with`` block, whose work needs none."""
         worker = self.thread.worker
         if worker is not None:
             self._end_turn(worker)
@@ -234,8 +239,8 @@ class Turns:
     def holding(self, lock: threading.Lock) -> Iterator[None]:
         """Hold a lock under which device work is done.
 
-        Its holder may be waiting for the calling thread's frame or turn to end, so who finds it
-        taken stands aside.
+        Whoever holds it may be waiting for this thread's frame or turn to end, so a thread that
+        finds it taken leaves either until it gets it.
         """
         taken = lock.acquire(blocking=False)
         try:

@@ -20,7 +20,7 @@ class Transfers(Memory):
     """A device whose buffers are written and read."""
 
     def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
-        """An array's values on the device, for kernels to read; ``name`` says what they are.
+        """Return an array's values on the device, for kernels to read; ``name`` says of what.
 
         A CPU device uses an array that is C-contiguous and aligned for it in place (see
         :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
@@ -28,7 +28,7 @@ class Transfers(Memory):
         """
         shape, array, flags = np.shape(array), np.ascontiguousarray(array), self.cl.mem_flags
         in_place, dtype = self.in_place(array), array.dtype
-        if in_place or self.turns.thread.worker is None or array.nbytes <= _COPY_BYTES:
+        if in_place or self.thread.worker is None or array.nbytes <= _COPY_BYTES:
             access = flags.READ_ONLY | (flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR)
             return self.allocate(access, shape, dtype, name, array, writable=False)
 
@@ -65,7 +65,7 @@ class Transfers(Memory):
             out = buffer.host
         if out is None:
             shape = buffer.shape if count is None else (count,)
-            waits = self.turns.thread.worker is None
+            waits = self.thread.worker is None
             pins = waits and not self.is_cpu and buffer.nbytes >= LEAST_PINNED
             out = (self.pinned.empty if pins else np.empty)(shape, buffer.dtype)
         _check_exchange(buffer, out, elements if count is None else count, written=True)
@@ -73,8 +73,8 @@ class Transfers(Memory):
             self._copy(buffer, out, to_host=True)
         elif out.nbytes:
             # Map it: the memory is the array's, so that nothing is copied, and the values stay
-            if self.turns.thread.worker is not None:
-                self.turns.checkpoint()
+            if self.thread.worker is not None:
+                self.give_way()
             cl, queue = self.cl, self.queue
             try:
                 mapped, event = cl.enqueue_map_buffer(
@@ -145,14 +145,14 @@ class Transfers(Memory):
         event is returned.
         """
         memory, cl, queue = buffer.memory, self.cl, self.queue
-        background = self.turns.thread.worker is not None
+        background = self.thread.worker is not None
         waits, event = background or not later, None
         data, offset = host.reshape(-1).view(np.uint8), first * host.itemsize
         size = _COPY_BYTES if background else max(1, data.nbytes)
         try:
             for start in range(0, data.nbytes, size):
                 if background:
-                    self.turns.checkpoint()
+                    self.give_way()
                 part = data[start : start + size]
                 if to_host:
                     ends = {"dest": part, "src": memory, "src_offset": offset + start}
@@ -195,7 +195,7 @@ class Transfers(Memory):
             if buffer.readers is not None:
                 self.note_reader(buffer.readers)
             self.record("[fill]", event)
-            if self.turns.thread.worker is not None:
+            if self.thread.worker is not None:
                 queue.finish()  # nothing of this thread runs when its turn is over
         except cl.Error as exc:
             raise self.failure(exc, f"filling the buffer {buffer.name!r}") from exc

@@ -95,7 +95,7 @@ class GrowingArray:
         self.room = 0
 
     def reserve(self, n: int, most: int) -> None:
-        """Have room for at least n elements, and if it can be had for the most there may be.
+        """Make room for at least n elements, and if it can be had for the most there may be.
 
         Raises
         ------

@@ -90,6 +90,12 @@ __kernel void spread(__global const float *x, __global float *y, const float4 v,
 """
 
 
+def scaling(path):
+    """The kernel ``scale`` of a file."""
+    arguments = {"x": "float*", "factor": "float", "n": "uint"}
+    return ocl.KernelDeclaration(path, "scale", **arguments)
+
+
 @pytest.fixture
 def scale_file(tmp_path):
     path = tmp_path / "with a space" / "scale.cl"
@@ -183,24 +189,23 @@ def test_define_options():
 
 def test_float_defines_are_exact(runtime, scale_file):
     add = np.float32(0.1)
-    kernel = runtime.kernel(scale_file, "scale", {"ADD": add})
     with runtime.buffer((1,), np.float32) as x:
         runtime.fill(x, 0)
-        runtime.launch(kernel, 1, None, x, np.float32(1), np.uint32(1))
+        runtime.bind(scaling(scale_file), {"ADD": add}, x=x, factor=1, n=1)(1)
         assert runtime.download(x)[0] == add
 
 
 def test_threads_may_launch_the_same_kernel(runtime, scale_file):
-    kernel = runtime.kernel(scale_file, "scale", {"ADD": 0})
     start = threading.Barrier(4)
 
     def work(factor: int) -> None:
         data = np.full(100, factor, np.float32)
         with runtime.buffer(data.shape, data.dtype) as x:
+            launch = runtime.bind(scaling(scale_file), {"ADD": 0}, x=x, n=100)
             start.wait()
             for _ in range(200):
                 runtime.write(x, data)
-                runtime.launch(kernel, 100, None, x, np.float32(factor), np.uint32(100))
+                launch(100, factor=factor)
                 assert np.all(runtime.download(x) == factor * factor)
 
     with ThreadPoolExecutor(4) as pool:
@@ -208,46 +213,45 @@ def test_threads_may_launch_the_same_kernel(runtime, scale_file):
 
 
 def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
-    """Only what changes is given to the driver: also signs of 0, arrays changed in place."""
-    kernel = runtime.kernel(scale_file, "spread", {"ADD": 0})
-    vector, room = np.array([1, 2, 3, 4], np.float32), ocl.LocalMemory(16)
+    """Also signs of 0, arrays changed in place, buffers in the place of those that have gone."""
+    kinds = {"x": "float*", "y": "float*", "v": "float4", "t": "local float*"}
+    spread = ocl.KernelDeclaration(scale_file, "spread", **kinds)
+    vector = np.array([1, 2, 3, 4], np.float32)
     with runtime.upload(np.arange(8, dtype=np.float32)) as x, runtime.buffer(x.shape) as y:
-        runtime.launch(kernel, 8, 4, x, y, vector, room)
+        launch = runtime.bind(spread, {"ADD": 0}, x=x, y=y, v=vector, t=4)
+        launch(8, 4)
         np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
+        launch.set(x=None)
         for last in (4.0, 0.0, -0.0, np.nan, 7.0):
             vector[3] = last
-            runtime.launch(kernel, (8,), (4,), None, y, vector, room)
+            launch((8,), (4,), v=vector)
             assert runtime.download(y).tobytes() == np.full(8, last, np.float32).tobytes()
-        runtime.launch(kernel, 8, 4, x, y, vector, room)
+        launch(8, 4, x=x)
         np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
-    scale = runtime.kernel(scale_file, "scale", {"ADD": 0})
-    for value in range(1, 6):  # a buffer that takes the place of one that has gone
+    launch = runtime.bind(scaling(scale_file), {"ADD": 0}, factor=2, n=3)
+    for value in range(1, 6):
         with runtime.buffer((3,)) as x:
             runtime.fill(x, np.float32(value))
-            runtime.launch(scale, 3, None, x, np.float32(2), np.uint32(3))
+            launch(3, x=x)
             assert np.all(runtime.download(x) == value * 2)
 
 
 def test_bad_launches_name_the_kernel(runtime, scale_file):
-    kernel = runtime.kernel(scale_file, "scale", {"ADD": 0})
+    launch = runtime.bind(scaling(scale_file), {"ADD": 0}, factor=1, n=8)
     with runtime.buffer((8,), name="eight") as x:
-        good = (x, np.float32(1), np.uint32(8))
-        with pytest.raises(InvalidArgumentError, match="'scale' of .*takes 3 arguments, 1 were"):
-            runtime.launch(kernel, 8, None, x)
-        with pytest.raises(TypeError, match="argument 1 of kernel 'scale' is 1.0 of type float"):
-            runtime.launch(kernel, 8, None, x, 1.0, np.uint32(8))
+        launch.set(x=x)
         with pytest.raises(InvalidArgumentError, match=r"\(8,\) is no multiple of .*\(3,\)"):
-            runtime.launch(kernel, 8, 3, *good)
+            launch(8, 3)
         with pytest.raises(InvalidArgumentError, match="no multiple"):
-            runtime.launch(kernel, (8, 1), 8, *good)
+            launch((8, 1), 8)
         with pytest.raises(DeviceError, match="failed while launching 'scale'.*2097152") as caught:
-            runtime.launch(kernel, 2**21, 2**21, *good)
+            launch(2**21, 2**21)
         assert caught.value.__cause__ is not None
-        with pytest.raises(DeviceError, match="argument 1|SIZE"):
-            runtime.launch(kernel, 8, None, x, np.float64(1), np.uint32(8))
-        runtime.launch(kernel, (0,), None, *good)  # nothing to do is no error
+        launch((0,))  # nothing to do is no error
     with pytest.raises(DeviceError, match="'eight' was used after its release"):
-        runtime.launch(kernel, 8, None, *good)
+        launch(8)
+    with pytest.raises(DeviceError, match="'eight' was used after its release"):
+        launch.set(x=x)
 
 
 def test_padded():
@@ -257,23 +261,23 @@ def test_padded():
 
 def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file, monkeypatch):
     cl, queues = devices.opencl(), []
-    launch = cl.enqueue_nd_range_kernel
+    enqueue = cl.enqueue_nd_range_kernel
 
     def noted(queue, *args, **kwargs):
         queues.append(queue.int_ptr)
-        return launch(queue, *args, **kwargs)
+        return enqueue(queue, *args, **kwargs)
 
     monkeypatch.setattr(cl, "enqueue_nd_range_kernel", noted)
-    kernel = runtime.kernel(scale_file, "scale", {"ADD": 1})
+    launch = runtime.bind(scaling(scale_file), {"ADD": 1}, factor=1, n=4)
     with runtime.buffer((4,)) as x:
         runtime.fill(x, 0)
-        args = (kernel, 4, None, x, np.float32(1), np.uint32(4))
-        runtime.launch(*args)
+        launch.set(x=x)
+        launch(4)
         with runtime.queue_scope():
             with runtime.queue_scope():
-                runtime.launch(*args)
-            runtime.launch(*args)
-        runtime.launch(*args)
+                launch(4)
+            launch(4)
+        launch(4)
         assert np.all(runtime.download(x) == 4)
     outer, innermost, inner, last = queues
     assert outer == last
@@ -285,11 +289,11 @@ def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
     monkeypatch.setattr(profiling, "PENDING_LIMIT", 3)
     monkeypatch.setenv("PYVISTA_VDI_PROFILE", "1")
     profiled = fresh_runtime(runtime)
-    kernel = profiled.kernel(scale_file, "scale", {"ADD": 1})
+    launch = profiled.bind(scaling(scale_file), {"ADD": 1}, factor=1, n=4)
     with profiled.buffer((4,)) as x:
         profiled.fill(x, 0)
         for _ in range(7):
-            profiled.launch(kernel, 4, None, x, np.float32(1), np.uint32(4))
+            launch(4, x=x)
         profiled.download(x)
     rows = {row.name: row for row in profiled.profile()}
     assert {name: row.calls for name, row in rows.items()} == {"scale": 7, "[fill]": 1, "[read]": 1}
@@ -300,17 +304,17 @@ def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
 
 
 def test_a_scope_can_be_profiled_by_itself(runtime, scale_file):
-    kernel = runtime.kernel(scale_file, "scale", {"ADD": 1})
+    launch = runtime.bind(scaling(scale_file), {"ADD": 1}, factor=1, n=4)
     profile = profiling.Profile()
     with runtime.buffer((4,)) as x:
         runtime.fill(x, 0)
-        args = (kernel, 4, None, x, np.float32(1), np.uint32(4))
+        launch.set(x=x)
         with runtime.queue_scope(profile):
-            runtime.launch(*args)
+            launch(4)
             with runtime.queue_scope():  # another's work, in the same thread
-                runtime.launch(*args)
+                launch(4)
             runtime.download(x)
-        runtime.launch(*args)
+        launch(4)
         assert np.all(runtime.download(x) == 3)
     calls = {row.name: row.calls for row in profile.figures()}
     assert calls == {"scale": 1, "[read]": 1}

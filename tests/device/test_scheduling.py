@@ -122,7 +122,7 @@ def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
             threading.Event().wait(3 * turns.POLL)  # the frame would be drawn by now
             order.append("piece")
             while order == ["piece"]:
-                each.checkpoint()
+                each.give_way()
             order.append("work")
 
     thread = InThread(work)
@@ -136,7 +136,7 @@ def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
 
 def test_frames_without_pause_leave_a_turn_each(monkeypatch):
     for limit in ("FIRST_TURN", "SHORTEST_TURN", "SHARE"):
-        monkeypatch.setattr(turns, limit, 0.0)  # a turn is over at every checkpoint
+        monkeypatch.setattr(turns, limit, 0.0)  # a turn is over at every give_way
     each, frames_before = Turns(), []
     begun, done = threading.Event(), threading.Event()
 
@@ -145,7 +145,7 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
             begun.set()
             for k in range(20):
                 while frames == k:
-                    each.checkpoint()
+                    each.give_way()
                 frames_before.append(frames)
         done.set()
 
@@ -174,17 +174,17 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
 )
 def test_a_turn_is_a_share_of_a_recent_frame_within_limits(clock, frames, turn):
     each = Turns()
-    assert each.checkpoint() == np.inf  # no background work
+    assert each.give_way() == np.inf  # no background work
     for frame in frames:
         with each.foreground():
             clock[0] += frame
     with each.background(never):
-        assert each.checkpoint() == pytest.approx(turn)
+        assert each.give_way() == pytest.approx(turn)
         if turn < turns.LONGEST_PIECE:
             clock[0] += 0.75 * turn
-            assert each.checkpoint() == pytest.approx(0.25 * turn)
+            assert each.give_way() == pytest.approx(0.25 * turn)
             clock[0] += (0.26 - turns.LEAST_REMAINDER) * turn  # no useful piece fits: a new turn
-            assert each.checkpoint() == pytest.approx(turn)
+            assert each.give_way() == pytest.approx(turn)
 
 
 def test_pieces_follow_the_slowest_of_the_last():
@@ -222,7 +222,7 @@ def test_workers_take_turns_with_each_other():
         with each.background(never):
             while len(set(seen)) < 2:  # without turns, the first would go on for ever
                 seen.append(name)
-                each.checkpoint()
+                each.give_way()
 
     threads = [InThread(work, name) for name in "ab"]
     begun.wait()
@@ -264,9 +264,9 @@ def test_cancelled_work_ends_while_a_frame_waits_for_it():
         with pytest.raises(Cancelled):
             thread.value()
     assert_free(each)
-    # And else at its next checkpoint
+    # And else at its next give_way
     with pytest.raises(Cancelled), each.background(lambda: True):
-        each.checkpoint()
+        each.give_way()
     assert_free(each)
 
 
@@ -288,7 +288,7 @@ def test_a_lock_is_handed_over_between_frame_and_work():
         with each.background(never), each.holding(lock):
             held.set()
             while not in_frame.is_set():
-                each.checkpoint()
+                each.give_way()
             order.append("work")
 
     def frame():
@@ -326,6 +326,13 @@ __kernel void group_numbers(__global uint *x)
 """
 
 
+def declared(path, name):
+    """The kernel ``index`` or ``chase`` of a file."""
+    index = {"x": "uint*", "wide": "uint"}
+    chase = {"next": "uint*", "end": "uint*", "steps": "uint"}
+    return ocl.KernelDeclaration(path, name, **(index if name == "index" else chase))
+
+
 @pytest.fixture
 def kernels(tmp_path):
     path = tmp_path / "kernels.cl"
@@ -341,12 +348,11 @@ def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch,
     pieces = []
     monkeypatch.setattr(turns.Worker, "piece", lambda *_: 2048)
     monkeypatch.setattr(turns.Worker, "took", lambda self, kind, items, _: pieces.append(items))
-    kernel = runtime.kernel(kernels, "index")
     n = int(np.prod(size))
     with runtime.buffer((n,), np.uint32) as x:
         with runtime.background():
             runtime.fill(x, 0)
-            runtime.launch(kernel, size, group, x, np.uint32(size[0]))
+            runtime.bind(declared(kernels, "index"), x=x, wide=size[0])(size, group)
         np.testing.assert_array_equal(runtime.download(x), np.arange(1, n + 1))
     assert sum(pieces) == n
     assert n <= 4096 or len(pieces) > 1
@@ -392,7 +398,7 @@ def test_copies_in_pieces(runtime):
 
 
 def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernels):
-    kernel = runtime.kernel(kernels, "index")
+    launch = runtime.bind(declared(kernels, "index"), wide=64)
     array = np.zeros(2**21, np.uint32)
     unwanted = threading.Event()
     with runtime.background(unwanted.is_set), runtime.buffer(array.shape, np.uint32) as x:
@@ -401,7 +407,7 @@ def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernel
         unwanted.set()
         errors = []  # kept, and with them what their frames hold
         for use in (
-            lambda: runtime.launch(kernel, 64, 64, x, np.uint32(64)),
+            lambda: launch(64, 64, x=x),
             lambda: runtime.write(x, array),
             lambda: runtime.download(x),
             lambda: runtime.upload(unaligned),
@@ -439,17 +445,17 @@ def ring():
 
 
 def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels):
-    kernel = runtime.kernel(kernels, "chase")
+    chase = declared(kernels, "chase")
     with runtime.upload(ring()) as shared, runtime.buffer((64,), np.uint32) as own:
-        launch = (kernel, 64, 64, shared, own, np.uint32(1))
+        launch = runtime.bind(chase, next=shared, end=own, steps=1)
         assert own.readers is None
         assert shared.readers == (set() if runtime.is_cpu else None)
         if not runtime.is_cpu:
             return
         with runtime.queue_scope():
-            runtime.launch(*launch)
+            launch(64, 64)
             (inner,) = shared.readers
-        runtime.launch(*launch)
+        launch(64, 64)
         assert len(shared.readers) == 1  # the other queue is gone
         assert inner not in shared.readers
 
@@ -457,14 +463,14 @@ def test_memory_in_place_knows_the_queues_that_read_it(runtime, kernels):
 @pytest.mark.parametrize("own_queue", [False, True])
 def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, own_queue):
     """Whatever thread releases it, and whichever queue reads it."""
-    kernel = runtime.kernel(kernels, "chase")
     array, steps = ring(), 2**20  # tens of milliseconds: the kernel runs when release() is called
     with (
         runtime.buffer((64,), np.uint32) as end,
         runtime.queue_scope() if own_queue else contextlib.nullcontext(),
     ):
         shared = runtime.upload(array)
-        runtime.launch(kernel, 64, 64, shared, end, np.uint32(steps))
+        launch = runtime.bind(declared(kernels, "chase"), next=shared, end=end, steps=steps)
+        launch(64, 64)
         InThread(shared.release).value()
         array[...] = 0  # in place of freeing it, which would crash some time later, or not
         np.testing.assert_array_equal(runtime.download(end), (np.arange(64) + steps) % 64)
@@ -503,10 +509,9 @@ def test_a_thread_waits_for_its_own_queue_only(runtime, finished):
 
 
 def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime, kernels, finished):
-    kernel = runtime.kernel(kernels, "index")
     with runtime.queue_scope():
         buffer = runtime.result((64,), np.uint32)
-        runtime.launch(kernel, 64, 64, buffer, np.uint32(64))
+        runtime.bind(declared(kernels, "index"), x=buffer, wide=64)(64, 64)
         runtime.finish()
         before = sum(finished)
         buffer.release()

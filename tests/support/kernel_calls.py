@@ -6,7 +6,11 @@ from contextlib import ExitStack
 
 import numpy as np
 
+from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, padded
+from pyvista_vdi.device.declarations import SCALARS
+
 GROUP = 64
+TYPES = {number.name: name for name, number in SCALARS.items()}
 
 
 class Output:
@@ -39,21 +43,23 @@ class Caller:
         The kernel's first parameter is ``items``. Arrays are uploaded but for those whose place
         is in ``by_value`` (vectors).
         """
-        function = self._runtime.kernel(self._folder / file, kernel, defines)
         with ExitStack() as stack:
-            given, written = [], []
+            kinds, given, written = {"items": "int"}, {}, []
             for place, argument in enumerate(arguments):
+                value, name = argument, f"a{place}"
                 if isinstance(argument, Output):
                     values = argument.values
-                    buffer = stack.enter_context(self._runtime.buffer(values.shape, values.dtype))
-                    self._runtime.write(buffer, values)
-                    written.append(buffer)
-                    given.append(buffer)
+                    value = stack.enter_context(self._runtime.buffer(values.shape, values.dtype))
+                    self._runtime.write(value, values)
+                    written.append(value)
                 elif isinstance(argument, np.ndarray) and place not in by_value:
-                    given.append(stack.enter_context(self._runtime.upload(argument)))
-                else:
-                    given.append(argument)
-            padded = -(-items // GROUP) * GROUP
-            self._runtime.launch(function, padded, GROUP, np.int32(items), *given)
+                    value = stack.enter_context(self._runtime.upload(argument))
+                count = np.size(value) if isinstance(value, np.ndarray) else 1
+                star = "*" if isinstance(value, DeviceBuffer) else ""
+                kinds[name] = f"{TYPES[value.dtype.name]}{count if count > 1 else ''}{star}"
+                given[name] = value
+            declaration = KernelDeclaration(self._folder / file, kernel, **kinds)
+            launch = self._runtime.bind(declaration, defines, items=items, **given)
+            launch(padded(items, GROUP), GROUP)
             results = [self._runtime.download(buffer) for buffer in written]
         return results[0] if len(results) == 1 else results

@@ -6,9 +6,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-from pyvista_vdi.device import Runtime, aligned_empty, get_runtime, kept_together
+from pyvista_vdi.device import (
+    DeviceBuffer,
+    Runtime,
+    aligned_empty,
+    get_runtime,
+    kept_together,
+    padded,
+)
 from pyvista_vdi.errors import DeviceError, InvalidVDIError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.extensions.series.codes import Codes, Samples, Tables
 from pyvista_vdi.extensions.series.differences import (
@@ -20,6 +27,7 @@ from pyvista_vdi.extensions.series.differences import (
     Stepped,
     unfolded,
 )
+from pyvista_vdi.extensions.series.kernels import DECODE_LISTS
 from pyvista_vdi.model.packing import GRID, TAU_BASE, TAU_CODES, Packed8, check_grid
 
 #: The arrays that are read by supersegment or by list, in the kernel's order.
@@ -135,51 +143,58 @@ def decoded_on(
         return None
     n = int(places.starts[-1])
     check_grid(step, *(np.empty(0, np.int64),) * 3)  # of the step alone: the kernel looks at lists
-    nothing = np.zeros(2, np.int32)
     base, streams = _together(arrays)
-    trouble = np.zeros(1, np.int32)
     defines = {"GRID": GRID, "TAU_BASE": TAU_BASE, "TAU_CODES": TAU_CODES}
     if pitches is None:
         defines["PLAIN"] = 1
+    was: dict[str, NDArray[Any]] = {}
+    if old is not None:
+        packing = old.packing
+        was = {"starts": old.offsets, "origins": packing.origins, "strides": packing.strides}
+        was |= {"words": packing.words, "entries": old.entries}
     with kept_together() as keep:
 
-        def up(array: NDArray[Any], name: str) -> Any:
-            return keep(runtime.upload(array if array.size else nothing, name))
+        def up(array: NDArray[Any] | None, dtype: DTypeLike, name: str) -> DeviceBuffer:
+            """Bring an array to the device, or something in the place of none."""
+            if array is None or not array.size:
+                array = np.zeros(2, dtype)
+            return keep(runtime.upload(array, name))
 
         origins = keep(runtime.result((n_lists,), np.int32, "origins of lists"))
         strides = keep(runtime.result((n_lists,), np.uint16, "strides of lists"))
         words = keep(runtime.result((max(n, 1), 2), np.uint32, "supersegments", lasting=True))
         entries = keep(runtime.result((max(n, 1),), np.uint8, "entries"))
-        told = keep(runtime.buffer((1,), np.int32, "trouble"))
-        runtime.write(told, trouble)
-        runtime.launch(
-            runtime.kernel("series/decode.cl", "decode_lists", defines),
-            -(-n_lists // _GROUP) * _GROUP,
-            _GROUP,
-            np.int32(n_lists),
-            up(how, "how lists are written"),
-            up(places.starts, "list offsets"),
-            up(places.table, "places"),
-            *(up(values, "what is left of lists") for values in left),
-            up(nothing.astype(np.float64) if pitches is None else pitches, "pitches"),
-            up(base, "arrays of a step"),
-            up(streams, "places of arrays"),
-            up(arrays.get("kept", nothing), "kept supersegments"),
-            up(arrays.get("kept_there", nothing), "supersegments that were kept"),
-            up(nothing if old is None else old.offsets, "list offsets before"),
-            up(nothing if old is None else old.packing.origins, "origins before"),
-            up(nothing.astype(np.uint16) if old is None else old.packing.strides, "strides before"),
-            up(nothing if old is None else old.packing.words, "supersegments before"),
-            up(nothing.astype(np.uint8) if old is None else old.entries, "entries before"),
-            up(tables.colors, "colours of entries"),
-            up(tables.extinctions, "extinctions of entries"),
-            origins,
-            strides,
-            words,
-            entries,
-            told,
+        trouble = keep(runtime.buffer((1,), np.int32, "trouble"))
+        runtime.fill(trouble, np.int32(0))
+        decode = runtime.bind(
+            DECODE_LISTS,
+            defines,
+            n_lists=n_lists,
+            how=up(how, "u1", "how lists are written"),
+            starts=up(places.starts, "i4", "list offsets"),
+            places=up(places.table, "i4", "places"),
+            pitches=up(pitches, "f8", "pitches"),
+            data=up(base, "u1", "arrays of a step"),
+            streams=up(streams, "u4", "places of arrays"),
+            kept=up(arrays.get("kept"), "u1", "kept supersegments"),
+            kept_there=up(arrays.get("kept_there"), "u1", "supersegments that were kept"),
+            old_starts=up(was.get("starts"), "i4", "list offsets before"),
+            old_origins=up(was.get("origins"), "i4", "origins before"),
+            old_strides=up(was.get("strides"), "u2", "strides before"),
+            old_words=up(was.get("words"), "u4", "supersegments before"),
+            old_entries=up(was.get("entries"), "u1", "entries before"),
+            colors=up(tables.colors, "u1", "colours of entries"),
+            extinctions=up(tables.extinctions, "f4", "extinctions of entries"),
+            origins=origins,
+            strides=strides,
+            words=words,
+            entries=entries,
+            trouble=trouble,
         )
-        if runtime.download(told)[0]:
+        for name, values in zip(("origins_left", "strides_left", "shifts"), left, strict=True):
+            decode.set(**{name: up(values, "i4", "what is left of lists")})
+        decode(padded(n_lists, _GROUP), _GROUP)
+        if runtime.download(trouble)[0]:
             return None
         packing = Packed8(
             step,
