@@ -134,18 +134,14 @@ class Records:
         self.runtime.fill(self.counts, np.uint32(0))
         self.runtime.fill(self.thresholds, self.finest)
 
-    def make_room(self, *, last: bool) -> None:
+    def make_room(self, *, last: bool = False) -> None:
         """Fit records without room for another chunk of steps, behind the last one if it must be.
 
         What is least unlike is merged, and such a ray's threshold is raised. At least error
         :meth:`fit` does it behind the last chunk.
         """
         if self._cut is not None or not last:
-            self.shorten()
-
-    def shorten(self) -> None:
-        """Merge what is least unlike in records that are longer than is kept."""
-        self._shorten(self.items, view=self.view, recording=self.recording, exactly=False)
+            self._shorten(self.items, view=self.view, recording=self.recording, exactly=False)
 
     def fit(self) -> None:
         """Merge at least error, or cut by homogeneity, until the budget is kept."""

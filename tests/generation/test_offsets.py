@@ -7,7 +7,7 @@ import contextlib
 import numpy as np
 import pytest
 
-from pyvista_vdi.device import LocalMemory
+from pyvista_vdi.generation.kernels import LIST_OFFSETS, SUM_LENGTHS
 
 LISTS_PER_ITEM = 16  # see generation/offsets.cl
 UNTOUCHED = np.uint64(0xA5A5A5A5A5A5A5A5)
@@ -24,9 +24,6 @@ def lengths_of(kind, n, seed):
 
 def summed(runtime, slices, group):
     """Offsets that the device makes of slices of lengths, one behind the other."""
-    kernels = [
-        runtime.kernel("generation/offsets.cl", name) for name in ("sum_lengths", "list_offsets")
-    ]
     most = max(map(len, slices))
     room = np.full(sum(map(len, slices)) + 3, UNTOUCHED)
     room[0] = 0
@@ -35,13 +32,16 @@ def summed(runtime, slices, group):
         runtime.buffer((-(-most // (group * LISTS_PER_ITEM)),), np.uint64) as sums,
     ):
         runtime.write(offsets, room)
+        shared = {"partial": group, "sums": sums}
+        sum_lengths = runtime.bind(SUM_LENGTHS, **shared)
+        list_offsets = runtime.bind(LIST_OFFSETS, **shared, all_offsets=offsets)
         made = 0
         for lengths in slices:
             blocks = -(-len(lengths) // (group * LISTS_PER_ITEM))
             with runtime.upload(lengths) as given:
-                shared = (np.uint32(len(lengths)), given, LocalMemory(8 * group), sums)
-                runtime.launch(kernels[0], blocks * group, group, *shared)
-                runtime.launch(kernels[1], blocks * group, group, *shared, np.uint32(made), offsets)
+                of_slice = {"lists": len(lengths), "lengths": given}
+                sum_lengths(blocks * group, group, **of_slice)
+                list_offsets(blocks * group, group, **of_slice, made=made)
             made += len(lengths)
         return runtime.download(offsets)
 

@@ -10,6 +10,7 @@ from strategies import camera_around
 
 from pyvista_vdi import TransferFunction, Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.kernels import MACROCELL_DISTANCES
 from pyvista_vdi.volume.variant import Variant
 
 MOST = 16
@@ -20,19 +21,13 @@ def test_distances_of_blocks_are_chessboard_distances(runtime, share):
     rng = np.random.default_rng(7)
     shape = (23, 9, 40)
     visible = rng.random(shape) < share
-    kernel = runtime.kernel(
-        "volume/macrocells.cl",
-        "macrocell_distances",
-        Variant().defines,
-    )
+    launch = runtime.bind(MACROCELL_DISTANCES, Variant().defines, most=MOST)
     found = np.where(visible, 0, MOST).astype(np.uint8)
     n, apart = found.size, 1
     for along in reversed(shape):
         with runtime.upload(found) as before, runtime.buffer(shape, np.uint8) as after:
-            runtime.launch(
-                kernel, -(-n // 64) * 64, 64, before, np.uint32(n), np.uint32(apart),
-                np.int32(along), np.int32(MOST), after,
-            )  # fmt: skip
+            launch.set(before=before, distances=after)
+            launch(-(-n // 64) * 64, 64, macrocells=n, apart=apart, along=along)
             found = runtime.download(after)
         apart *= along
     if visible.any():

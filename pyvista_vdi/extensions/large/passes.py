@@ -483,7 +483,7 @@ def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece])
                 of_part = piece.rows(first, first + part.rows)
                 if len(of_part.runs):
                     _append(records, of_part)
-                    records.shorten()  # each ray by what it has itself, whatever the rows
+                    records.make_room()  # each ray by what it has itself, whatever the rows
             records.fit()
             if part.number > 0:
                 lists.wait()
