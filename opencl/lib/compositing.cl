@@ -1,16 +1,23 @@
-// Front-to-back compositing by "over" (docs/conventions.md, "A supersegment is a homogeneous medium").
+// Front-to-back compositing by "over" (docs/conventions.md, "A supersegment is a homogeneous
+// medium").
 //
-// -D COMPENSATED  for rays that may meet so many media that their roundings add up to what one sees (docs/numerics.md,
-//                 "Accumulated rounding"):
-//                     1  opacity is summed up from 0, so that what is nearly transparent keeps its digits
-//                     2  and every sum carries what it rounds off (Kahan)
+// -D COMPENSATED  for rays that may meet so many media that their roundings add up to what one sees
+//                 (docs/numerics.md, "Accumulated rounding"):
+//                     0  no (default)
+//                     1  opacity is summed up from 0, so that what is nearly transparent keeps its
+//                        digits
+//                     2  every sum carries what it rounds off (Kahan)
 #include "lib/lanes.cl"
 #include "lib/opacity.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
+#ifndef COMPENSATED
+#define COMPENSATED 0
+#endif
+
 typedef struct {
     Real4 sums;         // premultiplied red, green and blue; transmittance
-    Real4 compensation; // if COMPENSATED: w is the opacity, or each is what the sum was rounded up by
+    Real4 compensation; // 1: w is the opacity; 2: what each sum was rounded up by
 } Seen;
 
 inline Seen nothing_seen()
@@ -22,47 +29,58 @@ inline Seen nothing_seen()
     return seen;
 }
 
-#if defined(COMPENSATED) && COMPENSATED == 2
-#define ADD_TO_SUM(component, summand)                                                                        \
-    {                                                                                                         \
-        const Real sum = seen->sums.component;                                                                \
-        const Real term = (summand) - seen->compensation.component;                                           \
-        seen->sums.component = sum + term;                                                                    \
-        seen->compensation.component = (seen->sums.component - sum) - term;                                   \
-    }
-#else
-#define ADD_TO_SUM(component, summand) seen->sums.component += (summand);
-#endif
+// A sum, and what it was rounded up by.
+typedef struct {
+    Real value, rounded_up;
+} Sum;
 
-// Composite straight `color` (xyz) behind what has been seen; `weight` is its opacity times the transmittance before it.
+inline Sum sum_of(Real value, Real rounded_up, Real summand)
+{
+    Sum sum = {value + summand, rounded_up};
+    if (COMPENSATED == 2) {
+        const Real term = summand - rounded_up;
+        sum.value = value + term;
+        sum.rounded_up = (sum.value - value) - term;
+    }
+    return sum;
+}
+
+// Composite straight `color` (xyz) behind what has been seen; `weight` is its opacity times the
+// transmittance before it.
 inline void composite_over(Seen *seen, Real weight, Real4 color)
 {
-    ADD_TO_SUM(x, weight * color.x)
-    ADD_TO_SUM(y, weight * color.y)
-    ADD_TO_SUM(z, weight * color.z)
-#if defined(COMPENSATED) && COMPENSATED == 1
-    seen->compensation.w += weight;
-    seen->sums.w = 1.0f - seen->compensation.w;
-#else
-    ADD_TO_SUM(w, -weight)
-#endif
+    const Sum red = sum_of(seen->sums.x, seen->compensation.x, weight * color.x);
+    const Sum green = sum_of(seen->sums.y, seen->compensation.y, weight * color.y);
+    const Sum blue = sum_of(seen->sums.z, seen->compensation.z, weight * color.z);
+    seen->sums.x = red.value;
+    seen->sums.y = green.value;
+    seen->sums.z = blue.value;
+    seen->compensation.x = red.rounded_up;
+    seen->compensation.y = green.rounded_up;
+    seen->compensation.z = blue.rounded_up;
+    if (COMPENSATED == 1) {
+        seen->compensation.w += weight;
+        seen->sums.w = 1.0f - seen->compensation.w;
+    } else {
+        const Sum transmittance = sum_of(seen->sums.w, seen->compensation.w, -weight);
+        seen->sums.w = transmittance.value;
+        seen->compensation.w = transmittance.rounded_up;
+    }
 }
 
 // Composite a medium of straight colour for the rays that are chosen.
 inline void composite_medium(Seen *seen, Real optical_depth, Real4 color, Int chosen)
 {
-    composite_over(seen, SELECT((Real)(0.0f), seen->sums.w * opacity_of(optical_depth), chosen), color);
+    const Real weight = seen->sums.w * opacity_of(optical_depth);
+    composite_over(seen, SELECT((Real)(0.0f), weight, chosen), color);
 }
 
 inline Real alpha_seen(const Seen *seen)
 {
-#if !defined(COMPENSATED)
-    return 1.0f - seen->sums.w;
-#elif COMPENSATED == 1
-    return fmin(seen->compensation.w, 1.0f);
-#else
-    return (1.0f - seen->sums.w) + seen->compensation.w;
-#endif
+    if (COMPENSATED == 1)
+        return fmin(seen->compensation.w, 1.0f);
+    const Real alpha = 1.0f - seen->sums.w;
+    return COMPENSATED == 2 ? alpha + seen->compensation.w : alpha;
 }
 
 // Premultiplied RGBA of what was composited.

@@ -243,14 +243,15 @@ class _MergedCells:
             self._walks.append(_Walk(strategy.build(scene), strategy.rays, walk, shift))
         defines: Defines = {
             "STREAMS": len(scenes),
-            "SEGMENTS": scenes[0].segments,
             **compensation(sum(scene.prepared.media for scene in scenes)),
         }
         in_blocks = self._in_rows and defines.get("COMPENSATED") != 2
         self._merged_rays = LANES if in_blocks else 1
-        defines["LANES"] = self._merged_rays
-        name = "merge_blocks" if in_blocks else "merge"
-        self._merge = runtime.kernel("multi_vdi/merge.cl", name, defines)
+        if in_blocks:
+            self._merge = runtime.kernel("cpu16/merge.cl", "merge_blocks", defines)
+        else:
+            defines["SEGMENT_ROWS"] = int(self._in_rows)
+            self._merge = runtime.kernel("multi_vdi/merge.cl", "merge", defines)
 
     def draw(
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer

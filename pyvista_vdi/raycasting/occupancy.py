@@ -27,6 +27,12 @@ _ROUNDINGS = 32
 #: it gains at .30 and loses from .39 on (docs/decisions/gpu.md).
 _WORTHWHILE, _WORTHWHILE_ON_GPU = 0.8, 1 / 3
 
+#: The kernels' grid as it is counted.
+_COUNTED = np.dtype(
+    [(name, np.int32) for name in ("width", "height", "stacks_wide")]
+    + [(name, np.float32) for name in ("first_depth", "slabs_per_depth", "margin")]
+)
+
 
 class OccupancyGrid:
     """How many supersegments reach into each cell: stacks of 64 slabs over 16 x 16 lists.
@@ -74,21 +80,17 @@ class OccupancyGrid:
             self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
             self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
             defines: dict[str, str | int] = {"OFFSET_T": "ulong" if long_offsets else "uint"}
-            if isinstance(vdi.packing, Packed8):
-                defines["PACKED"] = 8
+            count = "count_packed" if isinstance(vdi.packing, Packed8) else "count_supersegments"
+            grid = np.zeros((), _COUNTED)
+            grid[()] = (width, height, wide, self.first_depth, self.slabs_per_depth, self.margin)
             runtime.fill(self.counts, np.uint32(0))
             runtime.launch(
-                runtime.kernel("raycasting/occupancy.cl", "count_supersegments", defines),
+                runtime.kernel("raycasting/occupancy.cl", count, defines),
                 -(-width * height // GROUP) * GROUP,
                 GROUP,
                 offsets,
                 *faces,
-                np.int32(width),
-                np.int32(height),
-                np.int32(wide),
-                np.float32(self.first_depth),
-                np.float32(self.slabs_per_depth),
-                np.float32(self.margin),
+                grid,
                 self.counts,
             )
             runtime.launch(

@@ -73,9 +73,8 @@ def packets_of(
     if lit * crossed.sum() < least * across_packet.sum():
         return None
     along, across = (part.x0, part.x1), (part.y0, part.y1)
-    defines: dict[str, str | int | None] = {}
+    defines: dict[str, str | int | None] = {"UPRIGHT": int(upright), "SWEEP_V": 0}
     if upright:
-        defines["UPRIGHT"] = 1
         along, across = across, along
         epipole = epipole[[1, 0, 2]]
     if crossed[1] > crossed[0]:

@@ -87,6 +87,7 @@ class PreparedVDI:
         self.list_rows = self.list_space(vdi.camera)
         #: Bytes of a packed supersegment; 0 where they are exact.
         self.packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
+        self.depth_step = 1.0
         self._upload(vdi)
 
     def _double_float(self, vdi: VDI, depths: tuple[float, float]) -> int:
@@ -109,18 +110,17 @@ class PreparedVDI:
     @property
     def list_bytes(self) -> int:
         """Bytes of the lists on the device: headers and supersegments."""
-        return sum(buffer.nbytes for buffer in (self.headers, *self.lists))
+        return sum(buffer.nbytes for buffer in {self.headers, *self.lists})
 
     @property
     def defines(self) -> dict[str, str | int | None]:
         """``-D`` names that fix the kernels' shape for this VDI."""
-        defines: dict[str, str | int | None] = {"OFFSET_T": "long" if self.long_offsets else "int"}
-        if self.parallel:
-            defines["PARALLEL"] = 1
-        if self.shifted:
-            defines["SHIFTED"] = 1
-        if self.packed:
-            defines["PACKED"] = self.packed
+        depth = "PARALLEL" if self.parallel else "SHIFTED" if self.shifted else "RECIPROCAL"
+        defines: dict[str, str | int | None] = {
+            "OFFSET_T": "long" if self.long_offsets else "int",
+            "DEPTH": depth,
+            "PACKED": self.packed,
+        }
         if self.double_float:
             defines["DOUBLE_FLOAT_RAYS"] = self.double_float
         return defines
@@ -245,10 +245,11 @@ class PreparedVDI:
                 np.int32(wide),
                 np.int32(high),
                 directions,
-                *lists,
+                lists[0],
+                lists[-1],
             )
             runtime.finish()  # the buffers above may be host memory in use
-        return (*lists, keep(self._constants(1.0))) if packed else lists
+        return (lists[0], lists[-1])
 
     def _prepare_packed(
         self,
@@ -286,13 +287,10 @@ class PreparedVDI:
                 words,
             )
             faces = (origins, strides, stored, np.float32(packing.step))
+            self.depth_step = packing.step
             self._note_occupied(vdi, starts, faces, keep)
             runtime.finish()  # the buffers above may be host memory in use
-        self.lists = (words, keep(self._constants(packing.step)))
-
-    def _constants(self, step: float) -> DeviceBuffer:
-        constants = np.array([step, self.nearest - self.depth_origin], np.float32)
-        return self.runtime.upload(constants, "constants of depths")
+        self.lists = (words, words)
 
 
 def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:

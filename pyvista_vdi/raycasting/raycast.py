@@ -91,8 +91,8 @@ def enqueue(scene: Scene, walk: tuple[Any, ...], image: DeviceBuffer) -> None:
     strategy = strategy_for(scene)
     pixels = scene.size[0] * scene.size[1]
     if not strategy.whole and scene.only is None and scene.part.pixels < pixels:
-        defines = {} if scene.hit is None else {"FIRST_HIT": 1}
-        clear = runtime.kernel("raycasting/clear.cl", "clear_image", defines)
+        name = "clear_image" if scene.hit is None else "clear_hits"
+        clear = runtime.kernel("raycasting/clear.cl", name)
         padded = -(-pixels // _CLEARING_GROUP) * _CLEARING_GROUP
         runtime.launch(clear, padded, _CLEARING_GROUP, np.uint64(pixels), image)
     launch = strategy.launch(scene)

@@ -29,6 +29,33 @@ _COORDINATE_FORMS = 4
 #: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
 
+#: The scalars that every kernel takes which draws a frame: ``opencl/raycasting/frame.cl``.
+FRAME = np.dtype(
+    [
+        (name, np.int32)
+        for name in (
+            "lists_wide",
+            "lists_high",
+            "width",
+            "height",
+            "planes",
+            "has_opaque_depth",
+        )
+    ]
+    + [
+        (name, np.float32)
+        for name in (
+            "depth_origin",
+            "cutoff",
+            "first_depth",
+            "slabs_per_depth",
+            "depth_step",
+            "nearest_offset",
+        )
+    ]
+    + [("regions", np.uint32)]
+)
+
 #: A frame's forms and the ends of its rays, on the device.
 OnDevice: TypeAlias = tuple[DeviceBuffer, DeviceBuffer]
 
@@ -96,12 +123,10 @@ class Scene:
     @cached_property
     def defines(self) -> Defines:
         """``-D`` names that every kernel which draws the scene has."""
-        defines = {**self.prepared.defines, **self.cropped.defines}
+        defines = {**self.prepared.defines, "CROPPED": int(self.in_regions)}
         if self.segments:
-            defines["SEGMENTS"] = self.segments
-        elif self.hit is not None:
-            defines["FIRST_HIT"] = 1
-        else:
+            defines["SEGMENT_ROWS"] = self.segments - 1
+        elif self.hit is None:
             defines.update(compensation(self.options.preview_samples or self.prepared.media))
         return defines
 
@@ -109,7 +134,7 @@ class Scene:
     def skipping(self) -> Defines:
         """``-D`` names of kernels that pass by what is empty: none where that does not pay."""
         skips = self.options.skip_empty and self.prepared.occupancy.worthwhile
-        return {"SKIP_EMPTY": 1} if skips else {}
+        return {"SKIP_EMPTY": int(skips)}
 
     @property
     def in_regions(self) -> bool:
@@ -196,23 +221,25 @@ class Scene:
     ) -> tuple[Any, ...]:
         """Return the arguments that every kernel which walks through the lists begins with."""
         prepared, cutoff = self.prepared, self.options.transmittance_cutoff
+        frame = np.zeros((), FRAME)
+        frame["lists_wide"], frame["lists_high"] = prepared.window
+        frame["width"], frame["height"] = self.size
+        frame["planes"] = self.planes
+        frame["has_opaque_depth"] = has_ends
+        frame["depth_origin"] = prepared.depth_origin
+        frame["cutoff"] = -math.log(cutoff) if self.segments else cutoff
+        frame["first_depth"] = prepared.occupancy.first_depth
+        frame["slabs_per_depth"] = prepared.occupancy.slabs_per_depth
+        frame["depth_step"] = prepared.depth_step
+        frame["nearest_offset"] = prepared.nearest - prepared.depth_origin
+        frame["regions"] = self.cropped.regions
         return (
             prepared.headers,
             *prepared.lists,
-            np.int32(prepared.window[0]),
-            np.int32(prepared.window[1]),
-            np.float32(prepared.depth_origin),
             forms,
-            np.int32(self.planes),
-            np.int32(self.size[0]),
-            np.int32(self.size[1]),
             ends,
-            np.int32(has_ends),
-            np.float32(-math.log(cutoff) if self.segments else cutoff),
             prepared.occupancy.masks,
-            np.float32(prepared.occupancy.first_depth),
-            np.float32(prepared.occupancy.slabs_per_depth),
-            *self.cropped.arguments,
+            frame,
         )
 
 

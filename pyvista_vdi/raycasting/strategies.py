@@ -58,6 +58,11 @@ class Strategy:
     def build(self, scene: Scene) -> Kernel:
         """Return the kernel for a scene."""
         defines = {**scene.defines, **self.defines(scene)}
+        if self.file in ("cpu16/raycast.cl", "cpu16/segments.cl"):
+            for name in ("PACKED", "OFFSET_T", "SEGMENT_ROWS"):
+                defines.pop(name, None)
+        elif self.file.startswith("cpu16"):
+            defines.pop("CROPPED")
         return scene.prepared.runtime.kernel(self.file, self.kernel, defines)
 
 
@@ -91,16 +96,17 @@ def _columns(scene: Scene, rays: int = 1) -> Launch:
 
 
 def _ray_by_ray_defines(scene: Scene) -> Defines:
-    return {**scene.skipping, "ONE_LIST": 1} if scene.one_list else scene.skipping
+    if scene.segments:
+        return scene.skipping
+    return {**scene.skipping, "ONE_LIST": int(scene.one_list)}
 
 
 _BLOCKS = Strategy(
     "blocks",
-    "raycasting/raycast.cl",
+    "cpu16/raycast.cl",
     "raycast_blocks",
     supports=lambda scene: scene.in_blocks,
     launch=lambda scene: _columns(scene, LANES),
-    defines=lambda scene: {**scene.skipping, "LANES": LANES},
     rays=LANES,
 )
 _RAY_BY_RAY = Strategy(
@@ -125,13 +131,27 @@ STRATEGIES = (
     replace(
         _BLOCKS,
         name="segments in blocks",
+        file="cpu16/segments.cl",
+        kernel="segments_of_blocks",
         supports=lambda scene: scene.segments == 2 and scene.in_blocks,
     ),
-    replace(_RAY_BY_RAY, name="segments ray by ray", supports=lambda scene: scene.segments > 0),
-    replace(_RAY_BY_RAY, name="first hits", supports=lambda scene: scene.hit is not None),
+    replace(
+        _RAY_BY_RAY,
+        name="segments ray by ray",
+        file="multi_vdi/segments.cl",
+        kernel="segments",
+        supports=lambda scene: scene.segments > 0,
+    ),
+    replace(
+        _RAY_BY_RAY,
+        name="first hits",
+        file="raycasting/first_hits.cl",
+        kernel="first_hits",
+        supports=lambda scene: scene.hit is not None,
+    ),
     Strategy(
         "aligned view",
-        "raycasting/aligned_view.cl",
+        "cpu16/aligned_view.cl",
         "raycast_aligned_view",
         supports=lambda scene: scene.plain and scene.aligned is not None,
         launch=_aligned,
@@ -146,7 +166,7 @@ STRATEGIES = (
     ),
     Strategy(
         "packets",
-        "raycasting/packets.cl",
+        "cpu16/packets.cl",
         "raycast_packets",
         supports=lambda scene: scene.plain and scene.packets is not None,
         launch=_packets,

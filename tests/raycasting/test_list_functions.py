@@ -1,4 +1,4 @@
-"""opencl/raycasting/lists.cl: the first supersegment that a ray meets in a list, against a linear
+"""opencl/raycasting/first_supersegment.cl: the first supersegment that a ray meets in a list, against a linear
 scan.
 
 The paper's Algorithm 1 as printed is not what is tested here, but what it is for; the
@@ -27,7 +27,7 @@ def linear_scan(faces, depth, away):
 
 def check(call, lists, queries):
     """Compare answers with the scan. ``queries``: (list, depth, away, guess)."""
-    stride = call(FILE, "lists_per_bundle", 1, call.empty(1, dtype=np.int32), OFFSET_T="int")[0]
+    stride = call(FILE, "lists_per_bundle", 1, call.empty(1, dtype=np.int32))[0]
     faces = np.float32([face for faces in lists for face in faces]).reshape(-1, 2)
     flat = np.full((stride * len(faces) + 1, 2), np.nan, np.float32)  # nothing else is read
     flat[: stride * len(faces) : stride] = faces
@@ -38,9 +38,8 @@ def check(call, lists, queries):
     how = np.column_stack([away, guesses]).astype(np.int32)
     results = call.empty(len(queries), dtype=np.int32)
     found = call(
-        FILE, "counts_passing", len(queries), flat, places, np.float32(depths), how, results,
-        OFFSET_T="int",
-    )  # fmt: skip
+        FILE, "counts_passing", len(queries), flat, places, np.float32(depths), how, results
+    )
     # Made once for all guesses
     expected = {key: linear_scan(lists[key[0]], *key[1:]) for key in {q[:3] for q in queries}}
     wanted = np.array([expected[q[:3]] for q in queries])

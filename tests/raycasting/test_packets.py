@@ -87,7 +87,7 @@ REGIONS = {"cropping": ((-0.5, 0.5, -0.5, 0.5, -0.5, 0.5), "fence")}
         (CAMERA.replace(model_transform=np.eye(4)), WINDOW, {}, [OWN] * 3),
         (CAMERA.azimuth(1e-4), WINDOW, {}, [OWN] * 3),  # which no ray leaves its list by
         (CAMERA, SIZE, {}, ["raycast"] * 3),
-        (CAMERA, WINDOW, {"first_hit": FirstHit.of(0.5, True)}, ["raycast"] * 3),
+        (CAMERA, WINDOW, {"first_hit": FirstHit.of(0.5, True)}, ["first_hits"] * 3),
         (TURNED, WINDOW, {}, ["raycast_blocks", "raycast", "raycast"]),
         (CAMERA.azimuth(1), SIZE, {}, ["raycast_blocks", "raycast", "raycast"]),
         (CAMERA.replace(window_center=(1e-3, 0)), WINDOW, {}, ["raycast_blocks"] + 2 * ["raycast"]),
@@ -120,11 +120,11 @@ def test_how_far_light_gets():
 @pytest.mark.parametrize(
     ("camera", "defines"),
     [
-        (CAMERA.azimuth(30), {}),
-        (CAMERA.azimuth(-60), {}),
+        (CAMERA.azimuth(30), {"UPRIGHT": 0, "SWEEP_V": 0}),
+        (CAMERA.azimuth(-60), {"UPRIGHT": 0, "SWEEP_V": 0}),
         (CAMERA.elevation(30), {"UPRIGHT": 1, "SWEEP_V": 1}),
-        (CAMERA.azimuth(30).replace(view_up=(1, 0, 0)), {"UPRIGHT": 1}),
-        (CAMERA.elevation(30).replace(view_up=(1, 0, 0)), {"SWEEP_V": 1}),
+        (CAMERA.azimuth(30).replace(view_up=(1, 0, 0)), {"UPRIGHT": 1, "SWEEP_V": 0}),
+        (CAMERA.elevation(30).replace(view_up=(1, 0, 0)), {"UPRIGHT": 0, "SWEEP_V": 1}),
     ],
     ids=["to the right", "to the left", "up", "to the right and rolled", "up and rolled"],
 )
