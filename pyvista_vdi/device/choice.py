@@ -10,11 +10,21 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.buffers import LocalMemory, bytes_text
+from pyvista_vdi.device.buffers import bytes_text
+from pyvista_vdi.device.declarations import KernelDeclaration
 from pyvista_vdi.device.devices import Candidate, DeviceInfo
 from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
+PROBE = KernelDeclaration(
+    "lib/probe.cl",
+    "probe",
+    x="float*",
+    values="float4*",
+    group_sum="uint*",
+    total="uint*",
+    shared="local uint*",
+)
 PROBE_COUNT = 256
 PROBE_GROUP = 32
 # OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
@@ -24,6 +34,7 @@ PROBE_RTOL = 4 * 2.0**-23
 _lock = threading.RLock()
 _probed: dict[tuple[int, int], tuple[DeviceInfo, Runtime | None]] = {}
 _shared_contexts: dict[int, Runtime] = {}
+_default: Runtime | None = None
 
 
 def list_devices() -> list[DeviceInfo]:
@@ -71,17 +82,18 @@ def get_runtime(device: Any = None) -> Runtime:
     DeviceError
         In a fork of a process that had used or listed devices.
     """
-    devices.require_drivers()
+    if devices.forked:
+        devices.require_drivers()
     if isinstance(device, Runtime):
         return device
     origin = "device="
     if device is None:
         device = os.environ.get(devices.DEVICE_VARIABLE, "").strip() or None
         origin = f"{devices.DEVICE_VARIABLE}="
+    if device is None and _default is not None:
+        return _default
     with _lock:
-        if device is None:
-            return _default()
-        return _named(device, origin)
+        return _best() if device is None else _named(device, origin)
 
 
 def default_device(infos: list[DeviceInfo]) -> DeviceInfo | None:
@@ -105,87 +117,93 @@ def describe_devices() -> str:
     """
     _, notes = devices.find_candidates()
     infos = list_devices()
-    best = default_device(infos)
-    chosen, trouble = _chosen_by_user(infos)
-    used = chosen if chosen is not None else best
+    best, variable = default_device(infos), devices.DEVICE_VARIABLE
+    selector = os.environ.get(variable, "").strip()
+    if selector:
+        try:
+            best = devices.select(infos, selector, f"{variable}=")
+            last = f"Default: {best.full_name}, because {variable}={os.environ[variable]!r}."
+            if not best.usable:
+                last = f"No default: {_unusable(best, f'{variable}={selector!r}')}."
+        except NoDeviceError as exc:
+            best, last = None, f"No default: {exc}."
+    elif best is not None:
+        last = (
+            f"Default: {best.full_name}; GPUs come first, then CPUs, Intel's before PoCL.\n"
+            f"Choose another with device=, --device or {variable}."
+        )
+    else:
+        last = devices.no_device_message(infos, []) + "."
 
     lines = []
     for info in infos:
-        lines += _device_lines(info, info.index == (used.index if used and not trouble else None))
-    if trouble:
-        lines.append(trouble)
-    elif chosen is not None:
-        variable = f"{devices.DEVICE_VARIABLE}={os.environ[devices.DEVICE_VARIABLE]!r}"
-        lines.append(f"Default: {chosen.full_name}, because {variable}.")
-    elif best is not None:
-        lines.append(f"Default: {best.full_name}; GPUs come first, then CPUs, Intel's before PoCL.")
-        lines.append(f"Choose another with device=, --device or {devices.DEVICE_VARIABLE}.")
-    else:
-        lines.append(devices.no_device_message(infos, []) + ".")
-    lines += [f"Note: {note}." for note in notes if note]
-    return "\n".join(lines)
+        mark = "*" if best and best.usable and info.index == best.index else " "
+        memory, most = bytes_text(info.global_memory), bytes_text(info.max_allocation)
+        precision = "fp64" if info.has_fp64 else "no fp64"
+        lines.append(f"{mark} [{info.platform_index}:{info.device_index}] {info.full_name}")
+        lines.append(
+            f"    {info.kind}, {info.compute_units} compute units, {memory} memory, "
+            f"{most} per buffer, {precision}"
+        )
+        lines.append(f"    {info.version}, driver {info.driver}, selector {info.selector!r}")
+        lines.append("    usable" if info.usable else f"    not used: {info.reason}")
+    return "\n".join([*lines, last, *(f"Note: {note}." for note in notes if note)])
 
 
-def _chosen_by_user(infos: list[DeviceInfo]) -> tuple[DeviceInfo | None, str]:
-    selector = os.environ.get(devices.DEVICE_VARIABLE, "").strip()
-    if not selector:
-        return None, ""
-    try:
-        info = devices.select(infos, selector, f"{devices.DEVICE_VARIABLE}=")
-    except NoDeviceError as exc:
-        return None, f"No default: {exc}."
-    if not info.usable:
-        return None, f"No default: {_unusable(info, f'{devices.DEVICE_VARIABLE}={selector!r}')}."
-    return info, ""
-
-
-def _device_lines(info: DeviceInfo, is_default: bool) -> list[str]:
-    mark = "*" if is_default else " "
-    precision = "fp64" if info.has_fp64 else "no fp64"
-    memory = (
-        f"{bytes_text(info.global_memory)} memory, {bytes_text(info.max_allocation)} per buffer"
-    )
-    return [
-        f"{mark} [{info.platform_index}:{info.device_index}] {info.full_name}",
-        f"    {info.kind}, {info.compute_units} compute units, {memory}, {precision}",
-        f"    {info.version}, driver {info.driver}, selector {info.selector!r}",
-        "    usable" if info.usable else f"    not used: {info.reason}",
-    ]
-
-
-def _default() -> Runtime:
+def _best() -> Runtime:
+    """Find the first device that passes the probe, and remember it: the drivers' list is fixed."""
+    global _default
     candidates, notes = devices.find_candidates()
     for candidate in sorted(candidates, key=lambda c: devices.preference(c.info)):
-        _, runtime = _probe(candidate)
-        if runtime is not None:
-            return runtime
+        _default = _probe(candidate)[1]
+        if _default is not None:
+            return _default
     infos = [_probe(candidate)[0] for candidate in candidates]
     raise NoDeviceError(devices.no_device_message(infos, notes))
 
 
 def _named(device: Any, origin: str) -> Runtime:
     candidates, _ = devices.find_candidates()
-    infos = [candidate.info for candidate in candidates]
-    context = None
+    infos, context = [candidate.info for candidate in candidates], None
+    there = f"there is {devices.listing(infos)}"
     if isinstance(device, str):
         info = devices.select(infos, device, origin)
     elif isinstance(device, DeviceInfo):
-        info = _same(infos, device)
+        if (device.index, device.full_name) not in [(i.index, i.full_name) for i in infos]:
+            raise NoDeviceError(
+                f"the device {device.full_name} does not exist in this process; {there}"
+            )
+        info = device
     elif hasattr(device, "int_ptr"):
-        info, context = _from_driver_object(candidates, device)
+        context = device if hasattr(device, "devices") else None
+        if context is not None and len(context.devices) != 1:
+            raise InvalidArgumentError(
+                f"a context of {len(context.devices)} devices was given; it must have exactly one"
+            )
+        handle = device if context is None else context.devices[0]
+        same = [each.info for each in candidates if each.device.int_ptr == handle.int_ptr]
+        if not same:
+            raise NoDeviceError(
+                f"{device!r} is none of the devices that the drivers list (a sub-device?); {there}"
+            )
+        info = same[0]
     else:
         raise InvalidArgumentError(
             f"device={device!r} of type {type(device).__name__}: give a name, a DeviceInfo, a "
             "Runtime, a pyopencl.Device or a pyopencl.Context"
         )
 
-    candidate = next(c for c in candidates if c.info.index == info.index)
+    candidate = next(each for each in candidates if each.info.index == info.index)
     probed, runtime = _probe(candidate)
     if runtime is None:
         raise NoDeviceError(_unusable(probed, f"{origin}{device!r}"))
     if context is None:
         return runtime
-    return _sharing(context, Candidate(probed, candidate.device))
+    key = int(context.int_ptr)
+    if key not in _shared_contexts:
+        # The runtime keeps the context alive, so that its address cannot be given to another
+        _shared_contexts[key] = Runtime(Candidate(probed, candidate.device), context)
+    return _shared_contexts[key]
 
 
 def _unusable(info: DeviceInfo, asked: str) -> str:
@@ -195,82 +213,28 @@ def _unusable(info: DeviceInfo, asked: str) -> str:
     )
 
 
-def _same(infos: list[DeviceInfo], wanted: DeviceInfo) -> DeviceInfo:
-    for info in infos:
-        if info.index == wanted.index and info.full_name == wanted.full_name:
-            return info
-    raise NoDeviceError(
-        f"the device {wanted.full_name} does not exist in this process; there is "
-        f"{devices.listing(infos)}"
-    )
-
-
-def _from_driver_object(candidates: list[Candidate], given: Any) -> tuple[DeviceInfo, Any]:
-    context = given if hasattr(given, "devices") else None
-    if context is not None and len(context.devices) != 1:
-        raise InvalidArgumentError(
-            f"a context of {len(context.devices)} devices was given; it must have exactly one"
-        )
-    handle = given if context is None else context.devices[0]
-    for candidate in candidates:
-        if candidate.device.int_ptr == handle.int_ptr:
-            return candidate.info, context
-    raise NoDeviceError(
-        f"{given!r} is none of the devices that the drivers list (a sub-device?); there is "
-        f"{devices.listing([candidate.info for candidate in candidates])}"
-    )
-
-
-def _sharing(context: Any, candidate: Candidate) -> Runtime:
-    key = int(context.int_ptr)
-    if key not in _shared_contexts:
-        # The runtime keeps the context alive, so that its address cannot be given to another.
-        _shared_contexts[key] = Runtime(candidate, context)
-    return _shared_contexts[key]
-
-
 def _probe(candidate: Candidate) -> tuple[DeviceInfo, Runtime | None]:
     """Run the probe kernel, once per device and process."""
     with _lock:
         index = candidate.info.index
         if index not in _probed:
-            runtime, reason = _try(candidate)
+            runtime, reason = None, ""
+            try:
+                runtime = Runtime(candidate)
+                reason = run_probe(runtime)
+            except VDIError as exc:
+                reason = f"the probe kernel failed: {exc}"
             info = replace(candidate.info, usable=not reason, reason=reason)
             if runtime is not None:
                 runtime.info = info
-            _probed[index] = (info, runtime if not reason else None)
+            _probed[index] = (info, None if reason else runtime)
         return _probed[index]
 
 
-def _try(candidate: Candidate) -> tuple[Runtime | None, str]:
-    try:
-        runtime = Runtime(candidate)
-        return runtime, run_probe(runtime)
-    except VDIError as exc:
-        return None, f"the probe kernel failed: {exc}"
-
-
 def run_probe(runtime: Runtime) -> str:
-    """Run the probe kernel and check its numbers.
-
-    Parameters
-    ----------
-    runtime : Runtime
-        The device to try.
-
-    Returns
-    -------
-    str
-        What is wrong; empty if all is right.
-
-    Raises
-    ------
-    VDIError
-        If the driver fails.
-    """
+    """Run the probe kernel and return what is wrong with its numbers, if anything."""
     x = np.linspace(0.01, 0.99, PROBE_COUNT, dtype=np.float32)
     groups = PROBE_COUNT // PROBE_GROUP
-    kernel = runtime.kernel("lib/probe.cl", "probe")
     with (
         runtime.upload(x, name="probe input") as inputs,
         runtime.buffer((PROBE_COUNT, 4), np.float32, name="probe values") as values,
@@ -278,8 +242,8 @@ def run_probe(runtime: Runtime) -> str:
         runtime.buffer((1,), np.uint32, name="probe total") as total,
     ):
         runtime.fill(total, 0)
-        shared = LocalMemory(PROBE_GROUP * 4)
-        runtime.launch(kernel, PROBE_COUNT, PROBE_GROUP, inputs, values, sums, total, shared)
+        launch = runtime.bind(PROBE, x=inputs, values=values, group_sum=sums, total=total)
+        launch(PROBE_COUNT, PROBE_GROUP, shared=PROBE_GROUP)
         return _check_probe(x, *(runtime.download(b) for b in (values, sums, total)))
 
 

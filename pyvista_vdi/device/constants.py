@@ -1,6 +1,8 @@
-"""Numbers that kernels and Python share: defined here, and ``-D`` names of every program."""
+"""Numbers that kernels and Python share: defined here, and in the programs that use them."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from pyvista_vdi.model.packing import DEPTH_CODES as DEPTH_CODES
 
@@ -40,7 +42,31 @@ STEEPEST = 1.5
 #: rows (``raycasting/segments.cl``).
 SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
-#: All of them by name.
-KERNEL_CONSTANTS: dict[str, int | float] = {
-    name: value for name, value in list(vars().items()) if name.isupper()
+#: By folder of ``opencl/``, those that programs with a file of it know.
+OF_FOLDERS: dict[str, str] = {
+    "cpu16": "PLANE_FORMS STEEPEST",
+    "generation": "RUN_WORDS ERRORS_AT_A_TIME LISTS_PER_ITEM",
+    "large": "RUN_WORDS",
+    "lib": "STRIP COLUMN_ITEMS CELL CELL_ITEMS",
+    "multi_vdi": "CELL CELL_ITEMS SEGMENT_SIZE SPARE_SLOTS",
+    "raycasting": "BUNDLE_SHIFT BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS PLANE_FORMS"
+    " STEEPEST SEGMENT_SIZE SPARE_SLOTS DEPTH_CODES",
+    "series": "DEPTH_CODES",
 }
+
+
+def definitions(folders: set[str]) -> list[str]:
+    """Return the lines of OpenCL C that define what programs with files of some folders know."""
+    names = {name for folder in folders for name in OF_FOLDERS.get(folder, "").split()}
+    return [f"#define {name} {literal(globals()[name])}" for name in sorted(names)]
+
+
+def literal(value: object) -> str:
+    """Return a value as OpenCL C has it: floats in exact single precision, booleans as 0 or 1."""
+    if isinstance(value, (bool, np.bool_)):
+        return str(int(value))
+    if isinstance(value, (float, np.floating)):
+        return f"({float(np.float32(value)).hex()}f)"
+    if isinstance(value, (int, np.integer)) and value < 0:
+        return f"({value})"
+    return str(value)

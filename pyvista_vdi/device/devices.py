@@ -116,21 +116,11 @@ def preference(info: DeviceInfo) -> tuple[int, ...]:
 
 
 def match(infos: Sequence[DeviceInfo], selector: str) -> list[DeviceInfo]:
-    """Devices that a selector means.
+    """Return the devices that a selector means: none, one, or several if it is ambiguous.
 
-    Parameters
-    ----------
-    infos : sequence of DeviceInfo
-        What exists.
-    selector : str
-        ``"platform_index:device_index"``, ``"platform:device_index"``, or a part of
-        ``"platform / device"`` or of the version. Letter case is ignored; an exact name beats a
-        part of one, and a part of the platform beats one of the device.
-
-    Returns
-    -------
-    list of DeviceInfo
-        None, one, or several if the selector is ambiguous.
+    It is ``"platform_index:device_index"``, ``"platform:device_index"``, or a part of
+    ``"platform / device"`` or of the version. Letter case is ignored; an exact name beats a part of
+    one, and a part of the platform beats one of the device.
     """
     by_index = _INDEX_SELECTOR.match(selector)
     if by_index:
@@ -184,26 +174,10 @@ def listing(infos: Sequence[DeviceInfo]) -> str:
 
 
 def select(infos: Sequence[DeviceInfo], selector: str, origin: str) -> DeviceInfo:
-    """The one device that a selector means.
+    """Return the one device that a selector means, see :func:`match`.
 
-    Parameters
-    ----------
-    infos : sequence of DeviceInfo
-        What exists.
-    selector : str
-        As for :func:`match`.
-    origin : str
-        Where the selector came from, for messages: ``"device="`` or ``"PYVISTA_VDI_DEVICE="``.
-
-    Returns
-    -------
-    DeviceInfo
-        The device, probed or not.
-
-    Raises
-    ------
-    NoDeviceError
-        If the selector means none or several; the message lists what exists.
+    ``origin`` is where the selector came from, for messages: ``"device="``, say. NoDeviceError if
+    it means none or several, with a list of what exists.
     """
     found = match(infos, selector)
     if len(found) == 1:
@@ -228,13 +202,13 @@ def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
 
 _lock = threading.RLock()
 _found: tuple[list[Candidate], list[str]] | None = None
-#: Whether this process was forked from one that had loaded drivers.
-_forked = False
+#: Whether drivers are here that the threads they work with did not follow into a fork.
+forked = False
 
 
 def _note_fork() -> None:
-    global _forked, _lock
-    _forked = _forked or _found is not None
+    global forked, _lock
+    forked = forked or _found is not None
     _lock = threading.RLock()  # a thread that is not here may have held it
 
 
@@ -242,20 +216,12 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
 
 
-def drivers_lost() -> bool:
-    """Whether drivers are here that the threads they work with did not follow into a fork."""
-    return _forked
-
-
 def require_drivers() -> None:
-    """Raise at once where a driver would wait for ever: in a fork of a process that used one.
+    """Raise DeviceError where a driver would wait for ever: in a fork of a process that used one.
 
-    Raises
-    ------
-    DeviceError
-        If this process is such a fork. No lock is taken before: another thread may have held it.
+    No lock is taken before: another thread may have held it.
     """
-    if _forked:
+    if forked:
         raise DeviceError(
             "this process was forked from one that had used OpenCL already, and drivers do not "
             'survive that: start processes by multiprocessing.get_context("spawn"), or fork '
@@ -264,12 +230,9 @@ def require_drivers() -> None:
 
 
 def opencl() -> ModuleType:
-    """The module pyopencl, imported when first needed with pip's drivers made visible.
+    """Return the module pyopencl, imported when first needed with pip's drivers made visible.
 
-    Raises
-    ------
-    MissingDependencyError
-        If pyopencl or the OpenCL loader that it needs cannot be imported.
+    MissingDependencyError if it, or the OpenCL loader that it needs, cannot be imported.
     """
     find_candidates()
     # Once it is there without the import system, whose locks a finalizer that frees device memory
@@ -295,19 +258,10 @@ def _import_pyopencl() -> ModuleType:
 
 
 def find_candidates() -> tuple[list[Candidate], list[str]]:
-    """Every device of every platform, listed once per process, unprobed.
+    """Return every device of every platform, unprobed, in the drivers' order, listed once.
 
-    Returns
-    -------
-    tuple
-        The candidates in the drivers' order, and notes on how they were looked for.
-
-    Raises
-    ------
-    MissingDependencyError
-        If pyopencl cannot be imported.
-    DeviceError
-        In a fork of a process that had listed them.
+    Also notes on how they were looked for. MissingDependencyError if pyopencl cannot be imported,
+    DeviceError in a fork of a process that had listed them.
     """
     global _found
     require_drivers()

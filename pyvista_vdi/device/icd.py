@@ -39,25 +39,14 @@ INTEL_LIBRARY = "libintelocl.so"
 
 @dataclass(frozen=True)
 class Discovery:
-    """What was done about the loader's search path.
-
-    Attributes
-    ----------
-    added : Path or None
-        The driver library that was made visible; None when nothing was changed.
-    note : str
-        Why nothing was changed, or what was added; for :func:`describe_devices`.
-    """
+    """The driver library that was made visible, if any, and why, for :func:`describe_devices`."""
 
     added: Path | None
     note: str
 
 
 def intel_library() -> Path | None:
-    """Absolute path of pip's Intel CPU runtime, or None.
-
-    Looked for among the files of the installed distribution, then in ``sys.prefix/lib``.
-    """
+    """Return the absolute path of pip's Intel CPU runtime, or None."""
     candidates = []
     try:
         files = importlib.metadata.distribution(INTEL_DISTRIBUTION).files or []
@@ -65,11 +54,7 @@ def intel_library() -> Path | None:
     except importlib.metadata.PackageNotFoundError:
         pass
     candidates.append(Path(sys.prefix) / "lib" / INTEL_LIBRARY)
-    for path in candidates:
-        resolved = path.resolve()
-        if resolved.is_file():
-            return resolved
-    return None
+    return next((path.resolve() for path in candidates if path.resolve().is_file()), None)
 
 
 def vendor_folders() -> list[Path]:
@@ -108,13 +93,7 @@ def read_vendor_files(folders: list[Path]) -> dict[str, str]:
 
 
 def plan() -> tuple[dict[str, str] | None, Discovery]:
-    """Decide whether the loader needs help.
-
-    Returns
-    -------
-    tuple
-        The vendor files to show (None: leave the environment alone) and the explanation.
-    """
+    """Return the vendor files to show (None: leave the environment alone), and why."""
     if not sys.platform.startswith("linux"):
         return None, Discovery(None, "drivers are found by the system's own loader")
     for variable in USER_VARIABLES:
@@ -144,11 +123,6 @@ def drivers_visible() -> Iterator[Discovery]:
     """While inside, the loader sees the system's drivers and pip's; the environment is put back.
 
     Import pyopencl and list the platforms inside: the loader keeps what it found.
-
-    Yields
-    ------
-    Discovery
-        What was done.
     """
     files, discovery = plan()
     if files is None:

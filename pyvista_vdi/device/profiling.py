@@ -66,45 +66,23 @@ class Profile:
 
     def kernel_seconds(self) -> float:
         """Wait for what is pending; device time of all kernels so far, without transfers."""
-        with self._lock:
-            self._drain()
-            kernels = [ns for name, (_, ns) in self._sums.items() if not name.startswith("[")]
-        return sum(kernels) * 1e-9
+        kernels = [row for row in self.figures() if not row.name.startswith("[")]
+        return sum(row.total_ms for row in kernels) * 1e-3
 
     def figures(self) -> list[KernelTime]:
-        """Waits for what is pending; rows, longest total first."""
+        """Wait for what is pending, and return rows, longest total first."""
         with self._lock:
             self._drain()
-            sums = dict(self._sums)
-        whole = sum(nanoseconds for _, nanoseconds in sums.values())
-        rows = [
-            KernelTime(
-                name=name,
-                calls=calls,
-                total_ms=nanoseconds * 1e-6,
-                mean_ms=nanoseconds * 1e-6 / calls,
-                share=nanoseconds / whole if whole else 0.0,
-            )
-            for name, (calls, nanoseconds) in sums.items()
+            sums = sorted(self._sums.items(), key=lambda item: item[1][1], reverse=True)
+        whole = sum(elapsed for _, (_, elapsed) in sums) or 1
+        return [
+            KernelTime(name, calls, elapsed * 1e-6, elapsed * 1e-6 / calls, elapsed / whole)
+            for name, (calls, elapsed) in sums
         ]
-        return sorted(rows, key=lambda row: row.total_ms, reverse=True)
 
 
 def table(title: str, rows: list[KernelTime]) -> str:
-    """The figures as fixed-width text.
-
-    Parameters
-    ----------
-    title : str
-        First line, the device's name.
-    rows : list of KernelTime
-        As :meth:`Profile.figures` gives them.
-
-    Returns
-    -------
-    str
-        Several lines without a newline at the end.
-    """
+    """Return the figures as fixed-width text under a title, without a newline at the end."""
     width = max([len("kernel"), *(len(row.name) for row in rows)])
     lines = [
         f"OpenCL profile: {title}",

@@ -15,17 +15,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pyvista_vdi.device import sources
-from pyvista_vdi.device.constants import KERNEL_CONSTANTS
+from pyvista_vdi.device.constants import literal
+from pyvista_vdi.device.declarations import Define as Define
+from pyvista_vdi.device.declarations import KernelDeclaration, Parameter
 from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 from pyvista_vdi.model.user_cache import user_cache
 
-Define = str | int | float | bool | None
 LOG_LINES_SHOWN = 30
-_LINE_MARK = re.compile(r'#line (\d+) "(.*)"')
 #: Seconds from which a driver that keeps programs itself is taken to be compiling.
 _SLOW = 2.0
 
@@ -34,26 +32,13 @@ on_compiling: set[Callable[[], object]] = set()
 
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 _NOT_IN_OPTIONS = re.compile(r"[\s\"'\\;]")
-#: What several launches with offsets answer otherwise than one launch does.
-_PLACE_OF_GROUP = re.compile(r"\bget_(group_id|num_groups|global_size|global_offset)\b")
 _logger = logging.getLogger(__name__)
 _numbers = itertools.count(1)
-# pyopencl makes Python code for each, under names that it takes for free in two threads at a time
 _kernel_lock = threading.RLock()
 
 
 def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
-    """``-D`` options in sorted order.
-
-    Parameters
-    ----------
-    defines : mapping of str to str, int, float, bool or None
-        Floats become exact single-precision literals, booleans 0 or 1, None a name alone.
-
-    Returns
-    -------
-    tuple of str
-        One option each.
+    """Return ``-D`` options in sorted order; None is a name alone.
 
     Raises
     ------
@@ -61,201 +46,121 @@ def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
         If a name is no identifier, or a value holds what drivers split options at.
     """
     options = []
-    for name in sorted(defines):
-        value = defines[name]
+    for name, value in sorted(defines.items()):
         if not _IDENTIFIER.fullmatch(name):
             raise InvalidArgumentError(f"{name!r} is no name for a -D option")
-        if value is None:
-            options.append(f"-D{name}")
-            continue
-        if isinstance(value, (bool, np.bool_)):
-            text = str(int(value))
-        elif isinstance(value, (float, np.floating)):
-            text = f"({float(np.float32(value)).hex()}f)"
-        elif isinstance(value, (int, np.integer)):
-            text = str(value) if value >= 0 else f"({value})"
-        else:
-            text = str(value)
+        text = "1" if value is None else literal(value)
         if not text or _NOT_IN_OPTIONS.search(text):
             raise InvalidArgumentError(
                 f"-D{name}={text!r}: a value must be non-empty and free of spaces, quotes, "
                 "backslashes and semicolons (drivers split options there)"
             )
-        options.append(f"-D{name}={text}")
+        options.append(f"-D{name}" if value is None else f"-D{name}={text}")
     return tuple(options)
 
 
 class Kernel:
     """A kernel function of a compiled program; threads may share it.
 
-    OpenCL kernel objects carry their arguments and are not thread safe, so each thread gets an
-    object of its own when it first launches.
+    OpenCL's kernel objects carry their arguments and are not thread safe, so each launch has one of
+    its own while it is there.
 
     Attributes
     ----------
-    name : str
-        The function.
-    path : str
-        The file that it comes from.
-    divisible : bool
-        Whether several launches with offsets do what one launch does: nothing in the program asks
-        where in the whole its work-group is.
+    path, name : str
+        The file that it comes from, and the function.
+    argument_count : int
+        How many arguments it takes.
+    parameters : dict of str to Parameter
+        These, by name and in order; empty until they are declared.
+    free : list of pyopencl.Kernel
+        The driver's objects that no launch has.
     """
 
-    def __init__(self, program: Any, path: str, name: str, source: str) -> None:
-        self.name = name
-        self.path = path
-        self.divisible = _PLACE_OF_GROUP.search(source) is None
+    def __init__(self, program: Any, path: str, name: str) -> None:
+        self.path, self.name = path, name
+        self.parameters: dict[str, Parameter] = {}
         self._program = program
-        self._local = threading.local()
-        self.argument_count = int(self.object.num_args)
+        self.free = [self.new_object()]
+        self.argument_count = int(self.free[0].num_args)
 
-    @property
-    def object(self) -> Any:
-        """The driver's kernel object of the calling thread."""
-        found = getattr(self._local, "kernel", None)
-        if found is None:
-            found = self._local.kernel = _kernel_object(self._program, self.name)
-        return found
+    def new_object(self) -> Any:
+        """Return a driver's object of it, which takes its time to be made."""
+        cl: Any = opencl()
+        # pyopencl makes Python code for each, under names that it takes for free in two threads
+        with _kernel_lock:
+            try:
+                return cl.Kernel(self._program, self.name)
+            except sqlite3.Error:  # the file in which it keeps that code cannot be used
+                cl._PYOPENCL_NO_CACHE = True
+                return cl.Kernel(self._program, self.name)
 
-    @property
-    def arguments_set(self) -> dict[int, Any]:
-        """By index, what the calling thread's kernel object was given last, for who gives it."""
-        found: dict[int, Any] | None = getattr(self._local, "arguments", None)
-        if found is None:
-            found = self._local.arguments = {}
-        return found
+    def declare(self, declaration: KernelDeclaration, defines: Mapping[str, Define]) -> None:
+        """Take its arguments from a declaration; KernelBuildError if their number is another."""
+        parameters = declaration.parameters(defines)
+        if len(parameters) != self.argument_count:
+            raise KernelBuildError(
+                f"kernel {self.name!r} of {self.path} takes {self.argument_count} arguments, and "
+                f"{len(parameters)} are declared: {', '.join(parameters)}"
+            )
+        self.parameters = parameters
 
     def __repr__(self) -> str:
         return f"<Kernel {self.name!r} of {self.path}>"
 
 
 class ProgramCache:
-    """Programs of one device.
+    """Programs of one device, with a context that has it alone.
 
-    Parameters
+    Attributes
     ----------
-    context : pyopencl.Context
-        With one device.
-    device : pyopencl.Device
-        That device.
+    known : dict
+        Kernels of the package's files by path, name and ``-D`` options with their types.
     """
 
     def __init__(self, context: Any, device: Any) -> None:
         self._context = context
         self._device = device
+        self.known: dict[tuple[Any, ...], Kernel] = {}
         self._kernels: dict[tuple[Any, ...], Kernel] = {}
         self._programs: dict[tuple[str, tuple[str, ...]], Any] = {}
         self._locks: dict[tuple[str, tuple[str, ...]], threading.Lock] = {}
-        self._base_options = (
-            "-cl-std=CL1.2",
-            *_rounding_options(device),
-            *define_options(KERNEL_CONSTANTS),
-        )
-
-    def known(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel | None:
-        """A kernel of the package's files that was compiled before; parameters as for kernel."""
-        if not isinstance(path, str):
-            return None
-        return self._kernels.get((path, name, self._options(defines)))
+        self._options = ["-cl-std=CL1.2"]
+        if device.single_fp_config & opencl().device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT:
+            self._options.append("-cl-fp32-correctly-rounded-divide-sqrt")
 
     def kernel(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel:
-        """The kernel, compiled when first asked for.
-
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            As for :func:`pyvista_vdi.device.sources.expand`.
-        name : str
-            The function.
-        defines : mapping
-            As for :func:`define_options`.
-
-        Returns
-        -------
-        Kernel
-            The same object for the same arguments.
+        """Return a kernel, compiled when first asked for, and the same for the same source.
 
         Raises
         ------
         KernelBuildError
             If the source cannot be assembled or compiled, or has no such function.
         """
-        kernel = self.known(path, name, defines)
-        if kernel is not None:
-            return kernel
-        options = self._options(defines)
+        options = (*self._options, *define_options(defines))
         source = sources.expand(path)
-        key = (path, name, options) if isinstance(path, str) else (source, name, options)
+        program, key = (source, options), (source, name, options)
         # Different programs are compiled side by side. OpenCL has every function thread safe but
         # the one that sets arguments (1.2, A.2); compilers that are not are locked by their drivers
-        with self._locks.setdefault((source, options), threading.Lock()):
-            kernel = self._kernels.get(key)
-            if kernel is None:
-                program = self._program(str(path), source, options)
-                kernel = self._find(program, str(path), name, source, options)
-                self._kernels[key] = kernel
-            return kernel
-
-    def _options(self, defines: Mapping[str, Define]) -> tuple[str, ...]:
-        return (*self._base_options, *define_options(defines))
-
-    def _program(self, path: str, source: str, options: tuple[str, ...]) -> Any:
-        key = (source, options)
-        program = self._programs.get(key)
-        if program is None:
-            program = build(self._context, self._device, path, source, options)
-            self._programs[key] = program
-        return program
-
-    def _find(
-        self, program: Any, path: str, name: str, source: str, options: tuple[str, ...]
-    ) -> Kernel:
-        try:
-            return Kernel(program, path, name, source)
-        except opencl().Error as exc:
-            names = program.kernel_names.replace(";", ", ") or "none"
-            raise KernelBuildError(
-                f"{path} has no kernel {name!r}; with these options it has: {names}",
-                options=" ".join(options),
-            ) from exc
-
-
-def _rounding_options(device: Any) -> tuple[str, ...]:
-    correctly_rounded = opencl().device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
-    if device.single_fp_config & correctly_rounded:
-        return ("-cl-fp32-correctly-rounded-divide-sqrt",)
-    return ()
-
-
-def _kernel_object(program: Any, name: str) -> Any:
-    cl: Any = opencl()
-    with _kernel_lock:
-        try:
-            return cl.Kernel(program, name)
-        except sqlite3.Error:  # the file in which it keeps that code cannot be used
-            cl._PYOPENCL_NO_CACHE = True
-            return cl.Kernel(program, name)
+        with self._locks.setdefault(program, threading.Lock()):
+            if key not in self._kernels:
+                if program not in self._programs:
+                    self._programs[program] = build(
+                        self._context, self._device, str(path), source, options
+                    )
+                try:
+                    self._kernels[key] = Kernel(self._programs[program], str(path), name)
+                except opencl().Error as exc:
+                    names = self._programs[program].kernel_names.replace(";", ", ") or "none"
+                    raise KernelBuildError(
+                        f"{path} has no kernel {name!r}; with these options it has: {names}",
+                        options=" ".join(options),
+                    ) from exc
+            return self._kernels[key]
 
 
 def build(context: Any, device: Any, path: str, source: str, options: tuple[str, ...]) -> Any:
     """Compile a source, or take it from the cache; the compiler's remarks go to the log (DEBUG).
-
-    Parameters
-    ----------
-    context, device : pyopencl objects
-        Where to build.
-    path : str
-        Name of the source for messages.
-    source : str
-        Expanded text.
-    options : tuple of str
-        Build options.
-
-    Returns
-    -------
-    pyopencl.Program
-        Built.
 
     Raises
     ------
@@ -282,9 +187,13 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
             program._build(**call)
     except cl.Error as exc:
         log = _placed(_log(program, device) or str(exc), source)
+        lines = [line for line in log.splitlines() if line.strip()]
+        if len(lines) > LOG_LINES_SHOWN:
+            left_out = len(lines) - LOG_LINES_SHOWN
+            lines[LOG_LINES_SHOWN:] = [f"... {left_out} more lines in the error's .log"]
         raise KernelBuildError(
             f"{path} does not compile on {device.platform.name.strip()} / "
-            f"{device.name.strip()} with {joined}:\n{_trimmed(log)}",
+            f"{device.name.strip()} with {joined}:\n" + "\n".join(lines),
             log=log,
             options=joined,
             source=source,
@@ -297,24 +206,24 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
 @contextlib.contextmanager
 def _announced(path: str, delay: float) -> Iterator[None]:
     """Tell that a program is being compiled, if that takes longer than a delay in seconds."""
-    timer = threading.Timer(delay, _announce, [path])
+
+    def announce() -> None:
+        number = next(_numbers)
+        level = logging.INFO if number == 1 else logging.DEBUG
+        _logger.log(level, "compiling kernels, program %d of this process: %s", number, path)
+        for tell in tuple(on_compiling):
+            tell()
+
+    timer = threading.Timer(delay, announce)
     timer.daemon = True
     if delay > 0:
         timer.start()
     else:
-        _announce(path)
+        announce()
     try:
         yield
     finally:
         timer.cancel()
-
-
-def _announce(path: str) -> None:
-    number = next(_numbers)
-    level = logging.INFO if number == 1 else logging.DEBUG
-    _logger.log(level, "compiling kernels, program %d of this process: %s", number, path)
-    for tell in tuple(on_compiling):
-        tell()
 
 
 def _place(device: Any, options: str, source: str) -> Path | None:
@@ -329,16 +238,16 @@ def _place(device: Any, options: str, source: str) -> Path | None:
 
 
 def _read(place: Path | None) -> bytes | None:
-    if place is None:
-        return None
+    """Return a program that was kept, unless it is damaged."""
     try:
-        content = place.read_bytes()
+        content = place.read_bytes() if place else b""
     except OSError:
         return None
     return content[32:] if hashlib.sha256(content[32:]).digest() == content[:32] else None
 
 
 def _write(place: Path | None, program: Any) -> None:
+    """Keep a compiled program."""
     if place is None:
         return
     (binary,) = program.get_info(opencl().program_info.BINARIES)
@@ -360,19 +269,14 @@ def _placed(log: str, source: str) -> str:
     """Name file and line where a compiler counts the lines of the whole source, as NVIDIA's."""
     places, name, number = [""], "", 0
     for line in source.splitlines():
-        mark = _LINE_MARK.match(line)
-        name, number = (mark[2], int(mark[1]) - 1) if mark else (name, number + 1)
+        if line.startswith("#line "):
+            _, first, name = line.split(" ", 2)
+            name, number = name.strip('"'), int(first) - 1
+        else:
+            number += 1
         places.append(f"{name}:{number}")
 
     def place(found: re.Match[str]) -> str:
         return places[int(found[1])] if int(found[1]) < len(places) else found[0]
 
     return re.sub(r"<kernel>:(\d+)", place, log)
-
-
-def _trimmed(log: str) -> str:
-    lines = [line for line in log.splitlines() if line.strip()]
-    if len(lines) <= LOG_LINES_SHOWN:
-        return "\n".join(lines)
-    left_out = len(lines) - LOG_LINES_SHOWN
-    return "\n".join([*lines[:LOG_LINES_SHOWN], f"... {left_out} more lines in the error's .log"])

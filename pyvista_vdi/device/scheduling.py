@@ -70,12 +70,26 @@ class Worker:
         rates.append(items / max(seconds, 1e-9))
 
 
+class _ThisThread(threading.local):
+    """The calling thread, as one that works in turns, and whether it draws a frame."""
+
+    worker: Worker | None = None
+    in_frame = False
+
+
 class Turns:
-    """The order in which frames and background work use one device."""
+    """The order in which frames and background work use one device.
+
+    Attributes
+    ----------
+    thread : object
+        ``worker``, the calling thread as one that works in turns, None for any other; and
+        ``in_frame``, whether it draws a frame.
+    """
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        self._local = threading.local()
+        self.thread = _ThisThread()
         self._frames = 0  # in progress
         self._arriving = 0  # frames that wait to begin
         self._waiting: deque[Worker] = deque()
@@ -86,7 +100,7 @@ class Turns:
     @contextlib.contextmanager
     def foreground(self) -> Iterator[None]:
         """See :meth:`pyvista_vdi.device.Runtime.foreground`."""
-        if self.worker is not None or self._in_frame:
+        if self.thread.worker is not None or self.thread.in_frame:
             yield
             return
         self._begin_frame()
@@ -97,10 +111,6 @@ class Turns:
             self._end_frame()
             self._recent.append(time.perf_counter() - began)
 
-    @property
-    def _in_frame(self) -> bool:
-        return getattr(self._local, "in_frame", False)
-
     def _begin_frame(self) -> None:
         with self._changed:
             self._arriving += 1
@@ -110,32 +120,27 @@ class Turns:
             finally:
                 self._arriving -= 1
             self._frames += 1
-        self._local.in_frame = True
+        self.thread.in_frame = True
 
     def _end_frame(self) -> None:
-        self._local.in_frame = False
+        self.thread.in_frame = False
         with self._changed:
             self._frames -= 1
             self._owed = bool(self._waiting)
             self._changed.notify_all()
 
-    @property
-    def worker(self) -> Worker | None:
-        """The calling thread as one that works in turns, None for any other thread."""
-        return getattr(self._local, "worker", None)
-
     @contextlib.contextmanager
     def background(self, cancelled: Callable[[], bool]) -> Iterator[None]:
         """See :meth:`pyvista_vdi.device.Runtime.background`."""
-        if self.worker is not None or self._in_frame:
+        if self.thread.worker is not None or self.thread.in_frame:
             raise RuntimeError("background work cannot begin inside a frame or background work")
         worker = Worker(cancelled)
         self._take_turn(worker)
-        self._local.worker = worker
+        self.thread.worker = worker
         try:
             yield
         finally:
-            self._local.worker = None
+            self.thread.worker = None
             self._end_turn(worker)
 
     def checkpoint(self) -> float:
@@ -151,7 +156,7 @@ class Turns:
         Cancelled
             If the work is no longer wanted.
         """
-        worker = self.worker
+        worker = self.thread.worker
         if worker is None:
             return float("inf")
         if worker.cancelled():
@@ -168,7 +173,7 @@ class Turns:
 
     def clock(self) -> float:
         """See :meth:`pyvista_vdi.device.Runtime.clock`."""
-        worker, now = self.worker, time.perf_counter()
+        worker, now = self.thread.worker, time.perf_counter()
         return now if worker is None else worker.worked + now - worker.turn_began
 
     def _turn(self) -> float:
@@ -211,12 +216,12 @@ class Turns:
     @contextlib.contextmanager
     def aside(self) -> Iterator[None]:
         """Let others go on while the calling thread needs no device or waits for another thread."""
-        worker = self.worker
+        worker = self.thread.worker
         if worker is not None:
             self._end_turn(worker)
             yield
             self._take_turn(worker)
-        elif self._in_frame:
+        elif self.thread.in_frame:
             self._end_frame()
             try:
                 yield

@@ -7,30 +7,17 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
 
+from pyvista_vdi.device.constants import definitions
 from pyvista_vdi.errors import KernelBuildError
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
-_CONDITIONAL_OPENS = re.compile(r"^\s*#\s*if")
-_CONDITIONAL_CLOSES = re.compile(r"^\s*#\s*endif")
+_CONDITIONAL = re.compile(r"^\s*#\s*(if|endif)")
 
 
 def read_resource(path: str) -> str:
-    """Text of a kernel file of the package ``pyvista_vdi.opencl``.
+    """Return the text of a file of the package ``pyvista_vdi.opencl``: ``"lib/rays.cl"``, say.
 
-    Parameters
-    ----------
-    path : str
-        Relative to the package's folder, with forward slashes: ``"raycasting/raycast.cl"``.
-
-    Returns
-    -------
-    str
-        The file's text.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file, or the path leaves the package.
+    FileNotFoundError if there is no such file, or the path leaves the package.
     """
     parts = PurePosixPath(path).parts
     if not parts or ".." in parts or PurePosixPath(path).is_absolute():
@@ -42,7 +29,7 @@ def read_resource(path: str) -> str:
 
 
 def expand(path: str | Path) -> str:
-    """Source of a kernel file with its includes in place.
+    """Return a kernel file's text with its includes, and the constants that it may use, in place.
 
     Each file is expanded where it is first included and left out afterwards, so files need no
     include guards. An include inside ``#if`` is refused: it would depend on the first place.
@@ -53,19 +40,17 @@ def expand(path: str | Path) -> str:
         A string is a path inside ``pyvista_vdi.opencl``; a :class:`~pathlib.Path` is any file on
         disk (tests and users' own kernels), whose includes are taken from ``pyvista_vdi.opencl``.
 
-    Returns
-    -------
-    str
-        The text for the compiler; ``#line`` marks carry file names and line numbers.
-
     Raises
     ------
     KernelBuildError
         If a file is missing or an include stands inside a conditional.
     """
-    if isinstance(path, Path):
-        return _expand_text(path.name, _read_disk(path))
-    return _expand_resource(path)
+    if isinstance(path, str):
+        return _expand_resource(path)
+    try:
+        return _expand_text(path.name, path.read_text(encoding="utf-8"))
+    except OSError as exc:
+        raise KernelBuildError(f"the kernel file {str(path)!r} cannot be read: {exc}") from exc
 
 
 @cache
@@ -77,30 +62,26 @@ def _expand_resource(path: str) -> str:
     return _expand_text(path, text)
 
 
-def _read_disk(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as exc:
-        raise KernelBuildError(f"the kernel file {str(path)!r} cannot be read: {exc}") from exc
-
-
 def _expand_text(name: str, text: str) -> str:
     lines: list[str] = []
-    _append_file(name, text, {name}, lines)
-    return "\n".join(lines) + "\n"
+    seen = {name}
+    _append_file(name, text, seen, lines)
+    constants = definitions({file.partition("/")[0] for file in seen})
+    return "\n".join([*constants, *lines]) + "\n"
 
 
 def _append_file(name: str, text: str, seen: set[str], out: list[str]) -> None:
     out.append(f'#line 1 "{name}"')
     depth = 0
     for number, line in enumerate(text.splitlines(), start=1):
-        depth += bool(_CONDITIONAL_OPENS.match(line)) - bool(_CONDITIONAL_CLOSES.match(line))
-        found = _INCLUDE.match(line)
+        conditional, found = _CONDITIONAL.match(line), _INCLUDE.match(line)
+        if conditional:
+            depth += 1 if conditional[1] == "if" else -1
         if found is None:
             out.append(line)
             continue
 
-        # Replace the directive by the file's text, or by nothing where it stands already.
+        # Replace the directive by the file's text, or by nothing where it stands already
         target = str(PurePosixPath(found.group(1)))
         if depth > 0:
             raise KernelBuildError(

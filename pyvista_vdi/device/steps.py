@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from pyvista_vdi.device.arguments import Argument
 from pyvista_vdi.device.programs import Define, Kernel
 from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP
@@ -36,6 +36,6 @@ class Step:
             defines["VECTOR_FUNCTIONS"] = 1
         return cls(runtime.kernel(path, name, defines), rays)
 
-    def launch(self, runtime: Runtime, rays: int, *arguments: Argument) -> None:
+    def launch(self, runtime: Runtime, rays: int, *arguments: Any) -> None:
         """Launch it for so many rays, a multiple of a group's."""
         runtime.launch(self.kernel, rays // self.rays, GROUP // self.rays, *arguments)

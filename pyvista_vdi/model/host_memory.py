@@ -67,6 +67,69 @@ def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
     return raw, start
 
 
+class GrowingArray:
+    """An array whose number of elements is known when the last one is written.
+
+    Systems take memory as it is written, so room for the most that there may be costs nothing.
+    Only where that is refused do its elements move when it grows.
+
+    Parameters
+    ----------
+    item : tuple of int
+        Shape of an element.
+    dtype : dtype_like
+        Element type.
+
+    Attributes
+    ----------
+    room : int
+        Elements that there is room for.
+    """
+
+    def __init__(self, item: tuple[int, ...] = (), dtype: DTypeLike = np.float32) -> None:
+        self._item = item
+        self._dtype = np.dtype(dtype)
+        self._bytes = math.prod(item) * self._dtype.itemsize
+        self._raw = np.empty(0, np.uint8)
+        self._start = 0  # where it is aligned as that of aligned_empty
+        self.room = 0
+
+    def reserve(self, n: int, most: int) -> None:
+        """Have room for at least n elements, and if it can be had for the most there may be.
+
+        Raises
+        ------
+        MemoryError
+            If not even that many can be had.
+        """
+        if n <= self.room:
+            return
+        for room in (most, 2 * n):
+            try:
+                self._move(room)
+            except MemoryError:
+                continue
+            return
+        self._move(n)
+
+    def _move(self, room: int) -> None:
+        raw = np.empty(room * self._bytes + HOST_ALIGNMENT, np.uint8)
+        start = -raw.ctypes.data % HOST_ALIGNMENT
+        kept = self.room * self._bytes
+        raw[start : start + kept] = self._raw[self._start : self._start + kept]
+        self._raw, self._start, self.room = raw, start, room
+
+    def part(self, first: int, last: int) -> NDArray[Any]:
+        """Return elements to write, a view that is valid until the next call of another method."""
+        begin, end = (self._start + n * self._bytes for n in (first, last))
+        return self._raw[begin:end].view(self._dtype).reshape(last - first, *self._item)
+
+    def finished(self, n: int) -> NDArray[Any]:
+        """Return the first n elements; the room for others is given back."""
+        self._raw.resize(self._start + n * self._bytes, refcheck=False)
+        return self.part(0, n)
+
+
 def physical_memory() -> int:
     """Return the host's memory, bytes."""
     import psutil  # where it is asked for: importing the package loads little

@@ -1,0 +1,243 @@
+"""What is copied between a device's buffers and the host's arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device.buffers import LEAST_PINNED, DeviceBuffer
+from pyvista_vdi.device.memory import Memory
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError
+
+#: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
+_COPY_BYTES = 4 * 2**20
+
+
+class Transfers(Memory):
+    """A device whose buffers are written and read."""
+
+    def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
+        """An array's values on the device, for kernels to read; ``name`` says what they are.
+
+        A CPU device uses an array that is C-contiguous and aligned for it in place (see
+        :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
+        the values are copied. The buffer is not writable. Raises as :meth:`buffer` does.
+        """
+        shape, array, flags = np.shape(array), np.ascontiguousarray(array), self.cl.mem_flags
+        in_place, dtype = self.in_place(array), array.dtype
+        if in_place or self.turns.thread.worker is None or array.nbytes <= _COPY_BYTES:
+            access = flags.READ_ONLY | (flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR)
+            return self.allocate(access, shape, dtype, name, array, writable=False)
+
+        # In pieces: a driver that makes a buffer from an array keeps Python's lock
+        buffer = self.allocate(flags.READ_ONLY, shape, dtype, name, writable=False)
+        try:
+            self._copy(buffer, array)
+        except BaseException:
+            buffer.release()
+            raise
+        return buffer
+
+    def download(
+        self, buffer: DeviceBuffer, out: NDArray[Any] | None = None, count: int | None = None
+    ) -> NDArray[Any]:
+        """Return the values of a buffer, when all that was enqueued before is done.
+
+        They are in ``out``, a C-contiguous array of the buffer's dtype and of as many elements, or
+        in a new one of its shape; with ``count``, only so many from the start, in 1D.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If ``out`` or ``count`` does not fit.
+        DeviceError
+            If the driver fails, now or in a kernel before.
+        """
+        elements = buffer.nbytes // buffer.dtype.itemsize
+        if count is not None and not 0 <= count <= elements:
+            raise InvalidArgumentError(
+                f"{count} elements were asked of the buffer {buffer.name!r}, which has {elements}"
+            )
+        if out is None and count is None:
+            out = buffer.host
+        if out is None:
+            shape = buffer.shape if count is None else (count,)
+            waits = self.turns.thread.worker is None
+            pins = waits and not self.is_cpu and buffer.nbytes >= LEAST_PINNED
+            out = (self.pinned.empty if pins else np.empty)(shape, buffer.dtype)
+        _check_exchange(buffer, out, elements if count is None else count, written=True)
+        if buffer.host is None or out.ctypes.data != buffer.host.ctypes.data:
+            self._copy(buffer, out, to_host=True)
+        elif out.nbytes:
+            # Map it: the memory is the array's, so that nothing is copied, and the values stay
+            if self.turns.thread.worker is not None:
+                self.turns.checkpoint()
+            cl, queue = self.cl, self.queue
+            try:
+                mapped, event = cl.enqueue_map_buffer(
+                    queue, buffer.memory, cl.map_flags.READ, 0, out.shape, out.dtype
+                )
+                mapped.base.release(queue)
+            except cl.Error as exc:
+                raise self.failure(exc, _copying(buffer, out, to_host=True)) from exc
+            self.record("[map]", event)
+        return out
+
+    def download_later(
+        self, buffer: DeviceBuffer, out: NDArray[Any], *, first: int = 0
+    ) -> Callable[[], None]:
+        """Copy part of a buffer into an array when all that was enqueued before is done.
+
+        Inside :meth:`background` the copy is done when this returns. As many elements as ``out``
+        has are copied, from the ``first`` on; leave it alone until what is returned, when called,
+        has waited for them (and raised DeviceError if the driver failed).
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the elements are not all in the buffer, or the array does not fit.
+        """
+        _check_exchange(buffer, out, out.size, written=True, first=first)
+        event = self._copy(buffer, out, to_host=True, first=first, later=True)
+
+        def wait() -> None:
+            if event is None:
+                return
+            try:
+                event.wait()
+            except self.cl.Error as exc:
+                raise self.failure(exc, _copying(buffer, out, to_host=True)) from exc
+
+        return wait
+
+    def write(self, buffer: DeviceBuffer, array: NDArray[Any], *, first: int | None = None) -> None:
+        """Copy an array into a buffer; the array is free to change when this returns.
+
+        It fills the buffer, which is not one from :meth:`upload`, or only as many elements as it
+        has, from the ``first`` on.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If it does not fit or the buffer is not writable.
+        """
+        _check_writable(buffer)
+        array = np.ascontiguousarray(array)
+        elements = buffer.nbytes // buffer.dtype.itemsize if first is None else array.size
+        _check_exchange(buffer, array, elements, first=first or 0)
+        self._copy(buffer, array, first=first or 0)
+
+    def _copy(
+        self,
+        buffer: DeviceBuffer,
+        host: NDArray[Any],
+        *,
+        to_host: bool = False,
+        first: int = 0,
+        later: bool = False,
+    ) -> Any:
+        """Copy between a buffer, from an element on, and a C-contiguous array that fits it.
+
+        Background work copies in pieces, and what others ask for ``later`` is not waited for: its
+        event is returned.
+        """
+        memory, cl, queue = buffer.memory, self.cl, self.queue
+        background = self.turns.thread.worker is not None
+        waits, event = background or not later, None
+        data, offset = host.reshape(-1).view(np.uint8), first * host.itemsize
+        size = _COPY_BYTES if background else max(1, data.nbytes)
+        try:
+            for start in range(0, data.nbytes, size):
+                if background:
+                    self.turns.checkpoint()
+                part = data[start : start + size]
+                if to_host:
+                    ends = {"dest": part, "src": memory, "src_offset": offset + start}
+                else:
+                    ends = {"dest": memory, "src": part, "dst_offset": offset + start}
+                event = cl.enqueue_copy(queue, **ends, is_blocking=waits)
+                self.record("[read]" if to_host else "[write]", event)
+        except cl.Error as exc:
+            raise self.failure(exc, _copying(buffer, host, to_host=to_host)) from exc
+        return None if waits else event
+
+    def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
+        """Fill a buffer, not one from :meth:`upload`, with one byte or one element.
+
+        A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If the value is no byte, the pattern does not divide the buffer, or the buffer is not
+            writable.
+        """
+        _check_writable(buffer)
+        if isinstance(value, int) and not 0 <= value <= 255:
+            raise InvalidArgumentError(
+                f"{value} is no byte to fill the buffer {buffer.name!r} with; give a NumPy scalar "
+                f"such as np.{buffer.dtype}({value})"
+            )
+        pattern = np.uint8(value) if isinstance(value, int) else value
+        if buffer.nbytes % pattern.nbytes:
+            raise InvalidArgumentError(
+                f"a pattern of {pattern.nbytes} bytes does not divide the buffer "
+                f"{buffer.name!r} of {buffer.nbytes} bytes"
+            )
+        memory, queue, cl = buffer.memory, self.queue, self.cl
+        if buffer.nbytes == 0:
+            return
+        try:
+            event = cl.enqueue_fill_buffer(queue, memory, pattern, 0, buffer.nbytes)
+            if buffer.readers is not None:
+                self.note_reader(buffer.readers)
+            self.record("[fill]", event)
+            if self.turns.thread.worker is not None:
+                queue.finish()  # nothing of this thread runs when its turn is over
+        except cl.Error as exc:
+            raise self.failure(exc, f"filling the buffer {buffer.name!r}") from exc
+
+
+def _check_writable(buffer: DeviceBuffer) -> None:
+    if buffer.memory is None:
+        raise DeviceError(f"the buffer {buffer.name!r} was used after its release")
+    if not buffer.writable:
+        raise InvalidArgumentError(
+            f"the buffer {buffer.name!r} was uploaded and may share the caller's array; "
+            "make a buffer() to write to"
+        )
+
+
+def _check_exchange(
+    buffer: DeviceBuffer,
+    array: NDArray[Any],
+    elements: int,
+    *,
+    written: bool = False,
+    first: int = 0,
+) -> None:
+    """Refuse an array that cannot exchange so many elements with a buffer, from one on."""
+    if buffer.memory is None:
+        raise DeviceError(f"the buffer {buffer.name!r} was used after its release")
+    room = buffer.nbytes // buffer.dtype.itemsize
+    if not 0 <= first <= room - elements:
+        raise InvalidArgumentError(
+            f"{elements} elements from {first} on are not all in the buffer {buffer.name!r}, "
+            f"which has {room}"
+        )
+    if array.dtype != buffer.dtype or array.size != elements or not array.flags.c_contiguous:
+        raise InvalidArgumentError(
+            f"the buffer {buffer.name!r} exchanges {elements} C-contiguous elements of "
+            f"{buffer.dtype}; the array has {array.size} of {array.dtype}, strides {array.strides}"
+        )
+    if written and not array.flags.writeable:
+        raise InvalidArgumentError(f"the target for {buffer.name!r} is not writable")
+
+
+def _copying(buffer: DeviceBuffer, host: NDArray[Any], *, to_host: bool) -> str:
+    if to_host:
+        return f"reading {host.nbytes} bytes of the buffer {buffer.name!r}"
+    return f"writing {host.nbytes} bytes to the buffer {buffer.name!r}"

@@ -1,0 +1,175 @@
+"""Kernels and their arguments: by name, of the declared types, as the compiler sees them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+from pyvista_vdi.device import (
+    KernelDeclaration,
+    Struct,
+    devices,
+    list_devices,
+    sources,
+)
+from pyvista_vdi.device.programs import define_options
+from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
+
+AFFINE = Struct("Affine", n="int", weights="float4", factor="float")
+SOURCE = """\
+typedef struct { int n; float4 weights; float factor; } Affine;
+__kernel void affine(
+    Affine by, __global const T *x, const uint4 shift, __local float *room, __global T *y
+#ifdef MORE
+    , __global const ulong *pairs
+#endif
+)
+{
+    const int i = get_global_id(0);
+    room[get_local_id(0)] = (x ? x[i] : 1) * by.factor + by.weights.w + shift.y;
+    if (i < by.n)
+        y[i] = room[get_local_id(0)];
+}
+"""
+ARGUMENTS = {
+    "by": AFFINE,
+    "x": "T*",
+    "shift": "uint4",
+    "room": "local float*",
+    "y": "T*",
+    "pairs": "ulong* if MORE",
+}
+
+
+@pytest.fixture
+def affine(monkeypatch):
+    monkeypatch.setattr(sources, "expand", lambda path: SOURCE)
+    return KernelDeclaration("affine.cl", "affine", **ARGUMENTS)
+
+
+def test_only_what_changes_is_given_again(runtime, affine):
+    with runtime.upload(np.arange(8, dtype="f4")) as x, runtime.buffer(x.shape) as y:
+        by = AFFINE(n=8, weights=(1, 2, 3, 4), factor=2)
+        launch = runtime.bind(affine, {"T": "float"}, by=by, shift=(0, 3, 0, 0), room=4, y=y)
+        launch(8, 4, x=x)
+        np.testing.assert_array_equal(runtime.download(y), np.arange(8) * 2 + 7)
+        other = runtime.bind(affine, {"T": "float"}, by=by, shift=np.zeros(4, "u4"), room=4)
+        other(8, 4, x=x, y=y)
+        np.testing.assert_array_equal(runtime.download(y), np.arange(8) * 2 + 4)
+        launch((8,), (4,), x=None)
+        np.testing.assert_array_equal(runtime.download(y), [9] * 8)
+        launch(8, 4, by=AFFINE(n=1, weights=(0, 0, 0, 1), factor=0))
+        np.testing.assert_array_equal(runtime.download(y), [4] + [9] * 7)
+        with runtime.upload(np.ones(8, "u4")) as pairs:
+            more = runtime.bind(affine, {"T": "float", "MORE": None}, pairs=pairs)
+            more(8, 4, by=by, shift=(0, 0, 0, 0), room=4, x=x, y=y)
+        np.testing.assert_array_equal(runtime.download(y), np.arange(8) * 2 + 4)
+
+
+def test_wrong_arguments_are_refused_by_name(runtime, affine):
+    with runtime.buffer((8,), name="eight") as y, runtime.buffer((8,), np.int32) as integers:
+        launch = runtime.bind(affine, {"T": "float"}, x=None, y=y)
+        with pytest.raises(
+            InvalidArgumentError, match=r"'affine' of affine\.cl was .*without.*by, shift, room"
+        ):
+            launch(8, 4)
+        with pytest.raises(
+            InvalidArgumentError, match="no argument 'pairs'.*it takes by, x, shift"
+        ):
+            launch.set(pairs=y)
+        for name, values in {
+            "y": (integers, 3, np.zeros(8, np.float32)),
+            "shift": ((1, 2, 3), (0, 0, 0, -1), (0.5, 0, 0, 0), None, y),
+            "room": (1.5, y),
+            "by": (1, np.zeros(1)),
+        }.items():
+            for value in values:
+                with pytest.raises(TypeError, match=f"'{name}' of kernel 'affine' is declared as"):
+                    launch.set(**{name: value})
+        with pytest.raises(InvalidArgumentError, match="factor"):
+            AFFINE(n=1, weights=(0, 0, 0, 0))
+        launch.set(by=AFFINE(n=1, weights=(0, 0, 0, 0), factor=1), shift=(0, 0, 0, 0), room=4)
+        with pytest.raises(InvalidArgumentError, match=r"\(8,\) is no multiple of .*\(3,\)"):
+            launch(8, 3)
+    with pytest.raises(DeviceError, match="'eight' was used after its release"):
+        launch(8, 4)
+    wrong = KernelDeclaration("affine.cl", "affine", x="T*")
+    with pytest.raises(KernelBuildError, match="takes 5 arguments, and 1 are declared: x"):
+        runtime.bind(wrong, {"T": "float", "A": 1})
+
+
+#: Rooms whose module ``kernels`` declares what is in their folder of ``opencl/``.
+ROOMS = ("generation", "raycasting", "volume", "extensions.large", "extensions.series")
+#: ``-D`` options that every program may have, and those that kernels must have beside them.
+OPTIONS = {"VOXEL_T": "ushort", "INDEX_T": "uint", "MACROCELL_SHIFT": 2, "OFFSET_T": "int"}
+OF_KERNELS = {
+    "CUT_LISTS": {"CRITERION": "HOMOGENEITY"},
+    "FIRST_HITS": {"FIRST_HIT": 1},
+    "SEGMENTS": {"SEGMENTS": 1},
+    "SEGMENTS_BLOCKS": {"SEGMENTS": 2, "LANES": 16},
+    "MERGE": {"SEGMENTS": 1, "STREAMS": 2},
+    "MERGE_BLOCKS": {"SEGMENTS": 2, "STREAMS": 2, "LANES": 16},
+    "RAYCAST_BLOCKS": {"LANES": 16},
+    "RAYCAST_PACKETS": {"LANES": 16},
+    "RAYCAST_ALIGNED_VIEW": {"LANES": 16},
+    "PREPARE_PACKED": {"PACKED": 8},
+    "WANT_BRICKS": {"BRICK_SHIFT": 3, "BRICK_POINTS": 12, "BRICK_MARGIN": 1},
+    "SAMPLE_STEPS": {"BRICK_SHIFT": 3, "BRICK_POINTS": 12, "BRICK_MARGIN": 1},
+    "PROJECT": {"MAXIMUM": 1},
+    "OPTICAL_DEPTHS": {"GRID_PART": 1},
+    "DECODE_LISTS": {"GRID": 16, "TAU_BASE": 16256, "TAU_CODES": 4096},
+}
+
+
+def declared():
+    """Every kernel that is declared, with the options that make its arguments what they are."""
+    for room in ROOMS:
+        module = import_module(f"pyvista_vdi.{room}.kernels")
+        for name, declaration in vars(module).items():
+            if isinstance(declaration, KernelDeclaration):
+                kinds = [str(kind).split(" if ") for kind in declaration.arguments.values()]
+                options = {each.removeprefix("not ") for kind in kinds for each in kind[1:]}
+                own = {**OPTIONS, **OF_KERNELS.get(name, {})}
+                if name.endswith("BLOCKS"):  # of whole supersegments alone
+                    options = {each for each in options if "PACKED" not in each}
+                values = [dict([each.split("=")]) for each in sorted(options) if "=" in each]
+                valued = {key for each in values for key in each}
+                switches = {key: 1 for key in options if "=" not in key and key not in valued}
+                switches |= own
+                for defines in (own, switches, *({**own, **each} for each in values)):
+                    yield pytest.param(declaration, defines, id=f"{room}.{name}")
+
+
+@pytest.fixture(scope="module")
+def compiler():
+    """The device that compiles soonest: PoCL's, which optimises when a kernel is launched."""
+    candidates, _ = devices.find_candidates()
+    usable = {info.index for info in list_devices() if info.usable}
+    found = [each for each in candidates if each.info.index in usable]
+    return max(found, key=lambda each: each.info.platform.startswith("Portable")).device
+
+
+@pytest.mark.parametrize(("declaration", "defines"), list(declared()))
+def test_declarations_are_as_compilers_see_kernels(compiler, declaration, defines):
+    """Programs from a cache have no names on Intel's, so that every one is compiled here."""
+    cl = devices.opencl()
+    program = cl._cl._Program(cl.Context([compiler]), sources.expand(declaration.path))
+    options = (*define_options(defines), "-cl-kernel-arg-info")
+    program._build(options=" ".join(("-cl-std=CL1.2", *options)).encode(), devices=[compiler])
+    kernel = cl.Kernel(program, declaration.name)
+    info, space = cl.kernel_arg_info, cl.kernel_arg_address_qualifier
+    seen = {}
+    for index in range(kernel.num_args):
+        name = kernel.get_arg_info(index, info.NAME).removeprefix("_cl_")  # PoCL's for OpenCL's own
+        local = kernel.get_arg_info(index, info.ADDRESS_QUALIFIER) == space.LOCAL
+        seen[name] = "local " * local + kernel.get_arg_info(index, info.TYPE_NAME)
+    expected = {}
+    parameters = declaration.parameters(defines)
+    assert list(seen) == list(parameters)
+    for (name, parameter), kind in zip(parameters.items(), seen.values(), strict=True):
+        pointed, star = parameter.kind.removesuffix("*"), "*" * parameter.kind.endswith("*")
+        of_file = parameter.number is None  # a type that the kernel's file has of its own
+        expected[name] = kind if of_file else f"{defines.get(pointed, pointed)}{star}"
+    assert seen == expected
