@@ -2,7 +2,7 @@
 // stack of cells the set of its occupied slabs as one 64-bit mask, which answers a ray's whole
 // crossing of the stack with one load.
 //
-// -D OFFSET_T   type of an offset into the supersegments: uint or ulong
+// -D OFFSET_T   type of an offset into the supersegments: int or long
 #include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

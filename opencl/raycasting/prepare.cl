@@ -19,7 +19,7 @@ __kernel void prepare_lists(
     __global const HEADER_T *headers,  // of the bundles of lists
     __global const float *fronts,      // view depth less depth_origin
     __global const float *backs,
-    __global const uint *colors,       // if packed, 11, 11 and 10 bits; straight RGB, 3 floats
+    __global const ulong *colors,      // if packed, words of 11, 11 and 10 bits; straight RGB, 3 floats
     __global const float *optical_depths,
     float depth_origin,                // world units
     float nearest,                     // least view depth that is in front of the eye, world units
@@ -53,7 +53,7 @@ __kernel void prepare_lists(
             const float thickness = fmax((backs[k] - fronts[k]) * per_depth, FLT_MIN);
             extinction = fmin(optical_depths[k] / thickness, FLT_MAX);
             if (PACKED)
-                packed_color = colors[k];
+                packed_color = ((__global const uint *)colors)[k];
             else
                 color = vload3(k, (__global const float *)colors);
         }

@@ -1,5 +1,4 @@
-"""opencl/raycasting/first_supersegment.cl: the first supersegment that a ray meets in a list, against a linear
-scan.
+"""The first supersegment that a ray meets in a list, against a linear scan.
 
 The paper's Algorithm 1 as printed is not what is tested here, but what it is for; the
 documentation gives the errata.
