@@ -83,7 +83,8 @@ Entry points:
 ``volume/render_volume.cl``
     ``render_volume``: direct volume rendering, the baseline.
 ``raycasting/occupancy.cl``
-    ``count_supersegments``, ``count_packed``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
+    ``count_supersegments``, ``count_packed``, ``occupied_slabs``: the occupancy grid of a VDI
+    (paper, section 4).
 ``volume/macrocells.cl``
     ``macrocell_ranges``, ``macrocell_visibility``: macrocells of a volume that are transparent.
 ``volume/ambient_occlusion.cl``

@@ -190,9 +190,8 @@ def _viewport_planes(
 ) -> list[NDArray[np.float64]]:
     """Return forms that keep what is in V_O's viewport and in front of its eye."""
     u, v, _, denominator = coordinates
-    wide, high = prepared.window[0] / 2, prepared.window[1] / 2
-    sides = [u, -u, v, -v]
-    forms = [s + e * denominator for s, e in zip(sides, (wide, wide, high, high), strict=True)]
+    wide, high = (edge / 2 * denominator for edge in prepared.window)
+    forms = [wide + u, wide - u, high + v, high - v]
     if not prepared.parallel:
         front = denominator.copy()
         front[0] -= prepared.nearest

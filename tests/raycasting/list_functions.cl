@@ -33,3 +33,18 @@ __kernel void lists_per_bundle(int count, __global int *result)
     if (get_global_id(0) == 0)
         result[0] = LISTS_PER_BUNDLE;
 }
+
+// Where the members of a frame lie, and how large it is.
+#define OFFSET(member) (int)((const char *)&frame.member - (const char *)&frame)
+__kernel void frame_layout(int count, __global int *result)
+{
+    Frame frame;
+    const int found[] = {OFFSET(lists_wide), OFFSET(lists_high), OFFSET(width), OFFSET(height), OFFSET(planes),
+                         OFFSET(has_opaque_depth), OFFSET(depth_origin), OFFSET(cutoff), OFFSET(first_depth),
+                         OFFSET(slabs_per_depth), OFFSET(depth_step), OFFSET(nearest_offset), OFFSET(regions),
+                         sizeof(Frame)};
+    if (get_global_id(0) == 0) {
+        for (int n = 0; n < count; ++n)
+            result[n] = found[n];
+    }
+}

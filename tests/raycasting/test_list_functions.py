@@ -11,6 +11,8 @@ import itertools
 import numpy as np
 import pytest
 
+from pyvista_vdi.raycasting.kernels import FRAME
+
 FILE = "list_functions.cl"
 
 
@@ -96,3 +98,10 @@ def test_long_lists(call, sign):
                     queries.append((which, depth, away, int(guess)))
     assert len(queries) > 4000
     check(call, lists, queries)
+
+
+def test_a_frame_lies_on_the_device_as_on_the_host(call):
+    offsets = [FRAME.dtype.fields[name][1] for name in FRAME.fields]
+    expected = [*offsets, FRAME.dtype.itemsize]
+    found = call(FILE, "frame_layout", len(expected), call.empty(len(expected), dtype=np.int32))
+    assert found.tolist() == expected
