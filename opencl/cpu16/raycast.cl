@@ -44,7 +44,7 @@ inline void follow(Seen *seen, const Paths *paths, Int active, bool away, const 
             const Real length = lengths_crossed(&paths->rays, from, to, crossing.meets);
             composite_medium(seen, medium.w * length, medium, crossing.meets);
         }
-        step(&at, &crossing, paths, seen->sums.w < frame->cutoff);
+        step_on(&at, &crossing, paths, seen->sums.w < frame->cutoff);
     }
 }
 

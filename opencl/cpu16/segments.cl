@@ -60,7 +60,7 @@ inline void follow(Streams *streams, const Paths *paths, Int active, bool away, 
                 append_segments(streams, rays, kept_from, kept_to, medium, crossing.meets, depth_shift);
             }
         }
-        step(&at, &crossing, paths, streams->absorbed > frame->cutoff);
+        step_on(&at, &crossing, paths, streams->absorbed > frame->cutoff);
     }
 }
 

@@ -159,7 +159,7 @@ inline Real4 media_crossed(const Cursors *at, Crossings *crossing, const Sense *
 }
 
 // Step on; rays whose light is `done` end with their lists.
-inline void step(Cursors *at, const Crossings *crossing, const Paths *paths, Int done)
+inline void step_on(Cursors *at, const Crossings *crossing, const Paths *paths, Int done)
 {
     const Int leaves = crossing->found && !crossing->stays;
     guess_again(&at->search, &crossing->list, crossing->stays);

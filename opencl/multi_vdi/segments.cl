@@ -103,7 +103,7 @@ __kernel void segments(
                 append_segment(&stream, &path.ray, r.x, r.y, medium, depth_shift);
             }
         }
-        step(&at, &crossing, &path, stream.absorbed > frame.cutoff);
+        step_on(&at, &crossing, &path, stream.absorbed > frame.cutoff);
     }
     const bool meets = stream.slot > first_slot;
     ends[number * band_rays + place] = stream.slot;

@@ -55,7 +55,7 @@ __kernel void first_hits(
                 r_hit = ends.x < ray->kept.to[n] ? fmax(ends.x, ray->kept.from[n]) : r_hit;
             crossing.stays = crossing.stays && !hit;
         }
-        step(&at, &crossing, &path, hit);
+        step_on(&at, &crossing, &path, hit);
     }
     // From r to t
     float passed_by = ray->scale * (r_hit - ray->r_begin);

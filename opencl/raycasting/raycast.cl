@@ -45,7 +45,7 @@ __kernel void raycast(
             crossing.stays = crossing.stays && !(ONE_LIST && seen.sums.w < frame.cutoff);
         }
         // Step on (Amanatides and Woo)
-        step(&at, &crossing, &path, seen.sums.w < frame.cutoff);
+        step_on(&at, &crossing, &path, seen.sums.w < frame.cutoff);
     }
     image[pixel.place] = composited(&seen);
 }

@@ -68,7 +68,7 @@ inline Axis axis_of(Real along, Real deep, int lists)
     return axis;
 }
 
-// Say which way the rays step.
+// Set which way the rays step.
 inline void take_step(Axis *axis, Steps upwards)
 {
     axis->step = SELECT((Steps)(-1), (Steps)(1), upwards);

@@ -5,7 +5,7 @@
 //         skip_empty_cells(&at, ...);        // section 4
 //         crossing = next_crossing(&at, ..); // Algorithm 1
 //         ... composite what it crosses ...
-//         step(&at, ...);                    // Amanatides and Woo
+//         step_on(&at, ...);                    // Amanatides and Woo
 //     }
 //
 // Each turn makes a guess, meets a supersegment or leaves a list, or the last two: rays side by side
@@ -184,7 +184,7 @@ inline float4 medium_met(const Cursor *at, const Crossing *crossing, const Path 
 
 // Go on to the next supersegment of the list, or step to the next list (Amanatides and Woo); a ray
 // whose light is `done` ends with its list.
-inline void step(Cursor *at, const Crossing *crossing, const Path *path, bool done)
+inline void step_on(Cursor *at, const Crossing *crossing, const Path *path, bool done)
 {
     if (!crossing->found)
         return;

@@ -77,21 +77,18 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         return Variant(kernels.SEGMENTS, switches, 0, GROUP, {})
 
     def by_columns(
-        kernel: KernelDeclaration, *switches: Mapping[str, int | str], rays: int = 1, **own: Any
+        kernel: KernelDeclaration, switches: Mapping[str, int | str], rays: int = 1, **own: Any
     ) -> Variant:
         """Return the variant that draws the scene's part in strips, column by column."""
         columns = part_columns(scene.part)
         items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
-        merged = {name: value for some in switches for name, value in some.items()}
         own = {"part": columns, **own}
-        return Variant(kernel, merged, items // rays, COLUMN_ITEMS // rays, own, rays)
+        return Variant(kernel, switches, items // rays, COLUMN_ITEMS // rays, own, rays)
 
     if scene.hit is not None:
         return by_columns(
             kernels.FIRST_HITS,
-            lists,
-            walk,
-            {"ONE_LIST": int(scene.one_list)},
+            {**lists, **walk, "ONE_LIST": int(scene.one_list)},
             least_optical_depth=scene.hit.optical_depth,
             accumulated=int(scene.hit.accumulated),
         )
@@ -106,7 +103,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         return Variant(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
     # V_O's other rays have a loop of their own one by one; regions have blocks
     if scene.one_list and not (cropped and in_blocks):
-        return by_columns(kernels.RAYCAST, lists, walk, sums, {"ONE_LIST": 1})
+        return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
 
     # Rays that have many lists in common
     packets = scene.packets(or_blocks=in_blocks) if uncropped else None
@@ -116,8 +113,8 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
         return Variant(kernels.RAYCAST_PACKETS, switches, packets.items, LANES, across, LANES)
     if in_blocks:
-        return by_columns(kernels.RAYCAST_BLOCKS, depth, walk, sums, rays=LANES)
-    return by_columns(kernels.RAYCAST, lists, walk, sums, {"ONE_LIST": 0})
+        return by_columns(kernels.RAYCAST_BLOCKS, {**depth, **walk, **sums}, LANES)
+    return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 0})
 
 
 def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> Variant:

@@ -41,7 +41,8 @@ class _Preparation:
 def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
     """Return the VDI on the device, made once and kept as long as the VDI lives."""
     with _lock:
-        place = _prepared.setdefault(vdi, {}).setdefault(runtime, _Preparation())
+        places = _prepared.setdefault(vdi, {})
+        place = places.get(runtime) or places.setdefault(runtime, _Preparation())
     with runtime.holding(place.lock):
         if place.prepared is None:
             place.prepared = PreparedVDI(runtime, vdi)

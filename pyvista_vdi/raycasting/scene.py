@@ -145,7 +145,7 @@ class Scene:
 
     @contextlib.contextmanager
     def on_device(self) -> Iterator[OnDevice]:
-        """Have the forms and the ends of rays on the device."""
+        """Upload the forms and the ends of rays for a ``with`` block."""
         runtime = self.prepared.runtime
         ends = np.zeros(1, np.float32) if self.ends is None else self.ends
         with (
