@@ -25,7 +25,6 @@ from pyvista_vdi.measure.report import mebibytes, milliseconds, section, table
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.raycasting.prepared import PreparedVDI
-from pyvista_vdi.raycasting.scene import Scene
 
 #: Who draws, by the keys of the results, and what tables call them.
 WAYS: Mapping[str, str] = {
@@ -137,7 +136,7 @@ def ways_of(bench: Bench, vdi: Any, size: tuple[int, int], wanted: Sequence[str]
     runtime, found = bench.runtime, {}
 
     def one_by_one(camera: Any) -> Any:
-        with mock.patch.object(Scene, "in_vectors", False):
+        with mock.patch.object(runtime, "is_cpu", False):
             return bench.draw(vdi, camera, size, skip_empty=False)
 
     begin = time.perf_counter()

@@ -35,21 +35,22 @@ Shared functions:
     V_O's list space: coordinates of a ray in it, and its depth coordinate.
 ``lib/cropping.cl``
     The parts of a ray that cropping keeps.
-``raycasting/list_rays.cl``, ``raycasting/pixels.cl``
-    Rays in list space, clipped; model lengths along them; their pixels.
-``raycasting/stepping.cl``
-    How rays step from list to list, and pass by what is empty.
-``raycasting/lists.cl``
-    Which supersegment of a list a ray meets first (paper, Algorithm 1).
-``lib/compositing.cl``
-    Compositing front to back, with or without carrying what is rounded off.
+``raycasting/frame.cl``
+    The scalars that every kernel takes which draws a frame of a VDI.
 ``raycasting/supersegments.cl``
     How a list's supersegments are read: as they were made, or packed.
+``raycasting/first_supersegment.cl``
+    Which supersegment of a list a ray meets first (paper, Algorithm 1).
+``raycasting/ray.cl``, ``raycasting/stepping.cl``, ``raycasting/walk.cl``
+    A ray in list space; how it steps from list to list, and past what is empty; its walk.
 ``raycasting/stacks.cl``
     Stacks of cells of the occupancy grid, and which slab of one is ahead.
-``raycasting/segments.cl``
-    What rays cross of several VDIs, as segments in a pool.
-
+``multi_vdi/pool.cl``
+    Where segments of rays through several VDIs are kept.
+``cpu16/pixels.cl``, ``cpu16/rays.cl``, ``cpu16/lists.cl``, ``cpu16/walk.cl``, ``cpu16/pool.cl``
+    The same of sixteen rays in vectors, on CPUs.
+``lib/compositing.cl``
+    Compositing front to back, with or without carrying what is rounded off.
 Entry points:
 
 ``lib/probe.cl``
@@ -63,17 +64,20 @@ Entry points:
     ``sum_lengths``, ``list_offsets``: where each list begins in a VDI's arrays.
 ``volume/bricks.cl``
     ``want_bricks``, ``sample_steps``: samples of a volume that is on the device brick by brick.
-``raycasting/prepare.cl``
-    ``prepare_lists``: a VDI's arrays to what the raycaster reads.
-``raycasting/raycast.cl``
-    ``raycast``: VDI to image from any view (paper, section 3), to the depth of the first hit, or to
-    what is merged with other VDIs; ``raycast_blocks``: the same on a CPU, for blocks of 4 x 4 rays.
-``raycasting/packets.cl``
-    ``raycast_packets``: VDI to image on a CPU, for rays along epipolar lines, far from V_O.
+``raycasting/prepare.cl``, ``raycasting/prepare_packed.cl``
+    ``prepare_lists``, ``prepare_packed``: a VDI's arrays to what the raycaster reads.
+``raycasting/raycast.cl``, ``raycasting/first_hits.cl``
+    ``raycast``, ``first_hits``: VDI to image from any view (paper, section 3), or to the depth of
+    the first hit.
+``cpu16/raycast.cl``, ``cpu16/packets.cl``, ``cpu16/aligned_view.cl``
+    ``raycast_blocks``, ``raycast_packets``, ``raycast_aligned_view``: VDI to image on a CPU, by
+    blocks of 4 x 4 rays; by rays along epipolar lines, far from V_O; at V_O.
 ``raycasting/clear.cl``
-    ``clear_image``: nothing where no rays are cast.
-``multi_vdi/merge.cl``
-    ``merge``, ``merge_blocks``: what rays cross of several VDIs, to one image.
+    ``clear_image``, ``clear_hits``: nothing where no rays are cast.
+``multi_vdi/segments.cl``, ``cpu16/segments.cl``
+    ``segments``, ``segments_of_blocks``: what rays cross of one of several VDIs.
+``multi_vdi/merge.cl``, ``cpu16/merge.cl``
+    ``merge``, ``merge_blocks``: that of several VDIs, to one image.
 ``multi_vdi/cells.cl``
     ``alone_ends``, ``take_cells``: where only one of several VDIs is met.
 ``raycasting/preview.cl``
@@ -85,7 +89,8 @@ Entry points:
     The same kernels for sixteen rays in vectors, on CPUs, by ``cpu16/generation_records.cl`` and
     ``cpu16/volume_picture.cl``.
 ``raycasting/occupancy.cl``
-    ``count_supersegments``, ``occupied_slabs``: the occupancy grid of a VDI (paper, section 4).
+    ``count_supersegments``, ``count_packed``, ``occupied_slabs``: the occupancy grid of a VDI
+    (paper, section 4).
 ``volume/macrocells.cl``
     ``macrocell_ranges``, ``macrocell_visibility``: macrocells of a volume that are transparent.
 ``volume/ambient_occlusion.cl``

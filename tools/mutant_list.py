@@ -41,7 +41,7 @@ def _m(name: str, file: str, old: str, new: str, rooms: tuple[str, ...] = ()) ->
 MARCH, MARCH_LISTS = "opencl/volume/march.cl", "opencl/cpu16/generation_march.cl"
 RUNS, SHORTEN = "opencl/generation/runs.cl", "opencl/cpu16/generation_shorten.cl"
 HOMOGENEITY = "opencl/generation/homogeneity.cl"
-LISTS, RAYS = "opencl/raycasting/lists.cl", "opencl/raycasting/list_rays.cl"
+LISTS, RAYS = "opencl/raycasting/first_supersegment.cl", "opencl/raycasting/ray.cl"
 DECODE = "opencl/series/decode.cl"
 LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
     ("extensions/large",),
@@ -200,50 +200,50 @@ KERNEL_MUTANTS = (
     _m(
         "list search: the guess before is one too far",
         LISTS,
-        "search->beyond), search->n + 1, onwards)",
-        "search->beyond), search->n + 2, onwards)",
+        "search->low = passed ? p + 1 :",
+        "search->low = passed ? p + 2 :",
     ),
     _m(
         "list search: halves forget what lies behind",
         LISTS,
-        "SELECT(search->high, search->n - 1,",
-        "SELECT(search->high, search->n - 2,",
+        "search->high = beyond ? p - 1 :",
+        "search->high = beyond ? p - 2 :",
     ),
     _m(
         "list ray: enters at the far face",
-        RAYS,
+        "opencl/raycasting/stepping.cl",
         "(near - sense->deep) * sense->inverse",
         "(far - sense->deep) * sense->inverse",
     ),
     _m(
         "list ray: not clipped where it leaves the list",
-        RAYS,
+        "opencl/raycasting/stepping.cl",
         "LOWER_OF(HIGHER_OF(r_leaves, *from), r_next)",
         "HIGHER_OF(r_leaves, *from)",
     ),
     _m(
         "list ray: length by one end's depth",
         RAYS,
-        " * reciprocal_depth_at(rays, to, depths));",
-        " * reciprocal_depth_at(rays, from, depths));",
+        " * reciprocal_depth_at(ray, to));",
+        " * reciprocal_depth_at(ray, from));",
     ),
     _m(
         "stepping: v before u",
-        "opencl/raycasting/raycast.cl",
-        "const Int in_u = r_u <= r_v;",
-        "const Int in_u = r_u >= r_v;",
+        "opencl/raycasting/walk.cl",
+        "const bool in_u = crossing->r_u <= crossing->r_v;",
+        "const bool in_u = crossing->r_u >= crossing->r_v;",
     ),
     _m(
         "blocks: a supersegment is left too early",
-        "opencl/raycasting/raycast.cl",
-        "stays = meets && face.far <= next_depth;",
-        "stays = meets && face.far > next_depth;",
+        "opencl/cpu16/walk.cl",
+        "crossing->meets && crossing->face.far <= crossing->next_depth;",
+        "crossing->meets && crossing->face.far > crossing->next_depth;",
     ),
     _m(
         "occupancy: less than the faces",
         "opencl/raycasting/occupancy.cl",
-        "slab_of(front - margin,",
-        "slab_of(front + 64 * margin,",
+        "slab_of(front - grid->margin,",
+        "slab_of(front + 64 * grid->margin,",
     ),
     _m(
         "occupancy: supersegments end a slab too early",
@@ -271,39 +271,39 @@ KERNEL_MUTANTS = (
     ),
     _m(
         "packets: a ray's list is left by the other axis",
-        "opencl/raycasting/packets.cl",
+        "opencl/cpu16/packets.cl",
         "const Int steps_p = here && r_p <= r_q;",
         "const Int steps_p = here && r_p >= r_q;",
     ),
     _m(
         "packets: what waits is forgotten at the end",
-        "opencl/raycasting/packets.cl",
+        "opencl/cpu16/packets.cl",
         "met.waits = met.waits || meet;",
         "met.waits = meet;",
     ),
     _m(
         "aligned view: not clipped where the ray begins",
-        "opencl/raycasting/aligned_view.cl",
+        "opencl/cpu16/aligned_view.cl",
         "HIGHER_OF(at.front, begin)",
         "at.front",
     ),
     _m(
         "aligned view: a supersegment less",
-        "opencl/raycasting/aligned_view.cl",
-        "going && k < lists.list.count &&",
-        "going && k + 1 < lists.list.count &&",
+        "opencl/cpu16/aligned_view.cl",
+        "going && k < lists.count &&",
+        "going && k + 1 < lists.count &&",
     ),
     _m(
         "packed supersegments: red for blue",
         "opencl/raycasting/supersegments.cl",
-        "LIST_TO_REAL(second >> 16 & 255)",
-        "LIST_TO_REAL(second >> 8 & 255)",
+        "(float)(high >> 16 & 255)",
+        "(float)(high >> 8 & 255)",
     ),
     _m(
         "prepare: thickness in view depth, not along the ray",
         "opencl/raycasting/prepare.cl",
-        "(back - front) * per_depth",
-        "(back - front)",
+        "(backs[k] - fronts[k]) * per_depth",
+        "(backs[k] - fronts[k])",
     ),
     _m(
         "multi_vdi: the last medium's optical depth only",
@@ -390,7 +390,7 @@ KERNEL_MUTANTS = (
 )
 
 OPTIONS, RENDER = "pyvista_vdi/model/options.py", "pyvista_vdi/model/render_options.py"
-SCENE, STRATEGIES = "pyvista_vdi/raycasting/scene.py", "pyvista_vdi/raycasting/strategies.py"
+SCENE, CHOOSE = "pyvista_vdi/raycasting/scene.py", "pyvista_vdi/raycasting/choose.py"
 PICTURES = "pyvista_vdi/quality/pictures.py"
 PACKING = "pyvista_vdi/model/packing.py"
 REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
@@ -447,16 +447,16 @@ PYTHON_MUTANTS = (
     ),
     _m(
         "variant: the aligned view's kernel draws what is cropped",
-        STRATEGIES,
-        "supports=lambda scene: scene.plain and scene.aligned is not None",
-        "supports=lambda scene: scene.in_vectors and scene.aligned is not None",
+        CHOOSE,
+        "if uncropped and scene.aligned is not None:",
+        "if in_vectors and scene.aligned is not None:",
         ("raycasting",),
     ),
     _m(
         "variant: packed lists are drawn in blocks",
-        SCENE,
-        "return self.in_vectors and not self.prepared.packed and not self.prepared.long_offsets",
-        "return self.in_vectors and not self.prepared.long_offsets",
+        CHOOSE,
+        "not double_float and not prepared.packed and not prepared.long_offsets",
+        "not double_float and not prepared.long_offsets",
         ("raycasting", "model"),
     ),
     _m(
@@ -468,16 +468,16 @@ PYTHON_MUTANTS = (
     ),
     _m(
         "variant: previews are drawn ray by ray in full",
-        STRATEGIES,
-        "supports=lambda scene: scene.options.preview_samples is not None",
-        "supports=lambda scene: False",
+        CHOOSE,
+        "if options.preview_samples is not None:",
+        "if False:",
         ("raycasting",),
     ),
     _m(
         "variant: segments end at a transmittance, not at its optical depth",
         SCENE,
-        "np.float32(-math.log(cutoff) if self.segments else cutoff)",
-        "np.float32(cutoff)",
+        "cutoff=-math.log(cutoff) if self.segments else cutoff,",
+        "cutoff=cutoff,",
         ("raycasting",),
     ),
     _m(

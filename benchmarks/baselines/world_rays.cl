@@ -2,6 +2,7 @@
 //
 // Everything is affine in t: U d and V d, where list (i, j) is i <= U < i + 1 and j <= V < j + 1; Z less the depth origin;
 // and d, which is Z, or 1 in parallel projection. No list space: what is met is met in the world.
+#define DEPTH RECIPROCAL // of no coordinate here
 #include "lib/list_space.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF

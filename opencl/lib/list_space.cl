@@ -1,83 +1,81 @@
-// V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight (docs/conventions.md).
+// V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight
+// (docs/conventions.md, "List space").
 //
-// u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth and is projective:
+// u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth:
 //
-//     -D PARALLEL      z = Z - Z_ref             1/Z is not needed
-//     -D SHIFTED       z = (Z - Z_ref) / Z       long lens: what cancels in Z - Z_ref was taken out in float64 by the host
-//     otherwise        z = -1 / Z                the same relative precision at every depth
+//     -D DEPTH=RECIPROCAL   z = -1 / Z            the same relative precision at every depth
+//     -D DEPTH=SHIFTED      z = (Z - Z_ref) / Z   long lens: what cancels in Z - Z_ref was taken
+//                                                 out in float64 by the host
+//     -D DEPTH=PARALLEL     z = Z - Z_ref         1 / Z is not needed
 //
-// with Z view depth from V_O in world units and Z_ref the VDI's depth origin. An "offset" is Z - Z_ref.
+// with Z view depth from V_O in world units and Z_ref the VDI's depth origin. An "offset" is
+// Z - Z_ref.
 //
-//     -D DOUBLE_FLOAT_RAYS   lists hold so little of the depth that float32 has for all of it, that z is relative to Z_deep, where
-//                      a ray is deepest: 1/Z_deep - 1/Z, or Z - Z_deep if PARALLEL; faces are kept as offsets, DEPTH_FORM
-//                      is that of the offset (docs/numerics.md); 2: relative to where it is least deep
+// -D DOUBLE_FLOAT_RAYS=1, 2   lists hold so little of the depth that float32 has too few digits
+//     for all of it: z is relative to Z_deep, where a ray is deepest (2: least deep), 1 / Z_deep -
+//     1 / Z, or Z - Z_deep if PARALLEL. Faces are kept as offsets (docs/numerics.md).
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
+enum { RECIPROCAL, SHIFTED, PARALLEL };
+
 #define U_FORM 0
 #define V_FORM 1
-#define DEPTH_FORM 2
+#define DEPTH_FORM 2 // of the offset, with DOUBLE_FLOAT_RAYS
 #define DENOMINATOR_FORM 3
 #define MODEL_FORM 4
 
+// What depths are relative to; the depth coordinate of an offset, its offset, and 1 / Z there; and
+// what is kept of a face.
 #ifdef DOUBLE_FLOAT_RAYS
+#define FACES_ARE_OFFSETS 1
+#define KEPT_FACE(offset, depth_origin) (offset)
+
 typedef struct {
     float2 deep;      // the offset of Z_deep, a pair of lib/double_float.cl
     float reciprocal; // 1 / Z_deep
     float depth_origin;
 } Depths;
-#define DEPTHS_OF(rays) (rays)->depths
-#else
-typedef float Depths; // the depth origin
-#define DEPTHS_OF(rays) depth_origin
-#endif
-#define DEPTHS DEPTHS_OF(rays) // where `rays` are followed
 
-#ifdef DOUBLE_FLOAT_RAYS
 inline float depth_coordinate(float offset, Depths depths)
 {
     const float beyond = (offset - depths.deep.x) - depths.deep.y;
-#ifdef PARALLEL
-    return beyond;
-#else
+    if (DEPTH == PARALLEL)
+        return beyond;
     return beyond * depths.reciprocal / (offset + depths.depth_origin);
-#endif
 }
 
 inline float depth_offset(float z, Depths depths)
 {
-#ifdef PARALLEL
-    return depths.deep.x + z;
-#else
+    if (DEPTH == PARALLEL)
+        return depths.deep.x + z;
     return depths.deep.x + z / (depths.reciprocal * (depths.reciprocal - z));
-#endif
 }
 
-// 1 / Z of a depth coordinate. Not used in parallel projection.
 inline float reciprocal_depth(float z, Depths depths)
 {
     return depths.reciprocal - z;
 }
 #else
-// The same for one ray or for a vector of them
-#if defined(PARALLEL)
-#define depth_coordinate(offset, depths) (offset)
-#define depth_offset(z, depths) (z)
-#elif defined(SHIFTED)
-#define depth_coordinate(offset, depths) ((offset) / ((offset) + (depths)))
-#define depth_offset(z, depths) ((z) * (depths) / (1.0f - (z)))
-#else
-#define depth_coordinate(offset, depths) (-1.0f / ((offset) + (depths)))
-#define depth_offset(z, depths) (-1.0f / (z) - (depths))
-#endif
-#ifdef SHIFTED
-#define reciprocal_depth(z, depths) ((1.0f - (z)) / (depths))
-#else
-#define reciprocal_depth(z, depths) (-(z))
-#endif
+#define FACES_ARE_OFFSETS 0
+#define KEPT_FACE(offset, depth_origin) depth_coordinate(offset, depth_origin)
+
+typedef float Depths; // the depth origin
+
+// Of one number or of a vector of them
+#define depth_coordinate(offset, depth_origin)                        \
+    (DEPTH == PARALLEL  ? (offset)                                    \
+     : DEPTH == SHIFTED ? (offset) / ((offset) + (depth_origin))      \
+                        : -1.0f / ((offset) + (depth_origin)))
+#define depth_offset(z, depth_origin)                                 \
+    (DEPTH == PARALLEL  ? (z)                                         \
+     : DEPTH == SHIFTED ? (z) * (depth_origin) / (1.0f - (z))         \
+                        : -1.0f / (z) - (depth_origin))
+#define reciprocal_depth(z, depth_origin) \
+    (DEPTH == SHIFTED ? (1.0f - (z)) / (depth_origin) : -(z))
 #endif
 
-#ifndef DOUBLE_FLOAT_RAYS
+// Value of a form at t.
 inline Real list_form(__global const float *form, Real a, Real b, Real t)
 {
     return fma(t, form_slope(form, a, b), form_value(form, a, b));
@@ -87,11 +85,9 @@ inline Real list_form(__global const float *form, Real a, Real b, Real t)
 inline Real list_depth(__global const float *forms, Real a, Real b, Real t)
 {
     const Real depth = list_form(forms + DEPTH_FORM * FORM_SIZE, a, b, t);
-#ifdef PARALLEL
-    return depth;
-#else
+    if (DEPTH == PARALLEL)
+        return depth;
     return depth / list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
-#endif
 }
 
 // (u, v, depth coordinate) at t.
@@ -101,14 +97,13 @@ inline Real3 list_point(__global const float *forms, Real a, Real b, Real t)
     point.x = list_form(forms + U_FORM * FORM_SIZE, a, b, t);
     point.y = list_form(forms + V_FORM * FORM_SIZE, a, b, t);
     point.z = list_depth(forms, a, b, t);
-#ifndef PARALLEL
-    const Real denominator = list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
-    point.x /= denominator;
-    point.y /= denominator;
-#endif
+    if (DEPTH != PARALLEL) {
+        const Real denominator = list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+        point.x /= denominator;
+        point.y /= denominator;
+    }
     return point;
 }
-#endif
 
 inline Real squared_slope(__global const float *form, Real a, Real b)
 {
@@ -116,8 +111,9 @@ inline Real squared_slope(__global const float *form, Real a, Real b)
     return slope * slope;
 }
 
-// Model length per unit of t along the ray. The slopes of its forms are about 1, and in units of the value of the first: no
-// square is lost, and `length`, which guards against that by doubles or by divisions, is not needed.
+// Model length per unit of t along the ray. The slopes of its forms are about 1, and in units of
+// the value of the first: no square is lost, and `length`, which guards against that by doubles or
+// by divisions, is not needed.
 inline Real model_speed(__global const float *forms, Real a, Real b)
 {
     __global const float *form = forms + MODEL_FORM * FORM_SIZE;

@@ -1,159 +1,119 @@
-// The joint picture of several VDIs: a ray's streams of segments, merged by depth and composited front to back.
+// The joint picture of several VDIs: a ray's streams of segments, merged by depth and composited
+// front to back, a ray in a work-item.
 //
-// Every VDI is piecewise constant along a ray, so all of them together are: where several segments cover a piece of the ray,
-// their extinctions add and the colour is the mean by extinction (docs/conventions.md, "Several VDIs"). Streams are walked
-// together from boundary to boundary: in each turn every ray composites one piece, and comes to the next segment of those
-// streams whose segment ends there. The sums are formed in the order of the streams.
+// Every VDI is piecewise constant along a ray, so all of them together are: where several segments
+// cover a piece of the ray, their extinctions add and the colour is the mean by extinction
+// (docs/conventions.md, "Several VDIs"). Streams are walked together from boundary to boundary: each
+// turn composites one piece, and comes to the next segment of those streams whose segment ends
+// there. The sums are formed in the order of the streams.
 //
-// -D LANES        1: a work-item has a ray; 16: a block of 4 x 4, if SEGMENTS is 2
-// -D STREAMS      how many VDIs
-// -D SEGMENTS     see raycasting/segments.cl
-// -D COMPENSATED  see lib/compositing.cl
+// -D STREAMS   how many VDIs
 #include "lib/rays.cl"
 #include "lib/compositing.cl"
-#include "raycasting/pixels.cl"
-#include "raycasting/segments.cl"
+#include "multi_vdi/pool.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// The rays' streams of one VDI: slots of the segments that are not behind what has been composited, and of those behind the last
-// ones. At the end of a stream a segment begins at infinity.
+// A ray's stream of one VDI: the segment that is not behind what has been composited, its slot, and
+// that behind the last one. At the end of a stream a segment begins at infinity.
 typedef struct {
-    Int slots, ends;
+    int slot, end;
     Segments at;
 } Stream;
 
-// Load the segments of the rays that are chosen.
-inline void come_to_segments(Stream *stream, __global const float *rows, int capacity, Int chosen)
+inline void come_to_segment(Stream *stream, __global const float *rows)
 {
-    const Int left = chosen && stream->slots < stream->ends;
-#if LANES == 1
-    if (left)
-        stream->at = load_segments(rows, stream->slots, capacity);
-    else if (chosen)
+    if (stream->slot >= stream->end) {
         stream->at.from = stream->at.to = INFINITY;
-#else
-    const Segments next = load_segments(rows, select((Int)(0), stream->slots, left), capacity);
-    stream->at.from = select(stream->at.from, select((Real)(INFINITY), next.from, left), chosen);
-    stream->at.to = select(stream->at.to, select((Real)(INFINITY), next.to, left), chosen);
-    stream->at.optical_depth = select(stream->at.optical_depth, next.optical_depth, left);
-    stream->at.color.x = select(stream->at.color.x, next.color.x, left);
-    stream->at.color.y = select(stream->at.color.y, next.color.y, left);
-    stream->at.color.z = select(stream->at.color.z, next.color.z, left);
-#endif
+        return;
+    }
+    __global const float *const at = rows + SLOT(stream->slot);
+    stream->at.from = at[0];
+    stream->at.to = at[FLOATS_APART];
+    stream->at.optical_depth = at[2 * FLOATS_APART];
+    stream->at.color = (float4)(at[3 * FLOATS_APART], at[4 * FLOATS_APART], at[5 * FLOATS_APART], 0.0f);
 }
 
-#if LANES > 1
-#define merge merge_blocks
-#endif
-KERNEL_OF_LANES void merge(
-    __global const float *pool,         // see raycasting/segments.cl
-    int capacity,                       // slots of a ray
-    __global const int *ends,           // (streams, rays)
-    __global const uchar *contributes,  // (streams, rays), see raycasting/raycast.cl
-    int rays,                           // in the band
-    __global const int2 *cells,         // see lib/rays.cl
-    int first_cell,                     // the band's
-    int width, int height,              // window of V_N
-    float transmittance_cutoff,         // the ray ends where less than this is left
-    __global const int *streams_of,     // (VDIs): the stream of each, in the order in which owners are numbered
-    __global int *needed,               // slots that a ray of each cell needs; over the capacity, the ray is not drawn
-    __global float4 *image,             // premultiplied RGBA, top row first
-    __global short *owner)              // the VDI to which each pixel belongs, top row first; -1: to none
+__kernel void merge(
+    __global float *pool,              // see multi_vdi/pool.cl
+    int capacity,                      // slots of a ray
+    __global const int *ends,          // (streams, rays)
+    __global const uchar *contributes, // (streams, rays), see multi_vdi/segments.cl
+    int rays,                          // in the band
+    __global const int2 *cells,        // see lib/rays.cl
+    int first_cell,                    // the band's
+    int width, int height,             // window of V_N
+    float transmittance_cutoff,        // the ray ends where less than this is left
+    __global const int *streams_of,    // (VDIs): the stream of each, in the order of the owners
+    __global int *needed,              // slots that a ray of each cell needs; over the capacity, the
+                                       // ray is not drawn
+    __global float4 *image,            // premultiplied RGBA, top row first
+    __global short *owner)             // the VDI to which each pixel belongs; -1: to none
 {
-    const int first_ray = (int)get_global_id(0) * LANES;
-    const int2 corner = cell_pixel(cells + first_cell, first_ray);
-    const Int x = corner.x + (LANE_NUMBERS & (BLOCK - 1));
-    const Int y = corner.y + (LANE_NUMBERS / BLOCK);
-    const Int in_window = x < width && y < height;
-    if (!ANY(in_window))
+    const int place = (int)get_global_id(0);
+    const Ray pixel = ray_of_pixel(cell_pixel(cells + first_cell, place), width, height);
+    if (!pixel.present)
         return;
-    const Pixels pixels = pixels_at(x, y, in_window, width, height);
-    const Int used = SELECT((Int)(0), LOAD_LANES(0, ends + (STREAMS - 1) * rays + first_ray), in_window);
-    const int most = largest_lane(used);
-    __global int *const needed_here = needed + first_cell + first_ray / CELL_ITEMS;
-    if (most > *needed_here) // an old value is only lower, and does no harm
-        atomic_max(needed_here, most);
-    if (most > capacity)
+    // Has every segment found room?
+    const int used = ends[(STREAMS - 1) * rays + place];
+    __global int *const needed_here = needed + first_cell + place / CELL_ITEMS;
+    if (used > *needed_here) // an old value is only lower, and does no harm
+        atomic_max(needed_here, used);
+    if (used > capacity)
         return;
 
     // A pixel belongs to the first VDI that surely covers it, or else to the first that it meets
-    Int owned_by = -1;
-    Int grades = 0;
+    int owned_by = -1, grade = 0;
     for (int vdi = 0; vdi < STREAMS; ++vdi) {
-        const Int meets = TO_INT(LOAD_LANES(0, contributes + streams_of[vdi] * rays + first_ray));
-        owned_by = SELECT(owned_by, (Int)(vdi), meets > grades);
-        grades = max(meets, grades);
+        const int meets = contributes[streams_of[vdi] * rays + place];
+        owned_by = meets > grade ? vdi : owned_by;
+        grade = max(meets, grade);
     }
-    int owners[LANES];
-    STORE_LANES(owned_by, 0, owners);
-    for (int k = 0; k < LANES; ++k) {
-        if (pixels.wanted[k])
-            owner[pixels.places[k]] = (short)owners[k];
-    }
+    owner[pixel.place] = (short)owned_by;
 
-    __global const float *const rows = POOL_OF(pool, first_ray, capacity);
+    __global const float *const rows = pool_of(pool, place, capacity);
     Stream streams[STREAMS];
-    Int first = 0;
     for (int j = 0; j < STREAMS; ++j) {
-        streams[j].slots = first;
-        first = streams[j].ends = SELECT((Int)(0), LOAD_LANES(0, ends + j * rays + first_ray), in_window);
-        streams[j].at.optical_depth = streams[j].at.color.x = streams[j].at.color.y = streams[j].at.color.z = 0.0f;
-        streams[j].at.from = streams[j].at.to = INFINITY;
-        come_to_segments(&streams[j], rows, capacity, in_window);
+        streams[j].slot = j > 0 ? streams[j - 1].end : 0;
+        streams[j].end = ends[j * rays + place];
+        come_to_segment(&streams[j], rows);
     }
     Seen seen = nothing_seen();
-    Real reached = -INFINITY;
-    while (true) {
-        // The next piece that no segment begins or ends in
-        Real begin = INFINITY;
+    float reached = -INFINITY;
+    while (!(seen.sums.w < transmittance_cutoff)) {
+        // Find the next piece that no segment begins or ends in
+        float begin = INFINITY, end = INFINITY;
         for (int j = 0; j < STREAMS; ++j)
             begin = LOWER_OF(begin, HIGHER_OF(streams[j].at.from, reached));
-        const Int goes = begin < INFINITY && !(seen.sums.w < transmittance_cutoff);
-        if (!ANY(goes))
+        if (!(begin < INFINITY))
             break;
-        Real end = INFINITY;
         for (int j = 0; j < STREAMS; ++j)
-            end = LOWER_OF(end, SELECT(streams[j].at.from, streams[j].at.to, streams[j].at.from <= begin));
+            end = LOWER_OF(end, streams[j].at.from <= begin ? streams[j].at.to : streams[j].at.from);
 
-        // Its medium
-        Real optical_depth = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f; // colour times optical depth
-        Real4 color;                                                       // of the last one
-        color.x = color.y = color.z = color.w = 0.0f;
-        Int covering = 0;
+        // Sum up its medium: optical depths, and colours times them
+        float optical_depth = 0.0f;
+        float3 colors = (float3)(0.0f);
+        float3 color = (float3)(0.0f); // of the last one
+        int covering = 0;
         for (int j = 0; j < STREAMS; ++j) {
             const Segments at = streams[j].at;
-            const Int covers = goes && at.from <= begin;
-            const Int ends_here = covers && at.to <= end;
+            if (!(at.from <= begin))
+                continue;
+            const bool ends_here = at.to <= end;
             // A segment that nothing cuts keeps its optical depth, however short it is in t
-            const Real share = SELECT((end - begin) / (at.to - at.from), (Real)(1.0f), ends_here && at.from >= begin);
-            const Real part = SELECT((Real)(0.0f), at.optical_depth * share, covers);
-            red += part * at.color.x;
-            green += part * at.color.y;
-            blue += part * at.color.z;
+            const float share = ends_here && at.from >= begin ? 1.0f : (end - begin) / (at.to - at.from);
+            const float part = at.optical_depth * share;
+            colors += part * at.color.xyz;
             optical_depth += part;
-            color.x = SELECT(color.x, at.color.x, covers);
-            color.y = SELECT(color.y, at.color.y, covers);
-            color.z = SELECT(color.z, at.color.z, covers);
-            covering += COUNT(covers);
-            if (ANY(ends_here)) {
-                streams[j].slots += COUNT(ends_here);
-                come_to_segments(&streams[j], rows, capacity, ends_here);
+            color = at.color.xyz;
+            ++covering;
+            if (ends_here) {
+                ++streams[j].slot;
+                come_to_segment(&streams[j], rows);
             }
         }
-        const Int several = covering > 1;
-#if LANES == 1
-#define MEAN(sum) ((sum) / optical_depth)
-        const Int meets = optical_depth > 0.0f;
-#else // one division, not three
-        const Real per_depth = 1.0f / optical_depth;
-#define MEAN(sum) ((sum) * per_depth)
-        const Int meets = goes && optical_depth >= FLT_MIN; // of less, the reciprocal is not finite
-#endif
-        color.x = SELECT(color.x, MEAN(red), several);
-        color.y = SELECT(color.y, MEAN(green), several);
-        color.z = SELECT(color.z, MEAN(blue), several);
-        composite_medium(&seen, optical_depth, color, meets);
-        reached = SELECT(reached, end, goes);
+        color = covering > 1 && optical_depth > 0.0f ? colors / optical_depth : color;
+        composite_medium(&seen, optical_depth, (float4)(color, 0.0f), optical_depth > 0.0f);
+        reached = end;
     }
-    write_pixels(image, &pixels, composited(&seen));
+    image[pixel.place] = composited(&seen);
 }

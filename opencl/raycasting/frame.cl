@@ -1,17 +1,18 @@
-// What each kernel takes first that draws a frame of a VDI; raycasting/scene.py hands it over.
-#include "raycasting/supersegments.cl"
+// What every kernel takes that draws a frame of a VDI (pyvista_vdi/raycasting/frame.py).
+#include "lib/lanes.cl"
+#pragma OPENCL FP_CONTRACT OFF
 
-#define FRAME_PARAMETERS                                                                                         \
-    __global const HEADER_T *headers,   /* of the bundles of lists, see raycasting/supersegments.cl */           \
-    SUPERSEGMENTS_PARAMETERS            /* see raycasting/supersegments.cl */                                    \
-    int lists_wide, int lists_high,     /* window of V_O */                                                      \
-    float depth_origin,                 /* world units */                                                        \
-    __global const float *forms,        /* list coordinates, model direction, then `planes` to clip to */        \
-    int planes,                                                                                                  \
-    int width, int height,              /* window of V_N */                                                      \
-    __global const float *opaque_depth, /* t at which each pixel's ray ends, top row first, if has_opaque_depth */ \
-    int has_opaque_depth,                                                                                        \
-    float cutoff,                       /* the ray ends where less transmittance than this is left */            \
-    __global const ulong *masks,        /* occupied slabs of each stack, if SKIP_EMPTY */                        \
-    float first_depth,                  /* where slab 0 begins, view depth less depth_origin */                  \
-    float slabs_per_depth,
+typedef struct {
+    int lists_wide, lists_high;       // window of V_O
+    int width, height;                // window of V_N
+    int planes;                       // to clip to, of the forms
+    int has_opaque_depth;             // whether rays end at `opaque_depth`
+    float depth_origin;               // world units
+    float cutoff;                     // a ray ends where less transmittance than this is left
+    float first_depth;                // where slab 0 begins, view depth less depth_origin
+    float slabs_per_depth;            // per world unit
+    float depth_step, nearest_offset; // of 8-byte lists: of depth; least in front of the eye
+    uint regions;                     // of cropping that are kept, see lib/cropping.cl
+} Frame;
+
+#define BLOCK 4 // rays along each edge of a block, in which pixels are dealt to work-items

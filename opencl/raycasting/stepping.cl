@@ -1,17 +1,48 @@
-// How rays step from list to list (Amanatides and Woo), and pass by what the occupancy grid says is empty.
+// Steps from list to list (Amanatides and Woo), and past what the occupancy grid says is empty
+// (paper, section 4): formulas of one ray, or of several side by side (lib/lanes.cl).
 //
-// -D SHARED_LISTS  all rays of a work-item are in the same list, and step the same way
-#include "raycasting/list_rays.cl"
+// Who includes this says before of which types the ways of rays along an axis are: Steps, Int or,
+// if all rays of a work-item step the same way, int; Border, Real or float.
+#include "lib/list_space.cl"
 #include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#ifdef SHARED_LISTS
-typedef int Steps;
-typedef float Border;
-#else
-typedef Int Steps;
-typedef Real Border;
-#endif
+// Depth in the sense of rays that all go away, or all come back: it does not decrease along them.
+typedef struct {
+    bool away;
+    float sign;       // of the depth coordinate
+    Real along, deep; // at r it is fma(r, along, deep)
+    Real inverse;     // of `along`, or 0
+} Sense;
+
+// Of rays whose depth coordinate is deep + r along.
+inline Sense sense_of(Real along, Real deep, bool away)
+{
+    Sense sense;
+    sense.away = away;
+    sense.sign = away ? 1.0f : -1.0f;
+    sense.along = sense.sign * along;
+    sense.deep = sense.sign * deep;
+    sense.inverse = SELECT((Real)(0.0f), 1.0f / sense.along, along != 0.0f);
+    return sense;
+}
+
+inline Real depth_at(const Sense *sense, Real r)
+{
+    return fma(r, sense->along, sense->deep);
+}
+
+// What lies between depths `near` and `far` of the rays from r to r_next, where depths are `depth`
+// and `next_depth`: clipped to the supersegment by interval; between two faces it never leaves
+// [r, r_next].
+inline void clip_to_faces(Real *from, Real *to, const Sense *sense, Real near, Real far, Real r, Real r_next, Real depth,
+                          Real next_depth)
+{
+    const Real r_enters = (near - sense->deep) * sense->inverse;
+    const Real r_leaves = (far - sense->deep) * sense->inverse;
+    *from = SELECT(r, LOWER_OF(HIGHER_OF(r_enters, r), r_next), near > depth);
+    *to = SELECT(r_next, LOWER_OF(HIGHER_OF(r_leaves, *from), r_next), far < next_depth);
+}
 
 // One axis of V_O's window.
 typedef struct {
@@ -23,6 +54,7 @@ typedef struct {
     int lists;
 } Axis;
 
+// An axis along which rays have a coordinate deep + r along; take_step says which way they step.
 inline Axis axis_of(Real along, Real deep, int lists)
 {
     Axis axis;
@@ -33,20 +65,15 @@ inline Axis axis_of(Real along, Real deep, int lists)
     axis.inverse = SELECT((Real)(1.0f), 1.0f / along, along != 0.0f);
     axis.middle = 0.5f * (float)lists;
     axis.lists = lists;
-#ifndef SHARED_LISTS // otherwise see take_step
-    axis.step = SELECT((Int)(-1), (Int)(1), along > 0.0f);
-    axis.border = SELECT((Real)(0.0f), (Real)(1.0f), along > 0.0f) - axis.middle;
-#endif
     return axis;
 }
 
-#ifdef SHARED_LISTS
-inline void take_step(Axis *axis, bool upwards)
+// Set which way the rays step.
+inline void take_step(Axis *axis, Steps upwards)
 {
-    axis->step = upwards ? 1 : -1;
-    axis->border = (upwards ? 1.0f : 0.0f) - axis->middle;
+    axis->step = SELECT((Steps)(-1), (Steps)(1), upwards);
+    axis->border = SELECT((Border)(0.0f), (Border)(1.0f), upwards) - axis->middle;
 }
-#endif
 
 // Where the rays leave the lists of an index: from the border's number, never accumulated.
 #define CROSSINGS(axis, index) (((index) + (axis)->border - (axis)->zero) * (axis)->inverse)
@@ -56,13 +83,12 @@ inline Real crossings(const Axis *axis, Int index)
     return CROSSINGS(axis, TO_REAL(index));
 }
 
-// The indices of the lists at a coordinate u or v, or the nearest ones.
+// The indices of the lists at a coordinate u or v, or the nearest ones; a shift away from it.
 inline Int list_index(const Axis *axis, Real coordinate, int shift)
 {
     return clamp(TO_INT(floor(coordinate + axis->middle)) + shift, 0, axis->lists - 1);
 }
 
-#ifdef SKIP_EMPTY
 // The occupancy grid.
 typedef struct {
     __global const ulong *masks; // of the stacks
@@ -71,14 +97,18 @@ typedef struct {
     float slabs_per_depth;
 } Grid;
 
+#define GRID_OF(frame) \
+    {masks, STACKS_ALONG((frame).lists_wide), (frame).first_depth, (frame).slabs_per_depth}
+
 // The last index in a stack, in the rays' sense.
 inline Steps stack_edge(const Axis *axis, Steps index)
 {
     return SELECT(index & ~(STACK - 1), index | (STACK - 1), axis->step > 0);
 }
 
-// The index of the list that stepping from `index`, but not beyond the edge of a stack, would have reached at r_until, by the
-// crossings of its borders: where r_until lies by its coordinates, one back or one on where rounding has it otherwise.
+// The index of the list that stepping from `index`, but not beyond the edge of a stack, would have
+// reached at r_until, by the crossings of its borders: where r_until lies by its coordinates, one
+// back or one on where rounding has it otherwise.
 inline Int index_reached(const Axis *axis, Int index, Steps edge, Real r_until)
 {
     const Int behind = (Int)(edge + axis->step);
@@ -96,8 +126,8 @@ inline Real r_entered(const Axis *axis, Real r, Int from, Int to)
     return SELECT(r, fmax(r, crossings(axis, to - axis->step)), to != from);
 }
 
-// The nearest occupied slab ahead of rays at a depth, in a stack whose mask has these halves. Returns whether rays that look
-// pass by something empty before it.
+// The nearest occupied slab ahead of rays at a depth, in a stack whose mask has these halves.
+// Returns whether rays that look pass by something empty before it.
 inline Int look_ahead(Int *nearest, Int *nothing, Uint low, Uint high, const Sense *sense, Real depth, Int looks,
                       const Grid *grid, Depths depths)
 {
@@ -106,11 +136,11 @@ inline Int look_ahead(Int *nearest, Int *nothing, Uint low, Uint high, const Sen
     return looks && (*nothing || *nearest != slab);
 }
 
-// Up to here nothing is met: the stack's border at r_border, or the face of the nearest occupied slab.
+// Up to here nothing is met: the stack's border at r_border, or the face of the nearest occupied
+// slab.
 inline Real empty_until(Real r_border, Int nearest, Int nothing, const Sense *sense, const Grid *grid, Depths depths)
 {
     const Real face = grid->first_depth + TO_REAL(sense->away ? nearest : nearest + 1) / grid->slabs_per_depth;
     const Real r_face = (sense->sign * depth_coordinate(face, depths) - sense->deep) * sense->inverse;
     return SELECT(r_border, fmin(r_border, r_face), !nothing && sense->along != 0.0f);
 }
-#endif

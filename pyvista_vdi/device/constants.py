@@ -41,7 +41,7 @@ PLANE_FORMS = 7
 #: Pixels across by pixels along a packet, at most: that of the line that it follows.
 STEEPEST = 1.5
 #: float32 numbers of a segment of a ray, and slots that a ray has to spare where segments lie in
-#: rows (``raycasting/segments.cl``).
+#: rows (``multi_vdi/pool.cl``).
 SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
 #: By folder of ``opencl/``, those that programs with a file of it know.
@@ -51,8 +51,7 @@ OF_FOLDERS: dict[str, str] = {
     "large": "RUN_WORDS",
     "lib": "STRIP COLUMN_ITEMS CELL CELL_ITEMS PLANE_FORMS",
     "multi_vdi": "CELL CELL_ITEMS SEGMENT_SIZE SPARE_SLOTS",
-    "raycasting": "BUNDLE_SHIFT BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS"
-    " STEEPEST SEGMENT_SIZE SPARE_SLOTS DEPTH_CODES",
+    "raycasting": "BUNDLE_SHIFT BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS DEPTH_CODES",
     "series": "DEPTH_CODES",
     "volume": "MACROCELL_SHIFT",
 }

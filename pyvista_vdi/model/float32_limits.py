@@ -63,11 +63,15 @@ def scalars_suit_float32(low: float, high: float, dtype: DTypeLike, interpolatio
     return largest <= _MOST_RANGES[interpolation] * span
 
 
+def summation(media: float) -> int:
+    """Return how kernels sum up whose rays may meet so many media: ``-D COMPENSATED``."""
+    return 0 if media <= MANY_MEDIA else 1 if media <= VERY_MANY_MEDIA else 2
+
+
 def compensation(media: float) -> dict[str, int]:
     """Return the ``-D COMPENSATED`` of kernels whose rays may meet so many media, if any."""
-    if media <= MANY_MEDIA:
-        return {}
-    return {"COMPENSATED": 1 if media <= VERY_MANY_MEDIA else 2}
+    kind = summation(media)
+    return {"COMPENSATED": kind} if kind else {}
 
 
 def entries(reach: float, points: int) -> dict[str, str | int | None]:

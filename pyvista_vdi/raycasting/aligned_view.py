@@ -43,36 +43,31 @@ def aligned_view(
     ``window`` is V_O's in pixels, ``coordinates`` are the forms of (u, v, depth, denominator),
     float64 (4, 6), and ``depths`` the least and the largest t at which a ray may meet something.
     """
-    u_form, v_form, z_form, w_form = coordinates.tolist()
     first: list[int] = []
     # The corners, edges and middle speak for all: places depend on the pixel by a homography
     for x, y in itertools.product(*((0, pixels // 2, pixels - 1) for pixels in size)):
-        a, b = x + 0.5 - size[0] / 2, y + 0.5 - size[1] / 2
+        # Value and slope of (u, v, depth, denominator) along the pixel's ray
+        pixel = np.array([1.0, x + 0.5 - size[0] / 2, y + 0.5 - size[1] / 2])
+        values, slopes = (coordinates.reshape(4, 2, 3) @ pixel).T
         for t in depths:
-            w = _value(w_form, a, b, t)
-            if not (w > 0 and _slope(z_form if parallel else w_form, a, b) > 0):
+            u, v, _, w = (values + t * slopes).tolist()
+            # V_O's depth grows along the ray
+            if not (w > 0 and slopes[2 if parallel else 3] > 0):
                 return None
-            origin = (
-                x + 0.5 - (_value(u_form, a, b, t) / w + window[0] / 2),
-                y + 0.5 - (_value(v_form, a, b, t) / w + window[1] / 2),
-            )
+            # Where list (0, 0) would be, if the ray met its own list in the middle
+            origin_x = x + 0.5 - (u / w + window[0] / 2)
+            origin_y = y + 0.5 - (v / w + window[1] / 2)
             if not first:
-                if not max(map(abs, origin)) < _FARTHEST_ORIGIN:
+                if not max(abs(origin_x), abs(origin_y)) < _FARTHEST_ORIGIN:
                     return None
-                first = [round(at) for at in origin]
-            away = (abs(at - whole) for at, whole in zip(origin, first, strict=True))
-            if not max(away) <= _FARTHEST_FROM_CENTRE:
+                first = [round(origin_x), round(origin_y)]
+            away = max(abs(origin_x - first[0]), abs(origin_y - first[1]))
+            if not away <= _FARTHEST_FROM_CENTRE:
                 return None
-    ways = zip(size, first, _PACKET[in_bundles], strict=True)
-    wide, high = (-(-(edge - at - -at // step * step) // step) for edge, at, step in ways)
-    return AlignedView(np.array(first, np.int32), -(-wide * high // LANES) * LANES)
-
-
-def _slope(form: list[float], a: float, b: float) -> float:
-    """Return the slope of a form along the ray at pixel offsets (a, b)."""
-    return form[3] + a * form[4] + b * form[5]
-
-
-def _value(form: list[float], a: float, b: float, t: float) -> float:
-    """Return the value of a form on that ray at t."""
-    return form[0] + a * form[1] + b * form[2] + t * _slope(form, a, b)
+    # Packets begin at multiples of their size, in lists
+    wide, high = _PACKET[in_bundles]
+    first_i, first_j = -first[0] // wide * wide, -first[1] // high * high
+    packets_wide = -(-(size[0] - first[0] - first_i) // wide)
+    packets_high = -(-(size[1] - first[1] - first_j) // high)
+    packets = packets_wide * packets_high
+    return AlignedView(np.array(first, np.int32), -(-packets // LANES) * LANES)

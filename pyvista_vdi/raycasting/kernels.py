@@ -1,43 +1,52 @@
-"""The arguments of the kernels of ``opencl/raycasting/`` and ``opencl/multi_vdi/``."""
+"""The arguments of the kernels of ``opencl/raycasting/``, ``cpu16/`` and ``multi_vdi/``."""
 
 from __future__ import annotations
 
 from pyvista_vdi.device import KernelDeclaration, Struct
 
-#: A VDI and the frame that is asked of it (``raycasting/frame.cl``).
-FRAME: dict[str, str | Struct] = {
+#: The scalars of a frame (``raycasting/frame.cl``).
+FRAME = Struct(
+    "Frame",
+    lists_wide="int",
+    lists_high="int",
+    width="int",
+    height="int",
+    planes="int",
+    has_opaque_depth="int",
+    depth_origin="float",
+    cutoff="float",
+    first_depth="float",
+    slabs_per_depth="float",
+    depth_step="float",
+    nearest_offset="float",
+    regions="uint",
+)
+#: The occupancy grid as it is counted (``raycasting/occupancy.cl``).
+COUNTED = Struct(
+    "Counted",
+    width="int",
+    height="int",
+    stacks_wide="int",
+    first_depth="float",
+    slabs_per_depth="float",
+    margin="float",
+)
+
+#: What every kernel takes that draws a frame.
+_DRAWN: dict[str, str | Struct] = {
     "headers": "HEADER_T*",
-    "faces": "ulong* if not PACKED",
-    "media": "ulong* if not PACKED",
-    "supersegments": "ulong* if PACKED=16",
-    "words": "uint2* if PACKED=8",
-    "constants": "float* if PACKED",
-    "lists_wide": "int",
-    "lists_high": "int",
-    "depth_origin": "float",
+    "faces": "ulong*",
+    "media": "ulong*",
     "forms": "float*",
-    "planes": "int",
-    "width": "int",
-    "height": "int",
     "opaque_depth": "float*",
-    "has_opaque_depth": "int",
-    "cutoff": "float",
     "masks": "ulong*",
-    "first_depth": "float",
-    "slabs_per_depth": "float",
+    "frame": FRAME,
 }
-_CROPPED: dict[str, str | Struct] = {"regions": "uint if CROPPED"}
 _PICTURE: dict[str, str | Struct] = {"part": "int4", "image": "float4*"}
-_FIRST_HITS: dict[str, str | Struct] = {
-    "part": "int4",
-    "least_optical_depth": "float",
-    "accumulated": "int",
-    "image": "float*",
-}
 _SEGMENTS: dict[str, str | Struct] = {
     "cells": "int2*",
     "first_cell": "int",
-    "stream": "int",
+    "number": "int",
     "band_rays": "int",
     "depth_shift": "float",
     "margin": "float",
@@ -70,48 +79,58 @@ _CELLS: dict[str, str | Struct] = {
     "width": "int",
     "height": "int",
 }
+_CLEARED: dict[str, str | Struct] = {"pixels": "ulong"}
+_COUNTS: dict[str, str | Struct] = {"grid": COUNTED, "changes": "uint*"}
 
-_FILE = "raycasting/raycast.cl"
-RAYCAST = KernelDeclaration(_FILE, "raycast", **FRAME, **_CROPPED, **_PICTURE)
-RAYCAST_BLOCKS = KernelDeclaration(_FILE, "raycast_blocks", **FRAME, **_CROPPED, **_PICTURE)
-FIRST_HITS = KernelDeclaration(_FILE, "raycast", **FRAME, **_CROPPED, **_FIRST_HITS)
-SEGMENTS = KernelDeclaration(_FILE, "raycast", **FRAME, **_CROPPED, **_SEGMENTS)
-SEGMENTS_BLOCKS = KernelDeclaration(_FILE, "raycast_blocks", **FRAME, **_CROPPED, **_SEGMENTS)
-RAYCAST_PACKETS = KernelDeclaration(
-    "raycasting/packets.cl", "raycast_packets", **FRAME, epipole="float4", **_PICTURE
-)
-RAYCAST_ALIGNED_VIEW = KernelDeclaration(
-    "raycasting/aligned_view.cl", "raycast_aligned_view", **FRAME, origin="int2", image="float4*"
+# One ray in a work-item
+RAYCAST = KernelDeclaration("raycasting/raycast.cl", "raycast", **_DRAWN, **_PICTURE)
+FIRST_HITS = KernelDeclaration(
+    "raycasting/first_hits.cl",
+    "first_hits",
+    **_DRAWN,
+    part="int4",
+    least_optical_depth="float",
+    accumulated="int",
+    image="float*",
 )
 PREVIEW = KernelDeclaration(
-    "raycasting/preview.cl",
-    "preview",
-    **FRAME,
-    **_CROPPED,
-    counts="uint*",
-    samples="int",
-    image="float4*",
+    "raycasting/preview.cl", "preview", **_DRAWN, counts="uint*", samples="int", image="float4*"
 )
-CLEAR_IMAGE = KernelDeclaration(
-    "raycasting/clear.cl", "clear_image", pixels="ulong", image="IMAGE_T*"
+SEGMENTS = KernelDeclaration("multi_vdi/segments.cl", "segments", **_DRAWN, **_SEGMENTS)
+MERGE = KernelDeclaration("multi_vdi/merge.cl", "merge", **_MERGE)
+
+# Sixteen rays in a work-item, on CPUs
+RAYCAST_BLOCKS = KernelDeclaration("cpu16/raycast.cl", "raycast_blocks", **_DRAWN, **_PICTURE)
+RAYCAST_PACKETS = KernelDeclaration(
+    "cpu16/packets.cl", "raycast_packets", **_DRAWN, epipole="float4", **_PICTURE
 )
+RAYCAST_ALIGNED_VIEW = KernelDeclaration(
+    "cpu16/aligned_view.cl", "raycast_aligned_view", **_DRAWN, origin="int2", image="float4*"
+)
+SEGMENTS_OF_BLOCKS = KernelDeclaration(
+    "cpu16/segments.cl", "segments_of_blocks", **_DRAWN, **_SEGMENTS
+)
+MERGE_BLOCKS = KernelDeclaration("cpu16/merge.cl", "merge_blocks", **_MERGE)
+
+# What is made of a VDI and of a picture before
+CLEAR_IMAGE = KernelDeclaration("raycasting/clear.cl", "clear_image", **_CLEARED, image="float4*")
+CLEAR_HITS = KernelDeclaration("raycasting/clear.cl", "clear_hits", **_CLEARED, image="float*")
 PREPARE_LISTS = KernelDeclaration(
     "raycasting/prepare.cl",
     "prepare_lists",
     starts="OFFSET_T*",
-    headers="ulong*",
+    headers="HEADER_T*",
     fronts="float*",
     backs="float*",
-    colors="COLOR_T*",
+    colors="ulong*",
     optical_depths="float*",
     depth_origin="float",
     nearest="float",
     width="int",
     height="int",
     centre_ray="float*",
-    supersegments="uint4* if PACKED=16",
-    faces="float2* if not PACKED=16",
-    media="float4* if not PACKED=16",
+    faces="ulong*",
+    media="ulong*",
 )
 PREPARE_PACKED = KernelDeclaration(
     "raycasting/prepare_packed.cl",
@@ -131,26 +150,23 @@ COUNT_SUPERSEGMENTS = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_supersegments",
     offsets="OFFSET_T*",
-    origins="int* if PACKED",
-    strides="ushort* if PACKED",
-    words="uint2* if PACKED",
-    step="float if PACKED",
-    fronts="float* if not PACKED",
-    backs="float* if not PACKED",
-    width="int",
-    height="int",
-    stacks_wide="int",
-    first_depth="float",
-    slabs_per_depth="float",
-    margin="float",
-    changes="uint*",
+    fronts="float*",
+    backs="float*",
+    **_COUNTS,
+)
+COUNT_PACKED = KernelDeclaration(
+    "raycasting/occupancy.cl",
+    "count_packed",
+    offsets="OFFSET_T*",
+    origins="int*",
+    strides="ushort*",
+    words="uint2*",
+    step="float",
+    **_COUNTS,
 )
 OCCUPIED_SLABS = KernelDeclaration(
     "raycasting/occupancy.cl", "occupied_slabs", counts="uint*", stacks="uint", masks="ulong*"
 )
-
-MERGE = KernelDeclaration("multi_vdi/merge.cl", "merge", **_MERGE)
-MERGE_BLOCKS = KernelDeclaration("multi_vdi/merge.cl", "merge_blocks", **_MERGE)
 ALONE_ENDS = KernelDeclaration(
     "multi_vdi/cells.cl",
     "alone_ends",

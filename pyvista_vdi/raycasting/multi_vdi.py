@@ -13,24 +13,23 @@ import math
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Kernel, Runtime, get_runtime
+from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padded
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.device.ray_forms import cells_of_points
 from pyvista_vdi.device.work_order import GROUP, Rectangle
-from pyvista_vdi.model.float32_limits import compensation
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.packets import LANES
+from pyvista_vdi.raycasting.choose import choose, choose_merge
+from pyvista_vdi.raycasting.kernels import ALONE_ENDS, TAKE_CELLS
 from pyvista_vdi.raycasting.placed import PlacedVDI, canonical_order
-from pyvista_vdi.raycasting.prepared import Defines, prepared_vdi
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.raycast import enqueue, render_vdi
 from pyvista_vdi.raycasting.scene import OnDevice, Scene
-from pyvista_vdi.raycasting.strategies import strategy_for
 
 #: Bytes of the pool, unless the segments of a cell need more. A GPU needs more rays at a time; on a
 #: CPU what is below 32 MiB is memory that the process has freed, without page faults (glibc).
@@ -95,12 +94,11 @@ def owned_image(
         The same picture, to the last bit, in whatever order the VDIs are given.
     """
     runtime = get_runtime(request.device)
-    segments = 2 if _in_rows(runtime) else 1
     scenes = [
         Scene.of(
             prepared_vdi(runtime, one.vdi),
             request.replace(camera=one.camera, options=_merged(one.options)),
-            segments=segments,
+            segments=True,
         )
         for one in placed
     ]
@@ -175,43 +173,34 @@ def _draw_alone(
     owner: DeviceBuffer,
 ) -> None:
     """Draw the cells in which no two VDIs are met, as each would be by itself."""
-    width, height = size = scenes[0].size
+    size = scenes[0].size
     wide = cells.alone.shape[1]
     group = (_CELLS_OF_GROUP, 1)
-    items = (-(-wide // _CELLS_OF_GROUP) * _CELLS_OF_GROUP, height)
-    ends_kernel = runtime.kernel("multi_vdi/cells.cl", "alone_ends")
-    take = runtime.kernel("multi_vdi/cells.cl", "take_cells")
+    items = padded((wide, size[1]), group)
     with contextlib.ExitStack() as stack:
         alone = stack.enter_context(runtime.upload(cells.alone, "cells"))
-        window = (np.int32(wide), np.int32(width), np.int32(height))
+        window = {"alone": alone, "cells_wide": wide, "width": size[0], "height": size[1]}
+        end_rays = runtime.bind(ALONE_ENDS, **window)
+        take = runtime.bind(TAKE_CELLS, **window, image=image, owner=owner)
         picture, ends = image, None  # others are drawn over the first one's picture
         for number, (scene, (forms, opaque)) in enumerate(zip(scenes, on_device, strict=True)):
             part = cells.part(number, size)
             if not part.pixels:
                 continue
-            vdi = np.int32(number)
             if ends is None:
-                ends = stack.enter_context(runtime.result((height, width), name="ends of rays"))
+                ends = stack.enter_context(runtime.result(size[::-1], name="ends of rays"))
             elif picture is image:
                 picture = stack.enter_context(runtime.result(image.shape, name="one's picture"))
-            has_ends = np.int32(scene.ends is not None)
-            runtime.launch(ends_kernel, items, group, alone, vdi, *window, opaque, has_ends, ends)
-            scene = replace(scene, segments=0, only=part)
-            enqueue(scene, scene.walk_arguments(forms, ends, has_ends=True), picture)
-            runtime.launch(take, items, group, alone, vdi, *window, picture, image, owner)
+            has_ends = int(scene.ends is not None)
+            end_rays(
+                items, group, vdi=number, opaque_depth=opaque, has_opaque_depth=has_ends, ends=ends
+            )
+            scene = replace(scene, segments=False, only=part)
+            enqueue(scene, scene.arguments(forms, ends, has_ends=True), picture)
+            take(items, group, vdi=number, picture=picture)
         if (cells.alone == cells.NOBODY).any():
-            nobody = np.int32(cells.NOBODY)
-            runtime.launch(take, items, group, alone, nobody, *window, image, image, owner)
+            take(items, group, vdi=cells.NOBODY, picture=image)
         runtime.finish()  # the buffers above may be host memory in use
-
-
-class _Walk(NamedTuple):
-    """A kernel that writes a VDI's segments, and what does not change per band."""
-
-    kernel: Kernel
-    rays: int  # that a work-item follows
-    arguments: tuple[Any, ...]
-    depth_shift: np.float32
 
 
 class _MergedCells:
@@ -230,27 +219,29 @@ class _MergedCells:
         margin: float,
     ) -> None:
         self._runtime = runtime
-        self._size = scenes[0].size
         self._streams_of = np.argsort(order).astype(np.int32)
-        self._margin = np.float32(margin)
         nearest = min(scene.reference_depth for scene in scenes)
-        self._in_rows = _in_rows(runtime)
-        self._walks = []
-        for scene, (forms, ends) in ((scenes[i], on_device[i]) for i in order):
-            strategy = strategy_for(scene)
-            walk = scene.walk_arguments(forms, ends, has_ends=scene.ends is not None)
-            shift = np.float32(scene.reference_depth - nearest)
-            self._walks.append(_Walk(strategy.build(scene), strategy.rays, walk, shift))
-        defines: Defines = {
-            "STREAMS": len(scenes),
-            "SEGMENTS": scenes[0].segments,
-            **compensation(sum(scene.prepared.media for scene in scenes)),
-        }
-        in_blocks = self._in_rows and defines.get("COMPENSATED") != 2
-        self._merged_rays = LANES if in_blocks else 1
-        defines["LANES"] = self._merged_rays
-        name = "merge_blocks" if in_blocks else "merge"
-        self._merge = runtime.kernel("multi_vdi/merge.cl", name, defines)
+        self._walks: list[tuple[Launch, int]] = []  # and how many rays a work-item follows
+        for number, i in enumerate(order):
+            scene, variant = scenes[i], choose(runtime, scenes[i])
+            launch = runtime.bind(
+                variant.kernel,
+                variant.switches,
+                **scene.arguments(*on_device[i], has_ends=scene.ends is not None),
+                number=number,
+                depth_shift=scene.reference_depth - nearest,
+                margin=margin,
+            )
+            self._walks.append((launch, variant.rays))
+        merge = choose_merge(runtime, scenes)
+        self._merged_rays = merge.rays
+        self._merge = runtime.bind(
+            merge.kernel,
+            merge.switches,
+            width=scenes[0].size[0],
+            height=scenes[0].size[1],
+            transmittance_cutoff=TRANSMITTANCE_CUTOFF,
+        )
 
     def draw(
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
@@ -266,65 +257,30 @@ class _MergedCells:
         self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
     ) -> NDArray[np.int32]:
         """Draw cells whose rays have room, and return how many slots those of each have needed."""
-        runtime = self._runtime
-        width, height = self._size
-        streams = len(self._walks)
+        runtime, streams = self._runtime, len(self._walks)
         room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
-        ray_bytes = 4 * SEGMENT_SIZE * (slots + (SPARE_SLOTS if self._in_rows else 0))
+        ray_bytes = 4 * SEGMENT_SIZE * (slots + (SPARE_SLOTS if runtime.is_cpu else 0))
         most = min(max(1, room // (CELL_ITEMS * ray_bytes)), len(cells))  # cells of a band
-        rays = np.int32(most * CELL_ITEMS)
+        rays = most * CELL_ITEMS
         with (
-            runtime.result((int(rays) * ray_bytes // 4,), name="segments") as segments,
-            runtime.result((streams, int(rays)), np.int32, "ends of the streams") as ends,
-            runtime.result((streams, int(rays)), np.uint8, "VDIs met") as contributes,
-            runtime.result((int(rays),), name="ends of light") as dark,
+            runtime.result((rays * ray_bytes // 4,), name="segments") as pool,
+            runtime.result((streams, rays), np.int32, "ends of the streams") as ends,
+            runtime.result((streams, rays), np.uint8, "VDIs met") as contributes,
+            runtime.result((rays,), name="ends of light") as dark,
             runtime.buffer((len(cells),), np.int32, "slots needed") as needed,
             runtime.upload(cells, "cells") as of_cells,
             runtime.upload(self._streams_of, "order of the VDIs") as streams_of,
         ):
             runtime.fill(needed, np.int32(0))
+            written = {"pool": pool, "ends": ends, "contributes": contributes}
+            band = {"cells": of_cells, "capacity": slots, **written}
+            for launch, _ in self._walks:
+                launch.set(**band, band_rays=rays, dark=dark)
+            self._merge.set(
+                **band, rays=rays, streams_of=streams_of, needed=needed, image=image, owner=owner
+            )
             for first in range(0, len(cells), most):
                 items = min(most, len(cells) - first) * CELL_ITEMS
-                for number, walk in enumerate(self._walks):
-                    runtime.launch(
-                        walk.kernel,
-                        items // walk.rays,
-                        GROUP // walk.rays,
-                        *walk.arguments,
-                        of_cells,
-                        np.int32(first),
-                        np.int32(number),
-                        rays,
-                        walk.depth_shift,
-                        self._margin,
-                        np.int32(slots),
-                        segments,
-                        ends,
-                        contributes,
-                        dark,
-                    )
-                runtime.launch(
-                    self._merge,
-                    items // self._merged_rays,
-                    GROUP // self._merged_rays,
-                    segments,
-                    np.int32(slots),
-                    ends,
-                    contributes,
-                    rays,
-                    of_cells,
-                    np.int32(first),
-                    np.int32(width),
-                    np.int32(height),
-                    np.float32(TRANSMITTANCE_CUTOFF),
-                    streams_of,
-                    needed,
-                    image,
-                    owner,
-                )
+                for launch, n in (*self._walks, (self._merge, self._merged_rays)):
+                    launch(items // n, GROUP // n, first_cell=first)
             return runtime.download(needed)
-
-
-def _in_rows(runtime: Runtime) -> bool:
-    """Return whether segments lie ray by ray, for kernels in vectors (raycasting/segments.cl)."""
-    return runtime.is_cpu

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.device.work_order import GROUP
 from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.kernels import (
+    COUNT_PACKED,
+    COUNT_SUPERSEGMENTS,
+    COUNTED,
+    OCCUPIED_SLABS,
+)
 
 #: Squares of stacks along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
 _SQUARES = 12
@@ -35,10 +40,10 @@ class OccupancyGrid:
     span the depth range of the VDI's bounds. Built on the device, from the VDI's arrays alone, so
     that a file need not carry it.
 
-    ``faces`` are the kernel's: buffers of fronts and backs, or of 8-byte lists their origins,
-    strides, words and step. ``offsets`` are uint32, or uint64 if ``long_offsets``; ``nearest`` is
-    the least view depth in front of V_O's eye, and ``shifted`` says whether the depth coordinate
-    is that of a long lens.
+    ``lists`` are the kernel's arguments: buffers of offsets, which take 64 bits if
+    ``long_offsets``, and of fronts and backs, or of 8-byte lists their origins, strides, words and
+    step. ``nearest`` is the least view depth in front of V_O's eye, and ``shifted`` says whether
+    the depth coordinate is that of a long lens.
     """
 
     #: uint32 (stacks high, stacks wide, slabs); uint64 per stack: bit s is set where slab s is
@@ -50,8 +55,7 @@ class OccupancyGrid:
         self,
         runtime: Runtime,
         vdi: VDI,
-        offsets: DeviceBuffer,
-        faces: Sequence[Any],
+        lists: dict[str, Any],
         *,
         nearest: float,
         shifted: bool,
@@ -73,32 +77,33 @@ class OccupancyGrid:
         with kept_together() as keep:
             self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
             self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
-            defines: dict[str, str | int] = {"OFFSET_T": "ulong" if long_offsets else "uint"}
-            if isinstance(vdi.packing, Packed8):
-                defines["PACKED"] = 8
+            # Count, and sum up by stacks
+            offset_type = {"OFFSET_T": "long" if long_offsets else "int"}
+            packed = isinstance(vdi.packing, Packed8)
+            count = runtime.bind(
+                COUNT_PACKED if packed else COUNT_SUPERSEGMENTS,
+                offset_type,
+                **lists,
+                grid=COUNTED(
+                    width=width,
+                    height=height,
+                    stacks_wide=wide,
+                    first_depth=self.first_depth,
+                    slabs_per_depth=self.slabs_per_depth,
+                    margin=self.margin,
+                ),
+                changes=self.counts,
+            )
+            occupied = runtime.bind(
+                OCCUPIED_SLABS,
+                offset_type,
+                counts=self.counts,
+                stacks=wide * high,
+                masks=self.masks,
+            )
             runtime.fill(self.counts, np.uint32(0))
-            runtime.launch(
-                runtime.kernel("raycasting/occupancy.cl", "count_supersegments", defines),
-                -(-width * height // GROUP) * GROUP,
-                GROUP,
-                offsets,
-                *faces,
-                np.int32(width),
-                np.int32(height),
-                np.int32(wide),
-                np.float32(self.first_depth),
-                np.float32(self.slabs_per_depth),
-                np.float32(self.margin),
-                self.counts,
-            )
-            runtime.launch(
-                runtime.kernel("raycasting/occupancy.cl", "occupied_slabs", defines),
-                -(-wide * high // GROUP) * GROUP,
-                GROUP,
-                self.counts,
-                np.uint32(wide * high),
-                self.masks,
-            )
+            count(padded(width * height, GROUP), GROUP)
+            occupied(padded(wide * high, GROUP), GROUP)
             masks = runtime.download(self.masks)
         #: Model points, (n, 3), whose convex hull holds all occupied cells that rays meet, and a
         #: list and a slab around them.

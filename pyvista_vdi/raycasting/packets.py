@@ -42,7 +42,8 @@ _PROBES = 7
 class Packets(NamedTuple):
     """How a frame's rays are dealt to packets."""
 
-    defines: dict[str, str | int | None]  # for the directions
+    upright: bool  # whether they stand on end in the window
+    sweep_v: bool  # whether they sweep along v, not along u
     epipole: NDArray[np.float32]  # as the kernel takes it, (4,)
     part: NDArray[np.int32]  # first strip, strips, number of each one's first packet, unused
     items: int  # packets
@@ -73,19 +74,16 @@ def packets_of(
     if lit * crossed.sum() < least * across_packet.sum():
         return None
     along, across = (part.x0, part.x1), (part.y0, part.y1)
-    defines: dict[str, str | int | None] = {}
     if upright:
-        defines["UPRIGHT"] = 1
         along, across = across, along
         epipole = epipole[[1, 0, 2]]
-    if crossed[1] > crossed[0]:
-        defines["SWEEP_V"] = 1
     first = along[0] // LANES
     strips = -(-along[1] // LANES) - first
     numbers = -(-(across[1] - across[0] + 2 * MARGIN) // LANES) * LANES
     scaled = epipole / max(np.abs(epipole).max(), np.finfo(np.float64).tiny)
     return Packets(
-        defines,
+        bool(upright),
+        bool(crossed[1] > crossed[0]),
         np.append(scaled, 0.0).astype(np.float32),
         np.array([first, strips, across[0] - MARGIN, 0], np.int32),
         strips * numbers,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import threading
 import weakref
-from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import BUNDLE, FIRST_BITS, LIST_HEADER
 from pyvista_vdi.device.work_order import GROUP
@@ -19,16 +19,12 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
 from pyvista_vdi.model.packing import Packed8, Packed16
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.kernels import PREPARE_LISTS, PREPARE_PACKED
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid
 from pyvista_vdi.raycasting.packets import share_lit
 
-#: ``-D`` names of a kernel, and their values.
-Defines: TypeAlias = dict[str, str | int | None]
-
 #: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
 _LONG_LENS = 2.0
-
-_Keep: TypeAlias = Callable[[DeviceBuffer], DeviceBuffer]
 
 _prepared: weakref.WeakKeyDictionary[VDI, dict[Runtime, _Preparation]] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
@@ -45,7 +41,8 @@ class _Preparation:
 def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
     """Return the VDI on the device, made once and kept as long as the VDI lives."""
     with _lock:
-        place = _prepared.setdefault(vdi, {}).setdefault(runtime, _Preparation())
+        places = _prepared.setdefault(vdi, {})
+        place = places.get(runtime) or places.setdefault(runtime, _Preparation())
     with runtime.holding(place.lock):
         if place.prepared is None:
             place.prepared = PreparedVDI(runtime, vdi)
@@ -57,9 +54,13 @@ class PreparedVDI:
 
     #: Where there is nothing to see.
     occupancy: OccupancyGrid
-    #: Where lists begin, by their bundles or, of 8-byte supersegments, each; the supersegments.
+    #: Where lists begin, by their bundles or, of 8-byte supersegments, each; the supersegments,
+    #: which are in one array if they are packed.
     headers: DeviceBuffer
-    lists: tuple[DeviceBuffer, ...]
+    faces: DeviceBuffer
+    media: DeviceBuffer
+    #: World units of a step of depth of 8-byte supersegments.
+    depth_step: float
     #: Whether offsets take 64 bits.
     long_offsets: bool
 
@@ -80,13 +81,14 @@ class PreparedVDI:
         #: Whether the depth coordinate is that of a long lens.
         self.shifted = not self.parallel and 0 < far <= _LONG_LENS * closest
         #: About how many supersegments a ray may meet: it crosses a border from list to list.
-        self.media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
+        self.most_media = sum(vdi.window_size) + int(vdi.counts.max(initial=0))
         #: Whether float32 has too few digits for rays, whose forms are double-floats then: 1 where
         #: the lists lie at the far end of the bounds' depths, 2 at the near one.
         self.double_float = self._double_float(vdi, depths)
         self.list_rows = self.list_space(vdi.camera)
         #: Bytes of a packed supersegment; 0 where they are exact.
         self.packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
+        self.depth_step = 1.0
         self._upload(vdi)
 
     def _double_float(self, vdi: VDI, depths: tuple[float, float]) -> int:
@@ -109,21 +111,19 @@ class PreparedVDI:
     @property
     def list_bytes(self) -> int:
         """Bytes of the lists on the device: headers and supersegments."""
-        return sum(buffer.nbytes for buffer in (self.headers, *self.lists))
+        return sum(buffer.nbytes for buffer in {self.headers, self.faces, self.media})
 
     @property
-    def defines(self) -> dict[str, str | int | None]:
-        """``-D`` names that fix the kernels' shape for this VDI."""
-        defines: dict[str, str | int | None] = {"OFFSET_T": "long" if self.long_offsets else "int"}
-        if self.parallel:
-            defines["PARALLEL"] = 1
-        if self.shifted:
-            defines["SHIFTED"] = 1
-        if self.packed:
-            defines["PACKED"] = self.packed
+    def switches(self) -> dict[str, int | str]:
+        """``-D`` names of kernels that read the lists, and their values."""
+        switches: dict[str, int | str] = {
+            "OFFSET_T": "long" if self.long_offsets else "int",
+            "DEPTH": "PARALLEL" if self.parallel else "SHIFTED" if self.shifted else "RECIPROCAL",
+            "PACKED": self.packed,
+        }
         if self.double_float:
-            defines["DOUBLE_FLOAT_RAYS"] = self.double_float
-        return defines
+            switches["DOUBLE_FLOAT_RAYS"] = self.double_float
+        return switches
 
     def list_space(self, camera: Camera) -> NDArray[np.float64]:
         """Model frame to homogeneous list coordinates, float64 (4, 4).
@@ -143,156 +143,94 @@ class PreparedVDI:
 
     def _upload(self, vdi: VDI) -> None:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
-        runtime = self.runtime
+        runtime, packing = self.runtime, vdi.packing
+        # Where lists begin: by their bundles or, of 8-byte supersegments, each
         if self.packed == 8:
             lengths = vdi.counts + LIST_HEADER * (vdi.counts > 0)
         else:
             lengths = _longest(vdi.counts) * BUNDLE**2
         begins = np.zeros(lengths.size + 1, np.int64)
         np.cumsum(lengths, out=begins[1:])
+        entries = int(begins[-1])
         # Kernels count words of 8 bytes, of which an entry takes up to two, by signed numbers
-        self.long_offsets = 2 * int(begins[-1]) >= 2**31
+        self.long_offsets = 2 * entries >= 2**31
         offset_type = np.int64 if self.long_offsets else np.int32
         if self.packed == 8:
             headers: NDArray[Any] = begins.astype(offset_type)
         else:
             longest = lengths.reshape(-1) // BUNDLE**2
             headers = (begins[:-1] | longest << FIRST_BITS).view(np.uint64)
-        with (
-            kept_together() as keep,
-            runtime.upload(vdi.offsets.astype(offset_type), "list offsets") as starts,
-        ):
-            self.headers = keep(runtime.upload(headers, "list headers"))
-            if isinstance(vdi.packing, Packed8):
-                self._prepare_packed(vdi, vdi.packing, int(begins[-1]), starts, keep)
-            else:
-                with (
-                    runtime.upload(vdi.front, "front depths") as front,
-                    runtime.upload(vdi.back, "back depths") as back,
-                ):
-                    self._note_occupied(vdi, starts, (front, back), keep)
-                    n = int(begins[-1])
-                    self.lists = self._prepared_lists(vdi, n, starts, front, back, keep)
-                    runtime.finish()  # the buffers above may be host memory in use
-            runtime.finish()
-
-    def _note_occupied(
-        self,
-        vdi: VDI,
-        starts: DeviceBuffer,
-        faces: Sequence[Any],
-        keep: _Keep,
-    ) -> None:
-        """Build the occupancy grid."""
-        self.occupancy = OccupancyGrid(
-            self.runtime,
-            vdi,
-            starts,
-            faces,
-            nearest=self.nearest,
-            shifted=self.shifted,
-            long_offsets=self.long_offsets,
-        )
-        keep(self.occupancy.counts), keep(self.occupancy.masks)
-
-    def _prepared_lists(
-        self,
-        vdi: VDI,
-        entries: int,
-        starts: DeviceBuffer,
-        front: DeviceBuffer,
-        back: DeviceBuffer,
-        keep: _Keep,
-    ) -> tuple[DeviceBuffer, ...]:
-        """Return the supersegments with depth coordinates and extinctions, 24 or 16 bytes each.
-
-        They lie by bundles of lists, in so many ``entries``; ``starts`` are the lists' in the VDI's
-        arrays.
-        """
-        runtime = self.runtime
-        wide, high = vdi.window_size
-        packed = isinstance(vdi.packing, Packed16)
-        colors = vdi.packing.color if isinstance(vdi.packing, Packed16) else vdi.color
-        lists: tuple[DeviceBuffer, ...]
-        # On a CPU device memory of our own, which systems give in large pages: a driver's comes in
-        # pages of 4 KiB, each of which the kernel is interrupted for where it first writes
-        if packed:
-            lists = (keep(runtime.result((entries, 4), np.uint32, "supersegments", lasting=True)),)
-        else:
-            lists = (
-                keep(runtime.result((entries, 2), name="supersegment faces", lasting=True)),
-                keep(runtime.result((entries, 4), name="supersegment media", lasting=True)),
-            )
         # Direction of a centre ray per unit of view depth, in the model frame
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
-        with (
-            runtime.upload(colors, "supersegment colours") as color,
-            runtime.upload(vdi.optical_depth, "optical depths") as optical_depth,
-            runtime.upload(centre.astype(np.float32), "centre rays") as directions,
-        ):
-            runtime.launch(
-                runtime.kernel("raycasting/prepare.cl", "prepare_lists", self.defines),
-                -(-wide * high // GROUP) * GROUP,
-                GROUP,
-                starts,
-                self.headers,
-                front,
-                back,
-                color,
-                optical_depth,
-                np.float32(self.depth_origin),
-                np.float32(self.nearest),
-                np.int32(wide),
-                np.int32(high),
-                directions,
-                *lists,
-            )
-            runtime.finish()  # the buffers above may be host memory in use
-        return (*lists, keep(self._constants(1.0))) if packed else lists
+        with kept_together() as keep, contextlib.ExitStack() as stack:
 
-    def _prepare_packed(
-        self,
-        vdi: VDI,
-        packing: Packed8,
-        pairs: int,
-        starts: DeviceBuffer,
-        keep: _Keep,
-    ) -> None:
-        """Bring lists of 8-byte supersegments, which begin with their scales, to the device."""
-        runtime, (wide, high) = self.runtime, vdi.window_size
-        words = keep(runtime.result((max(1, pairs), 2), np.uint32, "supersegments", lasting=True))
-        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
-        with (
-            runtime.upload(packing.origins, "origins of lists") as origins,
-            runtime.upload(packing.strides, "strides of lists") as strides,
-            runtime.upload(
-                packing.words if len(packing.words) else np.zeros((1, 2), np.uint32)
-            ) as stored,
-            runtime.upload(centre.astype(np.float32), "centre rays") as directions,
-        ):
-            runtime.launch(
-                runtime.kernel("raycasting/prepare_packed.cl", "prepare_packed", self.defines),
-                -(-wide * high // GROUP) * GROUP,
-                GROUP,
-                starts,
-                self.headers,
-                origins,
-                strides,
-                stored,
-                np.float32(packing.step),
-                np.int32(wide),
-                np.int32(high),
-                directions,
-                words,
-            )
-            faces = (origins, strides, stored, np.float32(packing.step))
-            self._note_occupied(vdi, starts, faces, keep)
-            runtime.finish()  # the buffers above may be host memory in use
-        self.lists = (words, keep(self._constants(packing.step)))
+            def upload(array: NDArray[Any], name: str) -> DeviceBuffer:
+                return stack.enter_context(runtime.upload(array, name))
 
-    def _constants(self, step: float) -> DeviceBuffer:
-        constants = np.array([step, self.nearest - self.depth_origin], np.float32)
-        return self.runtime.upload(constants, "constants of depths")
+            def made(shape: tuple[int, ...], dtype: type[np.generic], name: str) -> DeviceBuffer:
+                # On a CPU device memory of our own, which systems give in large pages: a driver's
+                # comes in pages of 4 KiB, each of which the kernel is interrupted for where it
+                # first writes
+                return keep(runtime.result(shape, dtype, name, lasting=True))
+
+            self.headers = keep(runtime.upload(headers, "list headers"))
+            starts = upload(vdi.offsets.astype(offset_type), "list offsets")
+            common = {
+                "starts": starts,
+                "headers": self.headers,
+                "width": self.window[0],
+                "height": self.window[1],
+                "centre_ray": upload(centre.astype(np.float32), "centre rays"),
+            }
+            if isinstance(packing, Packed8):
+                # Lists begin with their scales
+                self.depth_step = packing.step
+                self.faces = self.media = made((max(1, entries), 2), np.uint32, "supersegments")
+                words = packing.words if len(packing.words) else np.zeros((1, 2), np.uint32)
+                faces = {
+                    "origins": upload(packing.origins, "origins of lists"),
+                    "strides": upload(packing.strides, "strides of lists"),
+                    "words": upload(words, "stored supersegments"),
+                    "step": packing.step,
+                }
+                stored = {**faces, "stored": faces["words"], "words": self.faces}
+                prepare = runtime.bind(PREPARE_PACKED, self.switches, **common, **stored)
+            else:
+                # Depth coordinates and extinctions, 24 or 16 bytes, by bundles of lists
+                faces = {
+                    "fronts": upload(vdi.front, "front depths"),
+                    "backs": upload(vdi.back, "back depths"),
+                }
+                if isinstance(packing, Packed16):
+                    self.faces = self.media = made((entries, 4), np.uint32, "supersegments")
+                    colors: NDArray[Any] = packing.color
+                else:
+                    self.faces = made((entries, 2), np.float32, "supersegment faces")
+                    self.media = made((entries, 4), np.float32, "supersegment media")
+                    colors = vdi.color
+                prepare = runtime.bind(
+                    PREPARE_LISTS,
+                    self.switches,
+                    **common,
+                    **faces,
+                    colors=upload(colors, "supersegment colours"),
+                    optical_depths=upload(vdi.optical_depth, "optical depths"),
+                    depth_origin=self.depth_origin,
+                    nearest=self.nearest,
+                    faces=self.faces,
+                    media=self.media,
+                )
+            self.occupancy = OccupancyGrid(
+                runtime,
+                vdi,
+                {"offsets": starts, **faces},
+                nearest=self.nearest,
+                shifted=self.shifted,
+                long_offsets=self.long_offsets,
+            )
+            keep(self.occupancy.counts), keep(self.occupancy.masks)
+            prepare(padded(self.window[0] * self.window[1], GROUP), GROUP)
+            runtime.finish()  # the buffers above may be host memory in use
 
 
 def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:

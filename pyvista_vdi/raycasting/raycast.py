@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, get_runtime
+from pyvista_vdi.device import DeviceBuffer, get_runtime, padded
 from pyvista_vdi.device.ray_forms import reference_depth
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.choose import choose
+from pyvista_vdi.raycasting.kernels import CLEAR_HITS, CLEAR_IMAGE
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
 from pyvista_vdi.raycasting.scene import Scene
-from pyvista_vdi.raycasting.strategies import strategy_for
 
 #: Work-items per group that clear an image.
 _CLEARING_GROUP = 256
@@ -79,22 +80,22 @@ def draw(
     scene = Scene.of(prepared, request, hit)
     # Buffers that are host memory in use are waited for when they are released
     with scene.on_device() as (forms, ends):
-        enqueue(scene, scene.walk_arguments(forms, ends, has_ends=scene.ends is not None), image)
+        enqueue(scene, scene.arguments(forms, ends, has_ends=scene.ends is not None), image)
 
 
-def enqueue(scene: Scene, walk: tuple[Any, ...], image: DeviceBuffer) -> None:
-    """Enqueue the kernel that draws a scene.
+def enqueue(scene: Scene, arguments: dict[str, Any], image: DeviceBuffer) -> None:
+    """Enqueue the kernel that draws a scene, whose :meth:`Scene.arguments` are given.
 
     Pixels beside :attr:`Scene.part` are cleared, but not beside :attr:`Scene.only`.
     """
     runtime = scene.prepared.runtime
-    strategy = strategy_for(scene)
+    variant = choose(runtime, scene)
     pixels = scene.size[0] * scene.size[1]
-    if not strategy.whole and scene.only is None and scene.part.pixels < pixels:
-        defines = {} if scene.hit is None else {"FIRST_HIT": 1}
-        clear = runtime.kernel("raycasting/clear.cl", "clear_image", defines)
-        padded = -(-pixels // _CLEARING_GROUP) * _CLEARING_GROUP
-        runtime.launch(clear, padded, _CLEARING_GROUP, np.uint64(pixels), image)
-    launch = strategy.launch(scene)
-    kernel = strategy.build(scene)
-    runtime.launch(kernel, launch.items, launch.group, *walk, *launch.arguments, image)
+    if not variant.whole and scene.only is None and scene.part.pixels < pixels:
+        clear = CLEAR_IMAGE if scene.hit is None else CLEAR_HITS
+        cleared = runtime.bind(clear, pixels=pixels, image=image)
+        cleared(padded(pixels, _CLEARING_GROUP), _CLEARING_GROUP)
+    launch = runtime.bind(
+        variant.kernel, variant.switches, **arguments, **variant.arguments, image=image
+    )
+    launch(variant.items, variant.group)

@@ -1,4 +1,4 @@
-"""A VDI in a frame: the rays in its list space, as strategies and kernels take them."""
+"""A VDI in a frame: the rays in its list space, as kernels take them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import PLANE_FORMS
 from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.float32_limits import compensation
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.raycasting.aligned_view import AlignedView, aligned_view
+from pyvista_vdi.raycasting.kernels import FRAME
 from pyvista_vdi.raycasting.packets import Packets, epipole_of, packets_of
 from pyvista_vdi.raycasting.picking import FirstHit
-from pyvista_vdi.raycasting.prepared import Defines, PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 #: How many of a frame's forms are (u, v, depth, denominator).
 _COORDINATE_FORMS = 4
@@ -51,8 +51,8 @@ class Scene:
     cropped: rays.CroppedRays
     #: What counts as a hit, where t of each ray's first one is asked for and no picture.
     hit: FirstHit | None = None
-    #: Not 0 where segments are asked for: 1 ray by ray, 2 in rows (raycasting/segments.cl).
-    segments: int = 0
+    #: Whether segments are asked for, to be merged with those of other VDIs.
+    segments: bool = False
     #: The part in which rays are cast, and nothing is written beside it; None: the VDI decides.
     only: Rectangle | None = None
 
@@ -62,7 +62,7 @@ class Scene:
         prepared: PreparedVDI,
         request: FrameRequest,
         hit: FirstHit | None = None,
-        segments: int = 0,
+        segments: bool = False,
     ) -> Scene:
         """Make the rays of a frame."""
         camera, size, options = request.camera, request.size, request.options
@@ -92,45 +92,6 @@ class Scene:
             hit,
             segments,
         )
-
-    @cached_property
-    def defines(self) -> Defines:
-        """``-D`` names that every kernel which draws the scene has."""
-        defines = {**self.prepared.defines, **self.cropped.defines}
-        if self.segments:
-            defines["SEGMENTS"] = self.segments
-        elif self.hit is not None:
-            defines["FIRST_HIT"] = 1
-        else:
-            defines.update(compensation(self.options.preview_samples or self.prepared.media))
-        return defines
-
-    @property
-    def skipping(self) -> Defines:
-        """``-D`` names of kernels that pass by what is empty: none where that does not pay."""
-        skips = self.options.skip_empty and self.prepared.occupancy.worthwhile
-        return {"SKIP_EMPTY": 1} if skips else {}
-
-    @property
-    def in_regions(self) -> bool:
-        """Whether it takes the regions of cropping to say what is drawn."""
-        return bool(self.cropped.forms)
-
-    @cached_property
-    def in_vectors(self) -> bool:
-        """Whether there are kernels that follow the scene's rays in vectors."""
-        exact = not self.prepared.double_float and self.defines.get("COMPENSATED") != 2
-        return self.prepared.runtime.is_cpu and exact
-
-    @property
-    def in_blocks(self) -> bool:
-        """Whether there is one that follows them in blocks of pixels."""
-        return self.in_vectors and not self.prepared.packed and not self.prepared.long_offsets
-
-    @property
-    def plain(self) -> bool:
-        """Whether there are those that follow them together otherwise."""
-        return self.in_vectors and not self.in_regions
 
     @cached_property
     def one_list(self) -> bool:
@@ -166,9 +127,11 @@ class Scene:
             in_bundles=prepared.packed != 8,
         )
 
-    @cached_property
-    def packets(self) -> Packets | None:
-        """How the rays are dealt to packets; None if each had better be followed by itself."""
+    def packets(self, *, or_blocks: bool) -> Packets | None:
+        """Return how the rays are dealt to packets; None if each had better be followed by itself.
+
+        That is in blocks, or not.
+        """
         forms = self.forms.astype(np.float64)
         return packets_of(
             self.size,
@@ -177,12 +140,12 @@ class Scene:
             forms[PLANE_FORMS : PLANE_FORMS + self.planes],
             epipole_of(self.prepared.camera, self.camera, self.size),
             self.prepared.lit,
-            or_blocks=self.in_blocks,
+            or_blocks=or_blocks,
         )
 
     @contextlib.contextmanager
     def on_device(self) -> Iterator[OnDevice]:
-        """Have the forms and the ends of rays on the device."""
+        """Upload the forms and the ends of rays for a ``with`` block."""
         runtime = self.prepared.runtime
         ends = np.zeros(1, np.float32) if self.ends is None else self.ends
         with (
@@ -191,29 +154,35 @@ class Scene:
         ):
             yield forms, depth
 
-    def walk_arguments(
+    def arguments(
         self, forms: DeviceBuffer, ends: DeviceBuffer, *, has_ends: bool
-    ) -> tuple[Any, ...]:
-        """Return the arguments that every kernel which walks through the lists begins with."""
+    ) -> dict[str, Any]:
+        """Return the arguments that every kernel takes which draws a frame."""
         prepared, cutoff = self.prepared, self.options.transmittance_cutoff
-        return (
-            prepared.headers,
-            *prepared.lists,
-            np.int32(prepared.window[0]),
-            np.int32(prepared.window[1]),
-            np.float32(prepared.depth_origin),
-            forms,
-            np.int32(self.planes),
-            np.int32(self.size[0]),
-            np.int32(self.size[1]),
-            ends,
-            np.int32(has_ends),
-            np.float32(-math.log(cutoff) if self.segments else cutoff),
-            prepared.occupancy.masks,
-            np.float32(prepared.occupancy.first_depth),
-            np.float32(prepared.occupancy.slabs_per_depth),
-            *self.cropped.arguments,
-        )
+        occupancy = prepared.occupancy
+        return {
+            "headers": prepared.headers,
+            "faces": prepared.faces,
+            "media": prepared.media,
+            "forms": forms,
+            "opaque_depth": ends,
+            "masks": occupancy.masks,
+            "frame": FRAME(
+                lists_wide=prepared.window[0],
+                lists_high=prepared.window[1],
+                width=self.size[0],
+                height=self.size[1],
+                planes=self.planes,
+                has_opaque_depth=has_ends,
+                depth_origin=prepared.depth_origin,
+                cutoff=-math.log(cutoff) if self.segments else cutoff,
+                first_depth=occupancy.first_depth,
+                slabs_per_depth=occupancy.slabs_per_depth,
+                depth_step=prepared.depth_step,
+                nearest_offset=prepared.nearest - prepared.depth_origin,
+                regions=self.cropped.regions,
+            ),
+        }
 
 
 def _viewport_planes(
@@ -221,9 +190,8 @@ def _viewport_planes(
 ) -> list[NDArray[np.float64]]:
     """Return forms that keep what is in V_O's viewport and in front of its eye."""
     u, v, _, denominator = coordinates
-    wide, high = prepared.window[0] / 2, prepared.window[1] / 2
-    sides = [u, -u, v, -v]
-    forms = [s + e * denominator for s, e in zip(sides, (wide, wide, high, high), strict=True)]
+    wide, high = (edge / 2 * denominator for edge in prepared.window)
+    forms = [wide + u, wide - u, high + v, high - v]
     if not prepared.parallel:
         front = denominator.copy()
         front[0] -= prepared.nearest

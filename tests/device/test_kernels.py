@@ -105,16 +105,21 @@ def test_wrong_arguments_are_refused_by_name(runtime, affine):
 ROOMS = ("generation", "raycasting", "volume", "extensions.large", "extensions.series")
 #: ``-D`` options that every program of a room may have, and those that kernels must have beside.
 OPTIONS = {room: Variant("ushort").defines for room in ("generation", "volume", "extensions.large")}
+LISTS = {"DEPTH": "PARALLEL", "PACKED": 0}
+RAYS = {"CROPPED": 1, "SKIP_EMPTY": 1}
 OF_KERNELS = {
-    "FIRST_HITS": {"FIRST_HIT": 1},
-    "SEGMENTS": {"SEGMENTS": 1},
-    "SEGMENTS_BLOCKS": {"SEGMENTS": 2, "LANES": 16},
-    "MERGE": {"SEGMENTS": 1, "STREAMS": 2},
-    "MERGE_BLOCKS": {"SEGMENTS": 2, "STREAMS": 2, "LANES": 16},
-    "RAYCAST_BLOCKS": {"LANES": 16},
-    "RAYCAST_PACKETS": {"LANES": 16},
-    "RAYCAST_ALIGNED_VIEW": {"LANES": 16},
-    "PREPARE_PACKED": {"PACKED": 8},
+    "RAYCAST": {**LISTS, **RAYS, "ONE_LIST": 1},
+    "FIRST_HITS": {**LISTS, **RAYS, "ONE_LIST": 0},
+    "PREVIEW": {**LISTS, "CROPPED": 1},
+    "SEGMENTS": {**LISTS, **RAYS, "SEGMENT_ROWS": 0},
+    "MERGE": {"SEGMENT_ROWS": 0, "STREAMS": 2},
+    "MERGE_BLOCKS": {"STREAMS": 2},
+    "RAYCAST_BLOCKS": {"DEPTH": "SHIFTED", **RAYS},
+    "SEGMENTS_OF_BLOCKS": {"DEPTH": "RECIPROCAL", **RAYS},
+    "RAYCAST_PACKETS": {**LISTS, "SKIP_EMPTY": 1, "UPRIGHT": 1, "SWEEP_V": 0},
+    "RAYCAST_ALIGNED_VIEW": LISTS,
+    "PREPARE_LISTS": LISTS,
+    "PREPARE_PACKED": {"DEPTH": "PARALLEL", "PACKED": 8},
     "PROJECT": {"BLEND_MODE": 1},
     "PROJECT_16": {"BLEND_MODE": 3},
     "OPTICAL_DEPTHS": {"GRID_PART": 1},

@@ -28,7 +28,7 @@ LAUNCHING = (
     "device.work_order",
     "raycasting.occupancy",
     "raycasting.prepared",
-    "raycasting.strategies",
+    "raycasting.choose",
     "volume.classified_volume",
     "volume.upload",
 )

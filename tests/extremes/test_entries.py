@@ -164,7 +164,7 @@ def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, paral
     camera = EYE.replace(parallel_projection=parallel, parallel_scale=0.7)
     where = {"window": (4, 3), "bounds": (-1, 1, -1, 1, -1, 1), "depth_origin": 9.0}
     vdi = slabs_vdi(camera, [2 - 2 / thinness, 2], 1.0, **where).with_precision(precision)
-    assert ("DOUBLE_FLOAT_RAYS" in PreparedVDI(runtime, vdi).defines) is far
+    assert ("DOUBLE_FLOAT_RAYS" in PreparedVDI(runtime, vdi).switches) is far
     image = render_vdi(vdi, vdi.camera, (4, 3), device=runtime)
     assert_within(worst, "VDI at V_O", image, reference.render(vdi, vdi.camera, (4, 3)))
     check_views(runtime, worst, vdi, [EYE.azimuth(a) for a in (25, 90, 180)], least_drawn=0)
@@ -179,7 +179,7 @@ def test_what_depths_cannot_tell_is_left_to_float32(thickness, far):
 def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
     volume = field_volume()
     vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
-    assert "DOUBLE_FLOAT_RAYS" not in PreparedVDI(runtime, vdi).defines
+    assert "DOUBLE_FLOAT_RAYS" not in PreparedVDI(runtime, vdi).switches
 
 
 @pytest.mark.every(5)
@@ -193,6 +193,6 @@ def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(
     vdi = strategies.random_vdi(rng, max_window=(9, 7)).with_precision(precision)
     camera, size = strategies.random_view(rng, vdi, kind)
     monkeypatch.setattr("pyvista_vdi.raycasting.prepared.lists_are_far", lambda *_: True)
-    assert "DOUBLE_FLOAT_RAYS" in PreparedVDI(runtime, vdi).defines
+    assert "DOUBLE_FLOAT_RAYS" in PreparedVDI(runtime, vdi).switches
     image = render_vdi(vdi, camera, size, device=runtime)
     worst("random VDI", assert_explained(vdi, camera, size, image, name=kind).worst)

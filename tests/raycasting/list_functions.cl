@@ -1,7 +1,8 @@
-// Entry point to opencl/raycasting/lists.cl, one work-item per query.
-//
-// -D OFFSET_T   see raycasting/supersegments.cl
-#include "raycasting/lists.cl"
+// Entry point to opencl/raycasting/first_supersegment.cl, one work-item per query.
+#define OFFSET_T int
+#define PACKED 0
+#define DEPTH RECIPROCAL
+#include "raycasting/first_supersegment.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Query i asks list lists[i].x .. lists[i].x + lists[i].y; (direction, guess) = how[i]. Supersegment k is faces[k * stride],
@@ -10,19 +11,20 @@
 __kernel void counts_passing(int count, __global const ulong *faces, __global const int2 *lists,
                              __global const float *depths, __global const int2 *how, __global int *results)
 {
-    __global const ulong *media = faces; // not read
     const int i = get_global_id(0);
     if (i >= count)
         return;
-    const List list = {lists[i].x * LISTS_PER_BUNDLE, lists[i].y};
+    const Lists all = {0, faces, faces, 0, 0, 0.0f, 0.0f};
+    const List list = {lists[i].x * LISTS_PER_BUNDLE, lists[i].y, 0, 0, 0.0f};
     const bool away = how[i].x != 0;
     const int guess = min(how[i].y, list.count);
+    const float depth = away ? depths[i] : -depths[i];
     Search search = begin_search(away ? how[i].y : list.count - guess);
     Faces face;
-    int left = list.count + 3; // turns; more than any search takes
-    while (!search_on(&search, &list, SUPERSEGMENTS_ARGUMENTS away ? depths[i] : -depths[i], true, away, &face) && --left > 0)
-        guess_again(&search, &list, false);
-    results[i] = left == 0 ? -1 : away ? search.n : list.count - search.n;
+    int left = list.count + 3; // comparisons; more than any search takes
+    while (!first_supersegment(&search, &all, list, depth, away, 0.0f, &face) && --left > 0)
+        ;
+    results[i] = left == 0 ? -1 : away ? search.p : list.count - search.p;
 }
 
 // Entries between supersegments of a list, for the caller.
@@ -30,4 +32,19 @@ __kernel void lists_per_bundle(int count, __global int *result)
 {
     if (get_global_id(0) == 0)
         result[0] = LISTS_PER_BUNDLE;
+}
+
+// Where the members of a frame lie, and how large it is.
+#define OFFSET(member) (int)((const char *)&frame.member - (const char *)&frame)
+__kernel void frame_layout(int count, __global int *result)
+{
+    Frame frame;
+    const int found[] = {OFFSET(lists_wide), OFFSET(lists_high), OFFSET(width), OFFSET(height), OFFSET(planes),
+                         OFFSET(has_opaque_depth), OFFSET(depth_origin), OFFSET(cutoff), OFFSET(first_depth),
+                         OFFSET(slabs_per_depth), OFFSET(depth_step), OFFSET(nearest_offset), OFFSET(regions),
+                         sizeof(Frame)};
+    if (get_global_id(0) == 0) {
+        for (int n = 0; n < count; ++n)
+            result[n] = found[n];
+    }
 }

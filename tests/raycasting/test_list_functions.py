@@ -1,5 +1,4 @@
-"""opencl/raycasting/lists.cl: the first supersegment that a ray meets in a list, against a linear
-scan.
+"""The first supersegment that a ray meets in a list, against a linear scan.
 
 The paper's Algorithm 1 as printed is not what is tested here, but what it is for; the
 documentation gives the errata.
@@ -11,6 +10,8 @@ import itertools
 
 import numpy as np
 import pytest
+
+from pyvista_vdi.raycasting.kernels import FRAME
 
 FILE = "list_functions.cl"
 
@@ -27,7 +28,7 @@ def linear_scan(faces, depth, away):
 
 def check(call, lists, queries):
     """Compare answers with the scan. ``queries``: (list, depth, away, guess)."""
-    stride = call(FILE, "lists_per_bundle", 1, call.empty(1, dtype=np.int32), OFFSET_T="int")[0]
+    stride = call(FILE, "lists_per_bundle", 1, call.empty(1, dtype=np.int32))[0]
     faces = np.float32([face for faces in lists for face in faces]).reshape(-1, 2)
     flat = np.full((stride * len(faces) + 1, 2), np.nan, np.float32)  # nothing else is read
     flat[: stride * len(faces) : stride] = faces
@@ -38,9 +39,8 @@ def check(call, lists, queries):
     how = np.column_stack([away, guesses]).astype(np.int32)
     results = call.empty(len(queries), dtype=np.int32)
     found = call(
-        FILE, "counts_passing", len(queries), flat, places, np.float32(depths), how, results,
-        OFFSET_T="int",
-    )  # fmt: skip
+        FILE, "counts_passing", len(queries), flat, places, np.float32(depths), how, results
+    )
     # Made once for all guesses
     expected = {key: linear_scan(lists[key[0]], *key[1:]) for key in {q[:3] for q in queries}}
     wanted = np.array([expected[q[:3]] for q in queries])
@@ -98,3 +98,10 @@ def test_long_lists(call, sign):
                     queries.append((which, depth, away, int(guess)))
     assert len(queries) > 4000
     check(call, lists, queries)
+
+
+def test_a_frame_lies_on_the_device_as_on_the_host(call):
+    offsets = [FRAME.dtype.fields[name][1] for name in FRAME.fields]
+    expected = [*offsets, FRAME.dtype.itemsize]
+    found = call(FILE, "frame_layout", len(expected), call.empty(len(expected), dtype=np.int32))
+    assert found.tolist() == expected

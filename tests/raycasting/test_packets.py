@@ -15,13 +15,13 @@ from drawing import draw, frame
 from extreme_scenes import slabs_vdi
 
 from pyvista_vdi import VDI, Camera
-from pyvista_vdi.device import Runtime
+from pyvista_vdi.device import Launch
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.raycasting import packets
+from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
 from pyvista_vdi.raycasting.scene import Scene
-from pyvista_vdi.raycasting.strategies import strategy_for
 
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 CAMERA = Camera((0, 0, 6), (0, 0, 0), (0, 1, 0), view_angle=30)
@@ -38,9 +38,9 @@ def slab_vdi(optical_depth=0.1, window=WINDOW, precision="exact"):
     return vdi.with_precision(precision)
 
 
-def scene_of(runtime, vdi, camera, size=SIZE, first_hit=None, **options):
+def scene_of(runtime, vdi, camera, size=SIZE, first_hit=None, prepared=None, **options):
     request = frame(vdi, camera, size, **{"skip_empty": False, **options})
-    return Scene.of(prepared_vdi(runtime, vdi), request, first_hit)
+    return Scene.of(prepared or prepared_vdi(runtime, vdi), request, first_hit)
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_which_rays_are_in_packets(runtime):
         (away, SIZE, 0.1, False),
         (turned, SIZE, 100.0, False),
     ):
-        found = scene_of(runtime, slab_vdi(tau), camera, size).packets
+        found = scene_of(runtime, slab_vdi(tau), camera, size).packets(or_blocks=runtime.is_cpu)
         assert (found is not None) == in_packets
 
 
@@ -87,7 +87,7 @@ REGIONS = {"cropping": ((-0.5, 0.5, -0.5, 0.5, -0.5, 0.5), "fence")}
         (CAMERA.replace(model_transform=np.eye(4)), WINDOW, {}, [OWN] * 3),
         (CAMERA.azimuth(1e-4), WINDOW, {}, [OWN] * 3),  # which no ray leaves its list by
         (CAMERA, SIZE, {}, ["raycast"] * 3),
-        (CAMERA, WINDOW, {"first_hit": FirstHit.of(0.5, True)}, ["raycast"] * 3),
+        (CAMERA, WINDOW, {"first_hit": FirstHit.of(0.5, True)}, ["first_hits"] * 3),
         (TURNED, WINDOW, {}, ["raycast_blocks", "raycast", "raycast"]),
         (CAMERA.azimuth(1), SIZE, {}, ["raycast_blocks", "raycast", "raycast"]),
         (CAMERA.replace(window_center=(1e-3, 0)), WINDOW, {}, ["raycast_blocks"] + 2 * ["raycast"]),
@@ -101,7 +101,9 @@ def test_which_kernel_follows_rays(cpu, camera, size, options, kernels):
     """Blocks near V_O, packets far from it; where there are no blocks, packets from nearer on."""
     for precision, kernel in zip(("exact", "16-byte", "8-byte"), kernels, strict=True):
         scene = scene_of(cpu, slab_vdi(precision=precision), camera, size, **options)
-        assert strategy_for(scene).kernel == kernel
+        variant = choose(cpu, scene)
+        assert variant.kernel.name == kernel
+        assert len(variant.switches) <= 8
 
 
 def test_how_far_light_gets():
@@ -118,19 +120,20 @@ def test_how_far_light_gets():
 
 
 @pytest.mark.parametrize(
-    ("camera", "defines"),
+    ("camera", "upright", "sweep_v"),
     [
-        (CAMERA.azimuth(30), {}),
-        (CAMERA.azimuth(-60), {}),
-        (CAMERA.elevation(30), {"UPRIGHT": 1, "SWEEP_V": 1}),
-        (CAMERA.azimuth(30).replace(view_up=(1, 0, 0)), {"UPRIGHT": 1}),
-        (CAMERA.elevation(30).replace(view_up=(1, 0, 0)), {"SWEEP_V": 1}),
+        (CAMERA.azimuth(30), 0, 0),
+        (CAMERA.azimuth(-60), 0, 0),
+        (CAMERA.elevation(30), 1, 1),
+        (CAMERA.azimuth(30).replace(view_up=(1, 0, 0)), 1, 0),
+        (CAMERA.elevation(30).replace(view_up=(1, 0, 0)), 0, 1),
     ],
     ids=["to the right", "to the left", "up", "to the right and rolled", "up and rolled"],
 )
-def test_packets_lie_along_the_lines_that_rays_share(cpu, camera, defines, monkeypatch):
+def test_packets_lie_along_the_lines_that_rays_share(cpu, camera, upright, sweep_v, monkeypatch):
     strategies.deal_rays(monkeypatch, cpu, "packets")
-    assert scene_of(cpu, slab_vdi(), camera).packets.defines == defines
+    switches = choose(cpu, scene_of(cpu, slab_vdi(), camera)).switches
+    assert (switches["UPRIGHT"], switches["SWEEP_V"]) == (upright, sweep_v)
 
 
 def test_the_epipole_is_where_the_eye_of_the_generating_view_is_seen():
@@ -166,24 +169,23 @@ def test_no_pixel_is_left_out(runtime, kind, size, dealt):
 def test_each_pixel_is_drawn_by_one_packet(cpu, kind, monkeypatch):
     """When a ray ends depends on its packet, in the last bits: two that draw a pixel would race."""
     strategies.deal_rays(monkeypatch, cpu, "packets")
-    launch, size = Runtime.launch, (96, 80)
+    launch, size = Launch.__call__, (96, 80)
 
     def written(prepared, camera, numbers):
-        """Where packets of some numbers draw: their arguments end with (epipole, part, image)."""
+        """Where packets of some numbers draw."""
+        chosen = choose(cpu, scene_of(cpu, None, camera, size, prepared=prepared))
+        first, strips, number, _ = chosen.arguments["part"]
 
-        def some(self, kernel, items, group, *arguments, **options):
-            if kernel.name != "raycast_packets":
-                launch(self, kernel, items, group, *arguments, **options)
+        def some(self, items, group, **arguments):
+            if "raycast_packets" not in repr(self):
+                launch(self, items, group, **arguments)
                 return
-            *walk, (first, strips, number, _), image = arguments
-            most = items // strips
-            for n in range(number, number + most)[numbers]:
+            for n in range(number, number + items // strips)[numbers]:
                 for strip in range(first, first + strips):
-                    one = np.array([strip, 1, n, 0], np.int32)
-                    launch(self, kernel, 1, 1, *walk, one, image, **options)
+                    launch(self, 1, 1, **arguments, part=(strip, 1, n, 0))
 
         with monkeypatch.context() as patch:
-            patch.setattr(Runtime, "launch", some)
+            patch.setattr(Launch, "__call__", some)
             return drawn(cpu, prepared, camera, size, unwritten=-1)[..., 3] >= 0
 
     for case in range(3):

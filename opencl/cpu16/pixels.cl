@@ -1,8 +1,11 @@
-// The pixels of a work-item's rays.
+// The pixels of a work-item's sixteen rays.
 #include "lib/rays.cl"
+#include "raycasting/frame.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#define BLOCK 4 // rays along each edge of a block, which vectors follow
+// Those of the block that begins at a corner.
+#define X_OF_BLOCK(corner) ((corner).x + (LANE_NUMBERS & (BLOCK - 1)))
+#define Y_OF_BLOCK(corner) ((corner).y + (LANE_NUMBERS / BLOCK))
 
 typedef struct {
     int places[LANES]; // in the image

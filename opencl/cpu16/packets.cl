@@ -1,20 +1,24 @@
-// VDI to image from a view that is turned far from V_O: what raycasting/raycast.cl does, for packets of rays.
+// The picture of raycasting/raycast.cl from a view that is turned far from V_O, a packet of sixteen
+// rays in a work-item (docs/decisions/packets.md).
 //
-// A packet's rays cross the same lists, if not at the same depth. The work-item sweeps over the lists along one axis of V_O's
-// window, p, from where its first ray begins: in each column of lists, list by list along the other axis, q, all rays that
-// cross the list go on through it together, while rays that are ahead wait. So each list and each supersegment is loaded
-// once for the packet. What a ray does is the same as in raycasting/raycast.cl, whatever the others do.
+// A packet's rays cross the same lists, if not at the same depth. The work-item sweeps over the
+// lists along one axis of V_O's window, p, from where its first ray begins: in each column of lists,
+// list by list along the other axis, q, all rays that cross the list go on through it together,
+// while rays that are ahead wait. So each list and each supersegment is loaded once for the packet.
+// What a ray does is the same as in raycasting/walk.cl, whatever the others do.
 //
-// -D SWEEP_V            p is v, not u
-// -D UPRIGHT            packets stand on end in the window of V_N
-// -D SKIP_EMPTY         as in raycasting/raycast.cl: the picture is the same to the last bit
-// -D OFFSET_T, PARALLEL, SHIFTED, PACKED, COMPENSATED (1)    as there
+// -D SWEEP_V=0, 1      p is v, not u
+// -D UPRIGHT=0, 1      packets stand on end in the window of V_N
+// -D SKIP_EMPTY=0, 1   pass by what the occupancy grid says is empty; the picture is the same
 #define LANES 16
-#define SHARED_LISTS
-#include "raycasting/lists.cl"
+#define CROPPED 0
+#include "lib/lanes.cl"
+typedef int Steps;
+typedef float Border;
+#include "cpu16/pixels.cl"
+#include "cpu16/rays.cl"
 #include "raycasting/stepping.cl"
-#include "raycasting/pixels.cl"
-#include "raycasting/frame.cl"
+#include "raycasting/supersegments.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -49,24 +53,19 @@ inline Int across_strip(int first, int number, int along_size, int across_size, 
 }
 
 // Of u's and v's, that of p and that of q; and of p's and q's, those of u and v
-#ifdef SWEEP_V
-#define FIRST_OF(of_u, of_v) (of_v)
-#define SECOND_OF(of_u, of_v) (of_u)
-#else
-#define FIRST_OF(of_u, of_v) (of_u)
-#define SECOND_OF(of_u, of_v) (of_v)
-#endif
+#define FIRST_OF(of_u, of_v) (SWEEP_V ? (of_v) : (of_u))
+#define SECOND_OF(of_u, of_v) (SWEEP_V ? (of_u) : (of_v))
 
 // How far the rays have come.
 typedef struct {
     Int p, q; // places of their lists; p is NOWHERE if they have ended
     Real r;
-    Real depth; // in their sense, see raycasting/lists.cl
+    Real depth; // in their sense, see raycasting/first_supersegment.cl
 } Progress;
 
-#ifdef SKIP_EMPTY
-// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to another stack is `fresh` there.
-inline void pass_by(Progress *now, Int *fresh, Int looks, int P, const ListRays *rays, const Axis *p, const Axis *q,
+// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to another
+// stack has a `new_stack` there.
+inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, const ListRays *rays, const Axis *p, const Axis *q,
                     const Sense *sense, const Grid *grid, float depth_origin)
 {
     const int stack_p = P >> STACK_SHIFT;
@@ -98,10 +97,9 @@ inline void pass_by(Progress *now, Int *fresh, Int looks, int P, const ListRays 
         now->p = select(now->p, select(next_p * p->step, (Int)(NOWHERE), ends), passes);
         const Int enters = passes && !ends && ((next_p ^ P) | (next_q ^ index_q)) >> STACK_SHIFT != 0;
         looks = looks || (enters && next_p == P);
-        *fresh = *fresh || (enters && next_p != P);
+        *new_stack = *new_stack || (enters && next_p != P);
     }
 }
-#endif
 
 // The supersegment that each ray has met last and that is not composited yet: that takes as long for one ray as for all, and
 // few of them are in the same supersegment at a time.
@@ -112,22 +110,32 @@ typedef struct {
 } Met;
 
 // Composite what waits.
-inline void composite_met(Seen *seen, Met *met, const ListRays *rays, const Sense *sense, float depth_origin)
+inline void composite_met(Seen *seen, Met *met, const ListRays *rays, const Sense *sense)
 {
     Real from, to;
     clip_to_faces(&from, &to, sense, met->near, met->far, met->r, met->r_next, depth_at(sense, met->r),
                   depth_at(sense, met->r_next));
-    composite_medium(seen, met->medium.w * length_crossed(rays, from, to, depth_origin), met->medium, met->waits);
+    composite_medium(seen, met->medium.w * lengths_between(rays, from, to), met->medium, met->waits);
     met->waits = 0;
+}
+
+// Where rays enter and leave the n-th supersegment that they come to, in their sense.
+inline float near_face(const Lists *lists, List list, int n, bool away, float depth_origin)
+{
+    return away ? face_of(lists, list, n, depth_origin).x : -face_of(lists, list, list.count - 1 - n, depth_origin).y;
+}
+
+inline float far_face(const Lists *lists, List list, int n, bool away, float depth_origin)
+{
+    return away ? face_of(lists, list, n, depth_origin).y : -face_of(lists, list, list.count - 1 - n, depth_origin).x;
 }
 
 // Follow the rays that are `going`, which step the same way, through all lists that they cross.
 __attribute__((always_inline))
 inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q, Int going, Int first_p, Int first_q,
-                  bool away, __global const HEADER_T *headers, SUPERSEGMENTS_PARAMETERS int lists_wide, float depth_origin,
-                  float cutoff, __global const ulong *masks, float first_depth, float slabs_per_depth)
+                  bool away, const Lists *lists, const Grid *grid, float depth_origin, float cutoff)
 {
-    const Sense sense = sense_of(rays, away);
+    const Sense sense = sense_of(rays->along.z, rays->deep.z, away);
     const Real r_end = rays->r_begin + 1.0f;
     Met met;
     met.waits = 0;
@@ -138,21 +146,16 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
     now.r = rays->r_begin;
     now.depth = sense.sign * rays->start.z;
     int n = 0; // the supersegment that the last list was left at
-#ifdef SKIP_EMPTY
-    const Grid grid = {masks, STACKS_ALONG(lists_wide), first_depth, slabs_per_depth};
-    Int fresh = going; // lanes in a stack that they have not looked at
-#endif
+    Int new_stack = going; // lanes in a stack that they have not looked at
     for (int place_p = least_lane(now.p); place_p != NOWHERE; place_p = least_lane(now.p)) {
         const int P = place_p * p->step;
         Int column = now.p == place_p;
-#ifdef SKIP_EMPTY
-        const Int looks = column && fresh;
-        if (ANY(looks)) {
-            fresh = fresh && !looks;
-            pass_by(&now, &fresh, looks, P, rays, p, q, &sense, &grid, depth_origin);
+        const Int looks = column && new_stack;
+        if (SKIP_EMPTY && ANY(looks)) {
+            new_stack = new_stack && !looks;
+            skip_empty_cells(&now, &new_stack, looks, P, rays, p, q, &sense, grid, depth_origin);
             column = now.p == place_p;
         }
-#endif
         const Real r_p = CROSSINGS(p, (Real)(P));
         // By the columns before: where a ray goes does not wait for what it sees in this one
         const Int dark = seen->sums.w < cutoff;
@@ -168,24 +171,24 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
             const Real r_next = HIGHER_OF(now.r, LOWER_OF(r_end, LOWER_OF(r_p, r_q)));
             const Real next_depth = depth_at(&sense, r_next);
 
-            const List list = LIST_AT(FIRST_OF(P, Q), SECOND_OF(P, Q));
+            const List list = list_at(lists, FIRST_OF(P, Q), SECOND_OF(P, Q));
             n = min(n, list.count);
-            while (n > 0 && ANY(here && far_face(list, SUPERSEGMENTS_ARGUMENTS n - 1, away) > now.depth))
+            while (n > 0 && ANY(here && far_face(lists, list, n - 1, away, depth_origin) > now.depth))
                 --n;
             for (int k = n; k < list.count; ++k) {
-                const float near = near_face(list, SUPERSEGMENTS_ARGUMENTS k, away);
+                const float near = near_face(lists, list, k, away, depth_origin);
                 const Int come_to = here && near <= next_depth;
                 if (!ANY(come_to))
                     break;
-                const float far = far_face(list, SUPERSEGMENTS_ARGUMENTS k, away);
+                const float far = far_face(lists, list, k, away, depth_origin);
                 const Int meet = come_to && far > now.depth;
                 if (!ANY(meet)) {
                     n = k + 1;
                     continue;
                 }
                 if (ANY(meet && met.waits))
-                    composite_met(seen, &met, rays, &sense, depth_origin);
-                const float4 medium = MEDIUM(list, away ? k : list.count - 1 - k);
+                    composite_met(seen, &met, rays, &sense);
+                const float4 medium = medium_of(lists, list, away ? k : list.count - 1 - k);
                 met.near = select(met.near, (Real)(near), meet);
                 met.far = select(met.far, (Real)(far), meet);
                 met.r = select(met.r, now.r, meet);
@@ -207,56 +210,57 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
             now.q = select(now.q, (Int)(place_q + 1), steps_q);
             column = now.p == place_p;
             const bool goes_on = ANY(column); // here, where it is one instruction, as the comparison has just made a mask
-#ifdef SKIP_EMPTY
             if (((P + p->step) ^ P) >> STACK_SHIFT)
-                fresh = fresh || steps_p;
+                new_stack = new_stack || steps_p;
             if (((Q + q->step) ^ Q) >> STACK_SHIFT)
-                fresh = fresh || steps_q;
-#endif
+                new_stack = new_stack || steps_q;
             if (!goes_on)
                 break;
         }
     }
-    composite_met(seen, &met, rays, &sense, depth_origin);
+    composite_met(seen, &met, rays, &sense);
 }
 
 KERNEL_OF_LANES void raycast_packets(
-    FRAME_PARAMETERS
+    __global const HEADER_T *headers,   // these as of raycasting/raycast.cl
+    __global const ulong *faces,
+    __global const ulong *media,
+    __global const float *forms,
+    __global const float *opaque_depth,
+    __global const ulong *masks,
+    Frame frame,
     float4 epipole,                     // see across_strip
     int4 part,                          // of the window: first strip, how many, number of each strip's first packet
-    __global float4 *image)             // premultiplied RGBA, top row first
+    __global float4 *image)
 {
-#ifdef UPRIGHT
-    const int along_size = height, across_size = width;
-#else
-    const int along_size = width, across_size = height;
-#endif
-    // Strips lie side by side in blocks of LANES packets, so that what is close in the window is close in time
+    const int along_size = UPRIGHT ? frame.height : frame.width, across_size = UPRIGHT ? frame.width : frame.height;
+    // Strips lie side by side in blocks of LANES packets, so that what is close in the window is
+    // close in time
     const int item = (int)get_global_id(0);
     const int block = item / LANES;
     const int first = (part.x + block % part.y) * LANES;
     const int number = part.z + block / part.y * LANES + item % LANES;
     const Int along = first + LANE_NUMBERS;
     const Int across = across_strip(first, number, along_size, across_size, epipole);
-    // A pixel of two packets is the former's: how it is rounded depends on what the packet's other rays meet
+    // A pixel of two packets is the former's: how it is rounded depends on what the packet's other
+    // rays meet
     const Int is_own = across != across_strip(first, number - 1, along_size, across_size, epipole);
     const Int in_window = is_own && along < along_size && across >= 0 && across < across_size;
     if (!ANY(in_window))
         return;
-#ifdef UPRIGHT
-    const Int x = across, y = along;
-#else
-    const Int x = along, y = across;
-#endif
-    const Pixels pixels = pixels_at(x, y, in_window, width, height);
-    const Real t_end = has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Real)(INFINITY);
-    const ListRays rays = begin_rays(forms, planes, offsets_from_middle(x, width), offsets_from_middle(y, height), t_end, in_window,
-                                 depth_origin);
+    const Int x = UPRIGHT ? across : along, y = UPRIGHT ? along : across;
+    const Pixels pixels = pixels_at(x, y, in_window, frame.width, frame.height);
+    const Real t_end = frame.has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Real)(INFINITY);
+    const ListRays rays = begin_rays(forms, &frame, offsets_from_middle(x, frame.width), offsets_from_middle(y, frame.height),
+                                     t_end, in_window);
+    const Lists lists = LISTS_OF(frame);
+    const Grid grid = GRID_OF(frame);
 
     Seen seen = nothing_seen();
-    Axis p = axis_of(FIRST_OF(rays.along.x, rays.along.y), FIRST_OF(rays.deep.x, rays.deep.y), FIRST_OF(lists_wide, lists_high));
+    Axis p = axis_of(FIRST_OF(rays.along.x, rays.along.y), FIRST_OF(rays.deep.x, rays.deep.y),
+                     FIRST_OF(lists.wide, lists.high));
     Axis q = axis_of(SECOND_OF(rays.along.x, rays.along.y), SECOND_OF(rays.deep.x, rays.deep.y),
-                     SECOND_OF(lists_wide, lists_high));
+                     SECOND_OF(lists.wide, lists.high));
     const Int first_p = list_index(&p, FIRST_OF(rays.start.x, rays.start.y), 0);
     const Int first_q = list_index(&q, SECOND_OF(rays.start.x, rays.start.y), 0);
     // Rays that step the same way go on together: nearly always, all
@@ -265,17 +269,12 @@ KERNEL_OF_LANES void raycast_packets(
         const int way = least_of(ways, waiting);
         const Int going = waiting && ways == way;
         waiting = waiting && !going;
-        const bool away = way & 1;
-        take_step(&p, way & 2);
-        take_step(&q, way & 4);
-        if (away)
-            sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, headers,
-                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, cutoff, masks, first_depth,
-                  slabs_per_depth);
+        take_step(&p, (way & 2) != 0);
+        take_step(&q, (way & 4) != 0);
+        if (way & 1)
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, &lists, &grid, frame.depth_origin, frame.cutoff);
         else
-            sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, headers,
-                  SUPERSEGMENTS_ARGUMENTS lists_wide, depth_origin, cutoff, masks, first_depth,
-                  slabs_per_depth);
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, &lists, &grid, frame.depth_origin, frame.cutoff);
     }
     write_pixels(image, &pixels, composited(&seen));
 }

@@ -1,0 +1,126 @@
+"""Which kernel draws a scene on a device, with which switches: one record, chosen in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pyvista_vdi.device import KernelDeclaration, Runtime
+from pyvista_vdi.device.constants import COLUMN_ITEMS
+from pyvista_vdi.device.work_order import GROUP, block_items, part_columns
+from pyvista_vdi.model.float32_limits import summation
+from pyvista_vdi.raycasting import kernels
+from pyvista_vdi.raycasting.packets import LANES
+from pyvista_vdi.raycasting.scene import Scene
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A kernel that draws a scene, and how it is launched.
+
+    Attributes
+    ----------
+    kernel : KernelDeclaration
+        A file of ``opencl/`` and the kernel in it.
+    switches : mapping
+        ``-D`` names and their values, of which each program has eight at most.
+    items, group : int
+        Work-items, and those of a group; of segments, 0 and those of a group.
+    arguments : mapping
+        Those of the kernel's own, beside what all kernels take that draw a frame.
+    rays : int
+        Rays that a work-item follows.
+    whole : bool
+        Whether it writes every pixel of the window, those beside :attr:`Scene.part`, too.
+    """
+
+    kernel: KernelDeclaration
+    switches: Mapping[str, int | str]
+    items: int
+    group: int
+    arguments: Mapping[str, Any]
+    rays: int = 1
+    whole: bool = False
+
+
+def choose(device: Runtime, scene: Scene) -> Variant:
+    """Return the variant that draws a scene on a device (docs/decisions/index.md).
+
+    CPUs follow sixteen rays in vectors that are written out, where there are such kernels; what
+    else there is, and everything on other devices, is followed ray by ray.
+    """
+    prepared, options = scene.prepared, scene.options
+    lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
+    depth = {"DEPTH": lists["DEPTH"]}
+    compensated = summation(options.preview_samples or prepared.most_media)
+    sums = {"COMPENSATED": compensated}
+    walk = {
+        "CROPPED": int(bool(scene.cropped.forms)),
+        "SKIP_EMPTY": int(options.skip_empty and prepared.occupancy.worthwhile),
+    }
+    double_float, cropped = prepared.double_float, walk["CROPPED"]
+    suit_blocks = not double_float and not prepared.packed and not prepared.long_offsets
+
+    if options.preview_samples is not None:
+        switches = {**lists, **sums, "CROPPED": cropped}
+        counts = {"counts": prepared.occupancy.counts, "samples": options.preview_samples}
+        items = block_items(*scene.size)
+        return Variant(kernels.PREVIEW, switches, items, GROUP, counts, whole=True)
+
+    # What rays cross of one of several VDIs
+    if scene.segments and device.is_cpu and suit_blocks:
+        blocks = kernels.SEGMENTS_OF_BLOCKS
+        return Variant(blocks, {**depth, **walk}, 0, GROUP // LANES, {}, LANES)
+    if scene.segments:
+        switches = {**lists, **walk, "SEGMENT_ROWS": int(device.is_cpu)}
+        return Variant(kernels.SEGMENTS, switches, 0, GROUP, {})
+
+    def by_columns(
+        kernel: KernelDeclaration, switches: Mapping[str, int | str], rays: int = 1, **own: Any
+    ) -> Variant:
+        """Return the variant that draws the scene's part in strips, column by column."""
+        columns = part_columns(scene.part)
+        items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
+        own = {"part": columns, **own}
+        return Variant(kernel, switches, items // rays, COLUMN_ITEMS // rays, own, rays)
+
+    if scene.hit is not None:
+        return by_columns(
+            kernels.FIRST_HITS,
+            {**lists, **walk, "ONE_LIST": int(scene.one_list)},
+            least_optical_depth=scene.hit.optical_depth,
+            accumulated=int(scene.hit.accumulated),
+        )
+
+    # At V_O, each pixel from a list of its own
+    in_vectors = device.is_cpu and not double_float and compensated < 2
+    in_blocks = in_vectors and suit_blocks
+    uncropped = in_vectors and not cropped
+    if uncropped and scene.aligned is not None:
+        kernel, own = kernels.RAYCAST_ALIGNED_VIEW, {"origin": scene.aligned.origin}
+        items = scene.aligned.items
+        return Variant(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
+    # V_O's other rays have a loop of their own one by one; regions have blocks
+    if scene.one_list and not (cropped and in_blocks):
+        return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
+
+    # Rays that have many lists in common
+    packets = scene.packets(or_blocks=in_blocks) if uncropped else None
+    if packets is not None:
+        ways = {"UPRIGHT": int(packets.upright), "SWEEP_V": int(packets.sweep_v)}
+        switches = {**lists, **sums, **ways, "SKIP_EMPTY": walk["SKIP_EMPTY"]}
+        across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
+        return Variant(kernels.RAYCAST_PACKETS, switches, packets.items, LANES, across, LANES)
+    if in_blocks:
+        return by_columns(kernels.RAYCAST_BLOCKS, {**depth, **walk, **sums}, LANES)
+    return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 0})
+
+
+def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> Variant:
+    """Return the variant that merges what rays cross of several VDIs."""
+    compensated = summation(sum(scene.prepared.most_media for scene in scenes))
+    switches = {"STREAMS": len(scenes), "COMPENSATED": compensated}
+    if device.is_cpu and compensated < 2:
+        return Variant(kernels.MERGE_BLOCKS, switches, 0, GROUP // LANES, {}, LANES)
+    return Variant(kernels.MERGE, {**switches, "SEGMENT_ROWS": int(device.is_cpu)}, 0, GROUP, {})
