@@ -8,8 +8,10 @@ import numpy as np
 
 from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, padded
 from pyvista_vdi.device.declarations import SCALARS
+from pyvista_vdi.volume.kernels import CLASSIFIED, RAYS
 
 GROUP = 64
+STRUCTS = (CLASSIFIED, RAYS)
 TYPES = {number.name: name for name, number in SCALARS.items()}
 
 
@@ -41,7 +43,7 @@ class Caller:
         """What the kernel wrote: its outputs in order, alone where there is one.
 
         The kernel's first parameter is ``items``. Arrays are uploaded but for those whose place
-        is in ``by_value`` (vectors).
+        is in ``by_value`` (vectors and structures).
         """
         with ExitStack() as stack:
             kinds, given, written = {"items": "int"}, {}, []
@@ -56,8 +58,11 @@ class Caller:
                     value = stack.enter_context(self._runtime.upload(argument))
                 count = np.size(value) if isinstance(value, np.ndarray) else 1
                 star = "*" if isinstance(value, DeviceBuffer) else ""
-                kinds[name] = f"{TYPES[value.dtype.name]}{count if count > 1 else ''}{star}"
                 given[name] = value
+                if value.dtype.names:
+                    kinds[name] = next(kind for kind in STRUCTS if kind.dtype == value.dtype)
+                    continue
+                kinds[name] = f"{TYPES[value.dtype.name]}{count if count > 1 else ''}{star}"
             declaration = KernelDeclaration(self._folder / file, kernel, **kinds)
             launch = self._runtime.bind(declaration, defines, items=items, **given)
             launch(padded(items, GROUP), GROUP)
