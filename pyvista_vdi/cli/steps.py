@@ -15,9 +15,9 @@ from typing import Any
 from pyvista_vdi.cli.inputs import laid_out, open_store, quietly, read_volume
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions.series import reader
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.io import read_info
+from pyvista_vdi.io.files import holds
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.time_steps import in_step_order, listed_steps, lists_steps
 from pyvista_vdi.io.volumes import needs_pyvista
@@ -52,8 +52,8 @@ def steps_of_vdis(files: Sequence[str]) -> list[Step]:
     """Return the steps of files that hold VDIs or series of them."""
     steps = []
     for file in files:
-        if reader.is_series_file(file):
-            series = reader.read(file)
+        if holds(file) == "series":
+            series = read_vdi(file)
             for i, at in enumerate(series.times):
                 steps.append(Step(f"{file}, step {i}", at, partial(series.__getitem__, i)))
         else:

@@ -13,13 +13,12 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.packing import Packed8, Packed16
-from pyvista_vdi.model.vdi import VDI
 
 #: Share of the way to the middle of the bounds at which their corners are looked at.
 _INNER = 0.5
 
 
-def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
+def thinned(vdi: Any, along_x: int = 1, along_y: int = 1) -> Any:
     """Return a VDI of every k-th list along each edge: the same lists, of the same rays.
 
     A list stands for its neighbours, too. From the side a ray crosses a k-th of the lists, which
@@ -30,7 +29,7 @@ def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     vdi : VDI
         Of any precision, which stays.
     along_x, along_y : int
-        Every how-manieth list is taken along the window's width and height.
+        Take every k-th list along the window's width and height.
 
     Returns
     -------
@@ -64,7 +63,7 @@ def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     offsets = np.concatenate([[0], np.cumsum(counts)])
     rows = np.repeat(vdi.offsets.view(np.int64)[taken] - offsets[:-1], counts)
     rows += np.arange(offsets[-1])
-    result = VDI(
+    result = type(vdi)(
         view,
         window,
         offsets,
@@ -88,7 +87,7 @@ def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     return result
 
 
-def lists_crossed(vdi: VDI, camera: Camera) -> NDArray[np.float64]:
+def lists_crossed(vdi: Any, camera: Camera) -> NDArray[np.float64]:
     """Return how many lists rays of a view cross along the window's width and height, float64 (2,).
 
     The mean of nine rays that go through the bounds, over a length of half their diagonal.

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
 import shlex
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import nrrd
 import numpy as np
@@ -18,7 +15,7 @@ from PIL import Image
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
-from pyvista_vdi.cli import inputs, paraview, parser
+from pyvista_vdi.cli import inputs, parser
 from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -554,74 +551,3 @@ def test_the_module_is_the_command():
     )
     assert result.returncode == 2
     assert result.stderr.startswith("pyvista-vdi: error: there is no verb 'generat'")
-
-
-@pytest.fixture
-def plain_installation(tmp_path, monkeypatch):
-    """An environment that holds the package and no VTK, in a folder that a shell must quote."""
-    package = tmp_path / "a folder" / "pyvista_vdi"
-    for room in ("opencl", "cli"):
-        (package / room).mkdir(parents=True)
-    (package / "opencl" / "__init__.py").touch()
-    copied = shutil.copy(paraview.__file__, package / "cli")
-    specification = importlib.util.spec_from_file_location(paraview.__name__, copied)
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    monkeypatch.setitem(sys.modules, paraview.__name__, module)
-    monkeypatch.setattr(module.sysconfig, "get_path", lambda name: str(package.parent))
-    return package
-
-
-def test_paraview_prints_the_plugins_path(capsys):
-    out = said(capsys, "paraview")
-    assert Path(out.strip()).is_file()
-
-
-def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
-    out = said(capsys, "paraview", "--environment")
-    shown = subprocess.run(
-        ["sh", "-c", f'{out}echo "$PYTHONPATH"; echo "$PV_PLUGIN_PATH"'],
-        env={"PYTHONPATH": "/before"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    site = plain_installation.parent
-    assert shown.stdout.splitlines() == [
-        f"{site}:/before",
-        f"{site}/pyvista_vdi/extensions/paraview",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("does", "message"),
-    [
-        ('echo "$PYTHONPATH:$PV_PLUGIN_PATH"', None),
-        ("exit 3", "loads the plugin, and finds no OpenCL device"),
-        ("exit 1", "does not load the plugin (status 1)"),
-    ],
-)
-def test_paraview_is_asked_whether_it_finds_a_device(
-    plain_installation, tmp_path, capfd, monkeypatch, does, message
-):
-    monkeypatch.setenv("PYTHONPATH", "/before")
-    monkeypatch.delenv("PV_PLUGIN_PATH", raising=False)
-    pvpython = tmp_path / "pvpython"
-    pvpython.write_text(f"#!/bin/sh\n{does}\n")
-    pvpython.chmod(0o755)
-    if message is None:
-        site = plain_installation.parent
-        expected = f"{site}:/before:{site}/pyvista_vdi/extensions/paraview\n"
-        assert run(capfd, "paraview", "--check", pvpython) == (0, expected, "")
-    else:
-        assert message in complaint(capfd, "paraview", "--check", pvpython)
-
-
-def test_paraview_is_not_shown_what_it_cannot_use(plain_installation, capsys):
-    assert "does not start" in complaint(capsys, "paraview", "--check", "/no/pvpython")
-    (plain_installation / "opencl" / "__init__.py").unlink()
-    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")
-    (plain_installation / "opencl" / "__init__.py").touch()
-    (plain_installation.parent / "vtkmodules").mkdir()
-    message = complaint(capsys, "paraview", "--environment")
-    assert "holds a VTK of its own" in message

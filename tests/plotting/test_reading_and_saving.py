@@ -11,7 +11,7 @@ from strategies import random_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
-from pyvista_vdi.plotting.reader import SeriesReader
+from pyvista_vdi.extensions.series.pyvista_reader import SeriesReader
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image, vdi_to_image
 
 

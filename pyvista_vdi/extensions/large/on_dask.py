@@ -54,10 +54,10 @@ from pyvista_vdi.extensions.large.passes import Opacities, Piece, Rows, Seen, Ta
 from pyvista_vdi.extensions.large.reading import Plan, Read
 from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.generation.generate import Progress, report
-from pyvista_vdi.io.store_identity import StoreIdentity, check_once, identity_of
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.store_identity import StoreIdentity, check_once, identity_of
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume

@@ -35,21 +35,16 @@ from pyvista_vdi.extensions.series.codes import ENTRIES, Samples, Tables
 from pyvista_vdi.extensions.series.differences import Stepped, decoded
 from pyvista_vdi.extensions.series.layout import FrameHeader
 from pyvista_vdi.extensions.series.on_device import decoded_on, runtime_for_decoding
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.files import opened
 from pyvista_vdi.io.vdi_file import reader as vdi_reader
 from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.packing import check_precision
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 
 _log = logging.getLogger(__name__)
-
-#: What the names of pages end in.
-_PAGE = ".html"
 
 _REMEDY = "copy it from its source again, or generate the series anew"
 
@@ -176,11 +171,7 @@ class StepsReader(Sequence[VDI]):
     def __init__(self, path: str | os.PathLike[str]) -> None:
         try:
             self._path = Path(path)
-            self._stream: BinaryIO = (
-                provider("html_files").data_in(path)
-                if str(path).lower().endswith(_PAGE)
-                else self._path.open("rb")
-            )
+            self._stream: BinaryIO = opened(self._path)
             weakref.finalize(self, self._stream.close)
             self._file_bytes = self._stream.seek(0, os.SEEK_END)
         except (OSError, ValueError, TypeError) as error:
@@ -593,36 +584,3 @@ def _tables(arrays: dict[str, NDArray[Any]]) -> Tables:
         raise InvalidVDIError("its extinctions are not finite")
     # Copies: the arrays of a frame lie in one memory
     return Tables(colors.reshape(-1, 3).copy(), extinctions.copy())
-
-
-def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
-    """Read a series from a .vdis file; steps are decoded when they are asked for.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    progress : callable, optional
-        Called with 1: opening reads no step.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
-    """
-    steps = StepsReader(path)
-    Pieces(progress, 1)()
-    return VDISeries(steps, steps.times)
-
-
-def read_info(path: str | os.PathLike[str]) -> SeriesInfo:
-    """Read what a .vdis file says about itself, without its steps: errors as for :func:`read`."""
-    return StepsReader(path).info()
-
-
-def is_series_file(path: Any) -> bool:
-    """Whether a file is read as a series: by its name, and a page by its content."""
-    name = str(path).lower()
-    if name.endswith(_PAGE):
-        return bool(provider("html_files").begins_with(path, layout.MAGIC))
-    return name.endswith(layout.SUFFIX)

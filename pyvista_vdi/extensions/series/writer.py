@@ -25,10 +25,10 @@ from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import writer as vdi_writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
 from pyvista_vdi.io.vdi_file.description import describe
-from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 
 #: Steps at most between two that need no other one.
 KEY_EVERY = 16

@@ -21,7 +21,6 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.extensions.series.writer import StepsWriter
 from pyvista_vdi.extensions.sets.files import bytes_around
-from pyvista_vdi.extensions.sets.render import blended
 from pyvista_vdi.extensions.sets.sphere import orbit, spiral, spread
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.generation.generate import generate_vdi
@@ -44,6 +43,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.tiles import REACH, seen_region
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
+from pyvista_vdi.raycasting.blend import blended
 
 _log = logging.getLogger(__name__)
 

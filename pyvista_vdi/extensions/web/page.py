@@ -27,10 +27,10 @@ from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.vdi_file.writer import write_to
-from pyvista_vdi.io.whole_file import check_writable, whole_file
 from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.metrics import over_background
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import check_writable, whole_file
 
 #: What the script elements that hold a .vdi file as base64 say of themselves.
 DATA_TYPE = "application/vdi+base64"

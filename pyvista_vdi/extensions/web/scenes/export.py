@@ -17,7 +17,7 @@ from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.page import View, assembled, in_parts
 from pyvista_vdi.extensions.web.placing import thinned
 from pyvista_vdi.extensions.web.scenes.scene import css, scene_of
-from pyvista_vdi.io.whole_file import whole_file
+from pyvista_vdi.model.whole_file import whole_file
 
 
 def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.StringIO | None:

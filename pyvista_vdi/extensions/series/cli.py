@@ -6,9 +6,11 @@ import argparse
 import json
 import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+from pyvista_vdi import registry
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     OF_ANY_VOLUME,
@@ -23,16 +25,15 @@ from pyvista_vdi.cli.inputs import (
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_vdis, steps_of_volumes, timed
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.errors import InvalidArgumentError, naming
-from pyvista_vdi.extensions.large.entrance import connected
-from pyvista_vdi.extensions.series import reader
+from pyvista_vdi.extensions.series import files as of_series
 from pyvista_vdi.extensions.series.layout import SUFFIX
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.io import check_write_options, checked_target
-from pyvista_vdi.io.files import HTML_SUFFIX
-from pyvista_vdi.io.whole_file import check_writable, with_suffix
+from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
 #: Options of ``convert`` that are for deep images of other programs, and for those that it writes.
 OF_READ_IMAGES = ("camera_json", "thickness", "from_linear")
@@ -62,7 +63,7 @@ def series(options: argparse.Namespace) -> int:
     # A writer's file grows step by step: it gets its name when it is whole, and all have been read
     with (
         tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder,
-        connected(options.scheduler) as client,
+        _connected(options.scheduler) as client,
         measuring("writing a series") as bar,
     ):
         part = Path(folder) / target.name
@@ -74,7 +75,7 @@ def series(options: argparse.Namespace) -> int:
                     out.append(step.read(), step.time)
                     bar((i + 1) / len(steps))
         part.replace(target)
-    about = reader.read_info(options.output)
+    about = of_series.read_info(options.output)
     print(f"{printable(options.output)}: {len(about.times)} steps, {mebibytes(about.file_bytes)}")
     return 0
 
@@ -104,6 +105,11 @@ def _write_volumes(
             bar((i + 1) / len(steps))
 
 
+def _connected(address: str | None) -> Any:
+    """Connect to a Dask scheduler, if one is given."""
+    return nullcontext() if address is None else registry.generator("clients")(address)
+
+
 def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
     return {
         **of_the_file(options),
@@ -115,14 +121,14 @@ def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
 def _kind(file: str) -> str:
     from pyvista_vdi.io import is_vdi_file
 
-    if reader.is_series_file(file):
+    if holds(file) == "series":
         return "series"
     return "VDI" if is_vdi_file(file) else "volume"
 
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file of a series says about itself."""
-    about = reader.read_info(options.file)
+    about = of_series.read_info(options.file)
     if options.json:
         state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
         print(json.dumps(state, indent=1))
@@ -152,9 +158,10 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Write a series anew, as a page, or each of its steps to a file of its own."""
     refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a series")
-    steps: VDISeries = reader.read(options.file)
+    steps: VDISeries = of_series.read(options.file)
     target, arguments = Path(options.output), of_the_file(options)
-    if target.suffix.lower() in (SUFFIX, HTML_SUFFIX):
+    found = format_named(target)
+    if found is not None and (found.suffix == SUFFIX or found.page):
         refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {target.suffix}")
         with measuring("converting") as bar:
             steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
