@@ -220,9 +220,6 @@ ENTRIES = {
 }
 
 
-SLOW = [*ENTRIES].index("generate_set")
-
-
 @pytest.fixture
 def vdi(default_runtime, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
