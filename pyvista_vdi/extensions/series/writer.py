@@ -18,7 +18,8 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming
 from pyvista_vdi.extensions.series import layout
 from pyvista_vdi.extensions.series.codes import Codes, Samples, Tables
 from pyvista_vdi.extensions.series.continuing import Begun, begun
-from pyvista_vdi.extensions.series.differences import SAME, Stepped, encoded, lengths_of
+from pyvista_vdi.extensions.series.differences import SAME, Stepped, lengths_of
+from pyvista_vdi.extensions.series.encoder import encoded
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import checked_time
 from pyvista_vdi.io.progress import Pieces, Progress
