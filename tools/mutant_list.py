@@ -400,7 +400,10 @@ PICTURES = "pyvista_vdi/quality/pictures.py"
 PACKING = "pyvista_vdi/model/packing.py"
 REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
 WHEN, WAYS = "pyvista_vdi/quality/when_anew.py", "pyvista_vdi/quality/ways.py"
-SET, SHOWER = "pyvista_vdi/extensions/sets/vdi_set.py", "pyvista_vdi/extensions/sets/shower.py"
+SET, SELECTION = (
+    "pyvista_vdi/extensions/sets/vdi_set.py",
+    "pyvista_vdi/extensions/sets/selection.py",
+)
 VIEWER = "pyvista_vdi/extensions/web/viewer/"
 PLAYER, SERIES = (
     "pyvista_vdi/extensions/series/player.py",
@@ -613,7 +616,7 @@ PYTHON_MUTANTS = (
     ),
     _m(
         "view selection: the view before stays the nearest",
-        SHOWER,
+        SELECTION,
         "self._weights = self.vdi_set.weights(camera)",
         "pass",
         ("extensions/sets", "vtk_pipeline", "plotting"),

@@ -20,7 +20,7 @@ _AHEAD = 8
 _MOVED = 1.0
 
 
-class SetShower:
+class ViewSelection:
     """Keeps at hand what frames need of a set.
 
     The thread that draws tells where it looks from by :meth:`look`, asks for :attr:`vdi` and
