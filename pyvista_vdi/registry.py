@@ -215,7 +215,7 @@ def method(name: str, otherwise: Any = None) -> Any:
     Without an extension that has it, that is ``otherwise``; MissingDependencyError is raised where
     that is ``None``.
     """
-    place = _place("methods", name)
+    place = core.methods.get(name) or _place("methods", name)
     if place is None and otherwise is None:
         raise _missing(name)
     return otherwise if place is None else load(place)

@@ -141,7 +141,7 @@ def test_data_files_and_methods_of_others(tmp_path):
 
 
 def test_what_no_extension_has_is_said_by_name():
-    with pytest.raises(pvdi.MissingDependencyError, match=r"by flight is of an extension .* web\)"):
+    with pytest.raises(pvdi.MissingDependencyError, match="by flight is of an extension"):
         registry.generator("flight")
     assert registry.method("VDI.flight", 5) == 5
     assert registry.made_of("volumes", 3) is None

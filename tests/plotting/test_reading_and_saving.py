@@ -65,6 +65,7 @@ def test_a_file_that_is_no_deep_image_is_refused(tmp_path):
         pv.read(tmp_path / "a.exr")
 
 
+@pytest.mark.extension("series")  # whose entry point would be broken
 def test_nothing_of_pyvista_is_shadowed():
     written = {".exr", ".vdi"}
     ours = {*written, ".vdis"}

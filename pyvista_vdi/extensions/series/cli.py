@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+import sys
 import tempfile
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +27,17 @@ from pyvista_vdi.cli.inputs import (
     refuse,
     say_written,
 )
-from pyvista_vdi.cli.steps import Step, in_order, steps_of_vdis, steps_of_volumes, timed
+from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.extensions.series import files as of_series
 from pyvista_vdi.extensions.series.layout import SUFFIX
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.writer import SeriesWriter
-from pyvista_vdi.io import check_write_options, checked_target
+from pyvista_vdi.io import check_write_options, checked_target, read_info
+from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.io.files import format_named, holds
+from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
@@ -54,9 +61,9 @@ def series(options: argparse.Namespace) -> int:
     if kinds[0] == "volume":
         steps = steps_of_volumes(files, options, in_chunks=True)
     else:
-        steps = steps_of_vdis(files)
+        steps = _steps_of_vdis(files)
     if kinds[0] != "series":
-        steps = timed(steps, options.times)
+        steps = _timed(steps, options.times)
     looks = classification(options)
     Classification(looks, "series")  # refused before a volume is read
     target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
@@ -116,6 +123,46 @@ def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
         "tolerance": options.tolerance,
         "key_every": options.key_every,
     }
+
+
+def _steps_of_vdis(files: Sequence[str]) -> list[Step]:
+    """Return the steps of files that hold VDIs or series of them."""
+    steps = []
+    for file in files:
+        if holds(file) == "series":
+            series = read_vdi(file)
+            for i, at in enumerate(series.times):
+                steps.append(Step(f"{file}, step {i}", at, partial(series.__getitem__, i)))
+        else:
+            at = as_number(read_info(file).metadata.get("time"))  # as a simulation's is written
+            steps.append(Step(file, None if math.isnan(at) else at, partial(read_vdi, file)))
+    return steps
+
+
+def _timed(steps: Sequence[Step], given: Sequence[float] | None) -> list[Step]:
+    """Return steps with the times that are given, else with the files' where these ascend.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If others are given than there are steps.
+    """
+    if given is not None:
+        if len(given) != len(steps):
+            raise InvalidArgumentError(
+                f"--times gives a time to each step: there are {len(steps)} steps and "
+                f"{len(given)} times"
+            )
+        return [replace(step, time=at) for step, at in zip(steps, given, strict=True)]
+    known = [step.time for step in steps if step.time is not None]
+    if known and (len(known) < len(steps) or any(b <= a for a, b in pairwise(known))):
+        print(
+            "The times in the files do not ascend, or some have none: steps are numbered "
+            "(--times gives times)",
+            file=sys.stderr,
+        )
+        return [replace(step, time=None) for step in steps]
+    return list(steps)
 
 
 def _kind(file: str) -> str:
