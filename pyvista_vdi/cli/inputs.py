@@ -101,7 +101,7 @@ def _read_quietly(file: Path) -> Any:
 
 @contextmanager
 def quietly() -> Iterator[None]:
-    """Let VTK's readers write nothing: the error says what is wrong."""
+    """Silence VTK's readers: the error says what is wrong."""
     before = logging.root.manager.disable
     logging.disable(logging.ERROR)
     try:
@@ -296,7 +296,7 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def say_vdi(options: argparse.Namespace, vdi: VDI, more: str = "") -> None:
-    """Say what was written to ``--output``."""
+    """Print what was written to ``--output``."""
     width, height = vdi.window_size
     print(
         f"{printable(options.output)}: {vdi.n_supersegments} supersegments in {width} x {height} "

@@ -257,7 +257,7 @@ class Player:
         self._trim()
 
     def _trim(self) -> None:
-        """Let go of what memory is not enough for, from what is shown in the longest time on.
+        """Drop what memory is not enough for, from what is shown in the longest time on.
 
         In a round that does not fit, the same steps are kept in each.
         """

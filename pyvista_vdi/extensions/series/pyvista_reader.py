@@ -71,11 +71,11 @@ class SeriesReader(pv.BaseReader, pv.TimeReader):  # type: ignore[type-arg]
         return float(series.times[0 if wanted is None else series.nearest(wanted)])
 
     def set_active_time_value(self, time_value: float) -> None:
-        """Have the step read that is nearest to a time."""
+        """Choose the step that is nearest to a time."""
         self._information.Set(UPDATE_TIME_STEP, float(time_value))
 
     def set_active_time_point(self, time_point: int) -> None:
-        """Have a step read, by its index."""
+        """Choose a step by its index."""
         self.set_active_time_value(self.time_point_value(time_point))
 
     @property

@@ -99,7 +99,7 @@ class ViewSelection:
         return self._grower.job is not None
 
     def grow(self) -> None:
-        """Have a VDI made of the view behind the frames, if its picture misses the target."""
+        """Generate a VDI of the view behind the frames, if its picture misses the target."""
         view, before = self._view, self._grown_for
         if self.growing or not self.vdi_set.can_grow:
             return
@@ -128,7 +128,7 @@ class ViewSelection:
             self._weights = self.vdi_set.weights(view)
 
     def stop_growing(self) -> None:
-        """Give up what is being made: the view turns."""
+        """Cancel what is being made: the view turns."""
         if self._grower.running:
             self._grower.clear()
             self._grown_for = None

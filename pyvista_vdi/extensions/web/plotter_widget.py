@@ -89,7 +89,7 @@ class PlotterWidget(VDIWidget):
         return None if self.window is None else self._renderer()
 
     def _turn(self, change: Any) -> None:
-        """Give the renderer the camera that has changed in the browser, or here."""
+        """Copy the camera that has changed, in the browser or here, to the other side."""
         renderer = self._open_renderer()
         if renderer is None or _same(_camera_of(renderer), change.new):
             return

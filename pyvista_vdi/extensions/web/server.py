@@ -195,7 +195,7 @@ class Server:
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
-        """Let in who knows the token, from a page of ours, by a name of ours."""
+        """Admit who knows the token, from a page of ours, by a name of ours."""
         if not self._is_ours(_place(f"//{request.host}")):
             # A page of another site whose name was made to point here (DNS rebinding)
             return _refused("this server does not go by that name")
@@ -482,7 +482,7 @@ def _refused(why: str) -> web.Response:
 
 
 def _keep_queue_short(transport: asyncio.BaseTransport | None) -> None:
-    """Have the system take little that it has not sent, so that what is given up is not sent."""
+    """Limit what the system takes without having sent it, so that what is given up is not sent."""
     connected = None if transport is None else transport.get_extra_info("socket")
     if connected is not None and hasattr(socket, "TCP_NOTSENT_LOWAT"):
         with contextlib.suppress(OSError):

@@ -142,7 +142,7 @@ class Client:
             self._settling.cancel()
 
     def close(self) -> None:
-        """Give up what is being made."""
+        """Cancel what is being made."""
         self._stop_settling()
         self._cancelled.set()
         self._closed = True

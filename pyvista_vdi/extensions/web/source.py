@@ -250,7 +250,7 @@ class Source:
             return estimator.estimate(vdi, camera, size, clipping_planes=wish.planes or None).ssim
 
     def forget(self, made: Made | None) -> None:
-        """Let go of a VDI that is judged no more."""
+        """Drop a VDI that is judged no more."""
         with self._lock:
             self._kept.pop(made, None)  # type: ignore[arg-type]
 

@@ -104,7 +104,7 @@ def png(pixels: NDArray[np.uint8]) -> str:
 
 
 def stand_in(picture: str, key: str, model_id: str) -> None:
-    """Have a notebook show a picture, base64 PNG, where a widget's view comes to nothing.
+    """Show a picture in a notebook, base64 PNG, where a widget's view comes to nothing.
 
     It is an output of its own: of one output, what shows notebooks takes the view alone.
     """

@@ -78,7 +78,7 @@ def _caption(caption: Any, renderer: Any) -> dict[str, Any]:
 
 
 def _labels_of_points(mapper: Any, renderer: Any) -> Iterator[dict[str, Any]]:
-    """Give the labels at points; the viewer leaves out those that overlap nearer ones."""
+    """Return the labels at points; the viewer leaves out those that overlap nearer ones."""
     hierarchy = mapper.GetInputAlgorithm(0, 0)
     if not isinstance(hierarchy, vtkPointSetToLabelHierarchy):
         return

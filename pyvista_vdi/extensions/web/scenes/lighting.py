@@ -19,7 +19,7 @@ def bounds_of(renderer: Any) -> list[float] | None:
 
 
 def lights_of(renderer: Any) -> Iterator[dict[str, Any]]:
-    """Give the lights that are on, as scene.js takes them."""
+    """Return the lights that are on, as scene.js takes them."""
     for light in renderer.GetLights():
         if not light.GetSwitch():
             continue

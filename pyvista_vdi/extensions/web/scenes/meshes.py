@@ -178,7 +178,7 @@ def offset_of(mapper: Any) -> float:
 
 
 def _blocks(mapper: Any) -> Iterator[tuple[Any, dict[str, Any]]]:
-    """Give the visible blocks of a composite mapper, and what is another material in each."""
+    """Return the visible blocks of a composite mapper, and what is another material in each."""
     attributes = mapper.GetCompositeDataDisplayAttributes()
     pending: list[tuple[Any, dict[str, Any]]] = [(mapper.GetInputDataObject(0, 0), {})]
     while pending:
@@ -277,7 +277,7 @@ def _shape(actor: Any, poly: Any, keep: Keep, left_out: list[str]) -> dict[str, 
 
 
 def _parts(poly: Any, look: Any) -> Iterator[dict[str, Any]]:
-    """Give the primitives that are drawn: their kind, points, cells and edges."""
+    """Return the primitives that are drawn: their kind, points, cells and edges."""
     before = 0
     representation = look.GetRepresentation()
     for cells, kind in (

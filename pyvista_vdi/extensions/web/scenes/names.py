@@ -107,7 +107,7 @@ def is_silhouette(prop: Any) -> bool:
 
 
 def passes_of(renderer: Any) -> Iterator[str]:
-    """Give the methods whose render passes a renderer has."""
+    """Return the methods whose render passes a renderer has."""
     outer = renderer.GetPass()
     pending, names = [outer], []
     while pending:
@@ -131,7 +131,7 @@ def _widgets(renderer: Any) -> Any:
 
 
 def widgets_of(renderer: Any) -> Iterator[str]:
-    """Give the methods whose widgets can be used in a renderer of PyVista's."""
+    """Return the methods whose widgets can be used in a renderer of PyVista's."""
     widgets = _widgets(renderer)
 
     def used(kind: str) -> list[Any]:
@@ -204,7 +204,7 @@ def _is_always_visible(prop: Any) -> bool:
 
 
 def _split(count: int, plain: str, **special: int) -> Iterator[str]:
-    """Give which methods have made ``count`` widgets, of which so many by each special one."""
+    """Return which methods have made ``count`` widgets, of which so many by each special one."""
     if count:
         yield from (name for name, made in special.items() if made)
         if count > sum(special.values()):

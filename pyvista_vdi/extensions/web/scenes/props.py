@@ -27,7 +27,7 @@ Matrix = NDArray[np.float64]
 
 
 def parts_of(prop: Any) -> Iterator[tuple[Any, Matrix]]:
-    """Give what a prop is drawn by, which is itself where it has no parts, and where that is.
+    """Return what a prop is drawn by, which is itself where it has no parts, and where that is.
 
     Parts that are hidden are left out; whether the prop itself is visible is not asked.
     """

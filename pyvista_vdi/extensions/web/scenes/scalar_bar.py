@@ -29,7 +29,7 @@ class _Note:
 
 
 def scalar_bar(bar: Any, renderer: Any) -> Iterator[dict[str, Any]]:
-    """Give what a scalar bar draws, as :func:`~.annotations.annotations_of` describes it."""
+    """Return what a scalar bar draws, as :func:`~.annotations.annotations_of` describes it."""
     table = bar.GetLookupTable()
     if table is None:
         return
@@ -245,7 +245,7 @@ def _look_of_notes(bar: Any, renderer: Any) -> Any:
 def _stacked(
     measured: list[tuple[_Note, Pair]], low: float, long: float, gap: float
 ) -> Iterator[tuple[_Note, float, float, str]]:
-    """Give where notes beside an upright bar stand: from the middle one on, none over another."""
+    """Return where notes beside an upright bar stand: from the middle one on, none over another."""
     measured = sorted(measured, key=lambda each: each[0].at)
     middle = len(measured) // 2
     downwards, upwards = low + long, low
@@ -266,7 +266,7 @@ def _stacked(
 def _lapped(
     measured: list[tuple[_Note, Pair]], gap: float
 ) -> Iterator[tuple[_Note, float, float, str]]:
-    """Give where notes along a lying bar stand, and how far off: from the middle one outwards."""
+    """Return where notes along a lying bar stand, and how far off: from the middle one outwards."""
     measured = sorted(measured, key=lambda each: each[0].at)
     middle = (len(measured) - 1) / 2
     taken: list[tuple[float, float, float]] = []  # left, right, far side
@@ -281,7 +281,7 @@ def _lapped(
 
 
 def _notes(bar: Any, table: Any, begin: float, long: float) -> Iterator[_Note]:
-    """Give a table's annotations; of categories, one for each box."""
+    """Return a table's annotations; of categories, one for each box."""
     count, upright = table.GetNumberOfAnnotatedValues(), bar.GetOrientation() == 1
     low, high = table.GetRange()
     for k in range(count):
@@ -300,7 +300,7 @@ def _notes(bar: Any, table: Any, begin: float, long: float) -> Iterator[_Note]:
 
 
 def _labels(bar: Any, table: Any) -> Iterator[tuple[float, str]]:
-    """Give where each label stands along the bar, 0 to 1, and its text."""
+    """Return where each label stands along the bar, 0 to 1, and its text."""
     if table.GetIndexedLookup():
         return
     low, high = table.GetRange()
@@ -361,7 +361,7 @@ def _nan(table: Any) -> list[float]:
 
 
 def _colors_outside(table: Any) -> Iterator[list[float]]:
-    """Give RGBA of NaN, of what is below and of what is above."""
+    """Return RGBA of NaN, of what is below and of what is above."""
     yield [*_nan(table), 1.0]
     for side in ("Below", "Above"):
         get = getattr(table, f"Get{side}RangeColor", None)
