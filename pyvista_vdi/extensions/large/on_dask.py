@@ -397,8 +397,8 @@ class _Run:
         except KilledWorker as error:
             raise DeviceError(
                 f"{work.named(self._task, at)} could not be made: the workers that were at it "
-                f"died, {_RETRIES + 1} in all (of too little memory, mostly): give workers more memory, "
-                f"or store the volume in smaller chunks; {error}"
+                f"died, {_RETRIES + 1} in all (of too little memory, mostly): give workers more "
+                f"memory, or store the volume in smaller chunks; {error}"
             ) from error
         except (VDIError, CancelledError):
             raise

@@ -10,7 +10,7 @@ from typing import Any
 from pyvista_vdi.extensions.series.info import SeriesInfo
 from pyvista_vdi.extensions.series.reader import StepsReader
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.series.writer import write
+from pyvista_vdi.extensions.series.steps_writer import write
 from pyvista_vdi.io.files import format_named
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.model.vdi import VDI

@@ -12,7 +12,7 @@ from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.extensions.series.info import SeriesInfo
 from pyvista_vdi.extensions.series.layout import index_bytes
 from pyvista_vdi.extensions.series.reader import StepsReader
-from pyvista_vdi.extensions.series.writer import StepsWriter
+from pyvista_vdi.extensions.series.steps_writer import StepsWriter
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import number

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.extensions.series.writer import StepsWriter
+from pyvista_vdi.extensions.series.steps_writer import StepsWriter
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import VDIFileError
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.series.writer import KEY_EVERY, StepsWriter, write_all
+from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter, write_all
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader

@@ -21,7 +21,7 @@ from stepped_vdis import SIZE, damaged, frames_of, packed_steps, same, stepped_v
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
-from pyvista_vdi.extensions.series import files, layout, reader, writer
+from pyvista_vdi.extensions.series import files, layout, reader, steps_writer
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -136,12 +136,12 @@ def test_a_seek_decodes_three_steps_at_most(tmp_path):
     for i in range(20):
         fresh = reader.StepsReader(path)
         assert fresh[i].equals(steps[i])
-        assert 1 <= fresh.n_decoded <= writer.MOST_DECODED
+        assert 1 <= fresh.n_decoded <= steps_writer.MOST_DECODED
     walk = reader.StepsReader(path)
     for i in range(20):
         assert walk[i].equals(steps[i])
     assert walk.n_decoded <= 20  # one after the other, each is decoded once
-    assert max(np.diff([*files.read_info(path).keys, 20])) <= writer.KEY_EVERY
+    assert max(np.diff([*files.read_info(path).keys, 20])) <= steps_writer.KEY_EVERY
 
 
 def test_a_tolerance_is_kept(tmp_path):

@@ -10,8 +10,8 @@ from typing import Any
 
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.extensions.series.series import Called
-from pyvista_vdi.extensions.series.writer import KEY_EVERY, StepsWriter
-from pyvista_vdi.extensions.series.writer import write_all as write_series
+from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
+from pyvista_vdi.extensions.series.steps_writer import write_all as write_series
 from pyvista_vdi.extensions.sets.files import write_all as write_set
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.page import View, assembled, in_parts
