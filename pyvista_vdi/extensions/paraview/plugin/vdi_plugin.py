@@ -30,7 +30,7 @@ try:
 except ImportError as error:
     raise ImportError(
         f"ParaView's Python cannot import pyvista_vdi ({error}): start ParaView with PYTHONPATH="
-        f"{Path(__file__).resolve().parents[3]}"
+        f"{Path(__file__).resolve().parents[4]}"
     ) from error
 
 from pyvista_vdi.errors import VDIError
