@@ -400,9 +400,9 @@ PICTURES = "pyvista_vdi/quality/pictures.py"
 PACKING = "pyvista_vdi/model/packing.py"
 REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
 WHEN, WAYS = "pyvista_vdi/quality/when_anew.py", "pyvista_vdi/quality/ways.py"
-SET, SELECTION = (
+SET, SHOWN = (
     "pyvista_vdi/extensions/sets/vdi_set.py",
-    "pyvista_vdi/extensions/sets/selection.py",
+    "pyvista_vdi/extensions/sets/shown.py",
 )
 VIEWER = "pyvista_vdi/extensions/web/viewer/"
 PLAYER, SERIES = (
@@ -616,8 +616,8 @@ PYTHON_MUTANTS = (
     ),
     _m(
         "view selection: the view before stays the nearest",
-        SELECTION,
-        "self._weights = self.vdi_set.weights(camera)",
+        SHOWN,
+        "self._weights = self.collection.weights(camera)",
         "pass",
         ("extensions/sets", "vtk_pipeline", "plotting"),
     ),
