@@ -19,6 +19,7 @@ from typing import NamedTuple
 import pytest
 
 import pyvista_vdi
+from pyvista_vdi import registry
 
 PACKAGE = Path(pyvista_vdi.__file__).parent
 
@@ -287,6 +288,14 @@ def test_importing_the_package_loads_little_and_touches_no_environment():
     # The package's own core and the standard library's modules that it needs stay under this; a
     # single heavy import (scikit-image: about 400 modules, PyVista: about 1000) is far beyond it
     assert len(loaded) < 60, loaded
+
+
+def test_checkers_of_types_are_told_every_public_name():
+    stub = (PACKAGE / "__init__.pyi").read_text(encoding="utf-8")
+    told = {*re.findall(r" as (\w+)$", stub, re.MULTILINE), *pyvista_vdi.errors.__all__}
+    assert {*pyvista_vdi.__all__} <= told
+    gone = told - {*pyvista_vdi.__all__}
+    assert not gone or len(registry.extensions()) < 7, gone
 
 
 def test_every_public_name_resolves():
