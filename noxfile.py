@@ -89,7 +89,7 @@ def snippets(session: nox.Session) -> None:
     with session.chdir(folder):
         session.run("pytest", "-q", "docs")
     # ParaView's plugin can be imported only in ParaView
-    plugin = "--ignore-glob=/*/pyvista_vdi/extensions/paraview/*"
+    plugin = "--ignore-glob=/*/pyvista_vdi/extensions/paraview/plugin/*"
     session.run("pytest", "-q", "--doctest-modules", plugin, "--pyargs", "pyvista_vdi")
 
 

@@ -22,7 +22,6 @@ from shared import execute, marked, parser_of, table_of  # beside this file
 import pyvista_vdi as pvdi
 from pyvista_vdi import Volume, examples
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.extensions.series import reader
 from pyvista_vdi.measure.harness import Bench, Case
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.results import Results
@@ -145,7 +144,7 @@ def measured(volumes: list[Volume], looks: Any, folder: Path, options: Any) -> d
                 writer.append(vdi)
         for writer in writers.values():
             writer.close()
-        info = reader.read_info(files[0.0])
+        info = files.read_info(files[0.0])
         shown = sorted({0, len(vdis) // 2, len(vdis) - 1})
         exact = pvdi.read(files[0.0])
         return {

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, check_callback
 from pyvista_vdi.model.classification import BLENDINGS, DEFAULTS, IN_PLACE, Classification
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.inputs import as_vdi, as_volume
 from pyvista_vdi.model.options import GenerationOptions, MediumOptions
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
@@ -201,7 +201,7 @@ def generate(
     )
     volume = as_volume(volume, looks.scalars, looks.preference)
     metadata = {"classification": looks.describe(), "scalars": volume.name}
-    from pyvista_vdi.extensions.series.generate import generate_anywhere
+    from pyvista_vdi.quality.generate_anywhere import generate_anywhere
 
     vdi = generate_anywhere(
         volume,
@@ -326,10 +326,11 @@ def render(
         preview_samples,
         TRANSMITTANCE_CUTOFF if transmittance_cutoff is None else transmittance_cutoff,
     )
-    if isinstance(vdi, VDISet):
-        from pyvista_vdi.extensions.sets.render import render_set
+    if _is_of_views(vdi):
+        from pyvista_vdi.raycasting.blend import blended
 
-        return render_set(vdi, _frame(vdi, view, window_size, options, opaque_depth, device))
+        parts = vdi.parts(view)
+        return blended(parts, _frame(vdi, view, window_size, options, opaque_depth, device))
     vdi = as_vdi(vdi)
     from pyvista_vdi.raycasting.bands import render_fitting
 
@@ -576,14 +577,8 @@ def read(path: str | os.PathLike[str], **options: Any) -> Any:
     VDIWarning
         If an ``.exr`` file of ours was changed by another program, or has colours outside 0 to 1.
     """
-    from pyvista_vdi.extensions.series import reader
-    from pyvista_vdi.extensions.sets import files as sets
     from pyvista_vdi.io import read as read_file
 
-    if sets.is_set_file(path):
-        return sets.read(path, **options)
-    if reader.is_series_file(path):
-        return reader.read(path, **options)
     return read_file(path, **options)
 
 
@@ -649,9 +644,14 @@ def estimate(
     )
 
 
+def _is_of_views(vdi: Any) -> bool:
+    """Whether these are VDIs of several views, among which a picture's view chooses."""
+    return isinstance(vdi, VDICollection) and vdi.times is None
+
+
 def _seen(vdi: Any, view: Camera) -> VDI:
     """Return what a user calls a VDI as one: of a set that which is nearest to the view."""
-    return vdi[vdi.nearest(view)] if isinstance(vdi, VDISet) else as_vdi(vdi)
+    return vdi[vdi.nearest(view)] if _is_of_views(vdi) else as_vdi(vdi)
 
 
 def _seen_in_scene(
@@ -662,18 +662,18 @@ def _seen_in_scene(
     if model_transforms is None or len(given) != len(vdis):  # refused where it is used
         return [_seen(vdi, view) for vdi in vdis]
     return [
-        _seen(vdi, view.replace(model_transform=placed)) if isinstance(vdi, VDISet) else as_vdi(vdi)
+        _seen(vdi, view.replace(model_transform=placed)) if _is_of_views(vdi) else as_vdi(vdi)
         for vdi, placed in zip(vdis, given, strict=True)
     ]
 
 
-def _made_for(vdi: Any, seen: VDI) -> VDI | VDISet:
+def _made_for(vdi: Any, seen: VDI) -> Any:
     """Return what knows the size of pictures: the set, where there is one."""
-    return vdi if isinstance(vdi, VDISet) else seen
+    return vdi if _is_of_views(vdi) else seen
 
 
 def _frame(
-    vdi: VDI | VDISet | None,
+    vdi: Any,
     camera: Camera,
     window_size: Sequence[int] | None,
     options: RenderOptions,

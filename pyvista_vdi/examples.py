@@ -338,7 +338,7 @@ def _locate(example: ExampleVolume) -> Path | None:
     return file if file.is_file() else None
 
 
-def read_nrrd(file: Path, quantity: str) -> Volume:
+def read_nrrd(file: Path, quantity: str = "values") -> Volume:
     """Read a three-dimensional NRRD file; axes as stored, so that x is the fastest."""
     import nrrd
 

@@ -31,6 +31,7 @@ from hypothesis import settings
 from kernel_calls import Caller
 
 import pyvista_vdi
+from pyvista_vdi import registry
 from pyvista_vdi.device import DeviceInfo, Runtime, get_runtime, list_devices
 from pyvista_vdi.errors import MissingDependencyError, NoDeviceError
 
@@ -153,6 +154,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what runs on each device to test, what is fast, and what nightly alone runs."""
     seen = set()
     for item in items:
+        needed = {name for mark in item.iter_markers("extension") for name in mark.args}
+        if not needed <= {*registry.extensions()}:
+            item.add_marker(pytest.mark.skip(f"needs the extension {', '.join(sorted(needed))}"))
         some = item.get_closest_marker("every")
         if some is not None:
             # By the case's name: other cases on another device, the same in every process

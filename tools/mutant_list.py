@@ -395,7 +395,10 @@ PICTURES = "pyvista_vdi/quality/pictures.py"
 PACKING = "pyvista_vdi/model/packing.py"
 REGENERATION = "pyvista_vdi/vtk_pipeline/interaction/regeneration.py"
 WHEN, WAYS = "pyvista_vdi/quality/regeneration_policy.py", "pyvista_vdi/quality/render_mode.py"
-SET, SHOWER = "pyvista_vdi/extensions/sets/vdi_set.py", "pyvista_vdi/extensions/sets/shower.py"
+SET, SHOWN = (
+    "pyvista_vdi/extensions/sets/vdi_set.py",
+    "pyvista_vdi/extensions/sets/shown.py",
+)
 VIEWER = "pyvista_vdi/extensions/web/viewer/"
 PLAYER, SERIES = (
     "pyvista_vdi/extensions/series/player.py",
@@ -608,8 +611,8 @@ PYTHON_MUTANTS = (
     ),
     _m(
         "view selection: the view before stays the nearest",
-        SHOWER,
-        "self._weights = self.vdi_set.weights(camera)",
+        SHOWN,
+        "self._weights = self.collection.weights(camera)",
         "pass",
         ("extensions/sets", "vtk_pipeline", "plotting"),
     ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, plain_number, table, vector
@@ -29,17 +30,11 @@ def devices(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file says about itself: a VDI, or a volume."""
-    from pyvista_vdi.cli.inputs import is_series, is_set, is_volume, read_volume, volume_name
+    from pyvista_vdi.cli.inputs import is_volume, read_volume, volume_name
     from pyvista_vdi.io import read_info
 
-    if is_series(options):
-        from pyvista_vdi.cli import series
-
-        return series.info(options)
-    if is_set(options):
-        from pyvista_vdi.cli import sets
-
-        return sets.info(options)
+    if (own := _own_verbs(options.file)) is not None:
+        return int(own.info(options))
     if is_volume(options):
         rows = _of_volume(read_volume(options, in_chunks=True))
         source = options.file or volume_name(options)
@@ -57,22 +52,14 @@ def convert(options: argparse.Namespace) -> int:
     from pyvista_vdi.cli.inputs import (
         file_options,
         given_camera,
-        is_series,
-        is_set,
         measuring,
         part,
         say_vdi,
     )
     from pyvista_vdi.io import checked_target
 
-    if is_series(options):
-        from pyvista_vdi.cli import series
-
-        return series.convert(options)
-    if is_set(options):
-        from pyvista_vdi.cli import sets
-
-        return sets.convert(options)
+    if (own := _own_verbs(options.file)) is not None:
+        return int(own.convert(options))
     target = checked_target(options.output)
     file_arguments = file_options(options)
     foreign = {
@@ -86,6 +73,14 @@ def convert(options: argparse.Namespace) -> int:
         vdi.save(target, progress=part(bar, 0.5, 1.0, "writing"), **file_arguments)
     say_vdi(options, vdi)
     return 0
+
+
+def _own_verbs(file: str | None) -> Any:
+    """Return the module with the verbs of a file's format, where it has its own."""
+    from pyvista_vdi.io.files import format_of
+
+    found = None if file is None else format_of(file)
+    return import_module(found.verbs) if found is not None and found.verbs else None
 
 
 def _of_volume(volume: Volume) -> dict[str, Any]:

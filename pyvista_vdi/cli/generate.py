@@ -18,7 +18,6 @@ from pyvista_vdi.cli.inputs import (
     say_vdi,
 )
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.extensions.large.entrance import connected
 from pyvista_vdi.generation.estimate import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
@@ -67,7 +66,7 @@ def generate(options: argparse.Namespace) -> int:
         needed = f"{width} x {height} lists: up to {most.total / 2**20:.0f} MiB"
     print(f"{nx} x {ny} x {nz} points, {needed}", file=sys.stderr)
     start = time.perf_counter()
-    with connected(options.scheduler) as client, measuring("generating a VDI") as bar:
+    with measuring("generating a VDI") as bar:
         vdi = generate_vdi(
             volume,
             view,
@@ -81,7 +80,7 @@ def generate(options: argparse.Namespace) -> int:
             **asked,
             ambient_occlusion=occlusion,
             memory_limit=options.memory_limit,
-            client=client,
+            client=options.scheduler,
             device=options.device,
             progress=bar,
             **arguments,

@@ -16,18 +16,19 @@ from typing import Any, TypeVar
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file
+from pyvista_vdi.io.files import holds
 from pyvista_vdi.io.stores import StoredVolume, is_store, open_volume
 from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
+from pyvista_vdi.plotting.imports import read_volume as read_by_pyvista
 from pyvista_vdi.plotting.progress import DelayedBar
 from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
@@ -95,12 +96,12 @@ def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
 
 def _read_quietly(file: Path) -> Any:
     with quietly():
-        return provider("read_by_pyvista")(file)
+        return read_by_pyvista(file)
 
 
 @contextmanager
 def quietly() -> Iterator[None]:
-    """Let VTK's readers write nothing: the error says what is wrong."""
+    """Silence VTK's readers: the error says what is wrong."""
     before = logging.root.manager.disable
     logging.disable(logging.ERROR)
     try:
@@ -128,23 +129,14 @@ def _loaded(volume: StoredVolume) -> Volume:
 
 def is_series(options: argparse.Namespace) -> bool:
     """Whether FILE names a series of VDIs."""
-    from pyvista_vdi.extensions.series.reader import is_series_file
-
-    return options.file is not None and is_series_file(options.file)
-
-
-def is_set(options: argparse.Namespace) -> bool:
-    """Whether FILE names a set of VDIs."""
-    from pyvista_vdi.extensions.sets.files import is_set_file
-
-    return options.file is not None and is_set_file(options.file)
+    return options.file is not None and holds(options.file) == "series"
 
 
 def is_volume(options: argparse.Namespace) -> bool:
     """Whether FILE or ``--example`` names a volume, and not a VDI, a series or a set."""
     if options.example is not None:
         return True
-    if not (is_vdi_file(options.file) or is_series(options) or is_set(options)):
+    if not is_vdi_file(options.file) and holds(options.file) in (None, "VDI"):
         return True
     is_vdi = f"{printable(options.file)} is a VDI: "
     refuse(options, (*_OF_A_VOLUME, *OF_A_STORE), "volumes", is_vdi)
@@ -304,7 +296,7 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def say_vdi(options: argparse.Namespace, vdi: VDI, more: str = "") -> None:
-    """Say what was written to ``--output``."""
+    """Print what was written to ``--output``."""
     width, height = vdi.window_size
     print(
         f"{printable(options.output)}: {vdi.n_supersegments} supersegments in {width} x {height} "

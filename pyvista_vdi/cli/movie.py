@@ -29,9 +29,9 @@ from pyvista_vdi.cli.inputs import (
 from pyvista_vdi.cli.steps import in_order
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError, VDIFileError
-from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
 
@@ -194,8 +194,9 @@ def _shown(
         )
     refuse(options, OF_ANY_VOLUME, "volumes", f"{printable(options.file)} is a VDI: ")
     found = read(options.file)
-    steps = len(found) if isinstance(found, VDISeries) else None
-    first = found[0] if isinstance(found, VDISeries) else found
+    in_time = isinstance(found, VDICollection) and found.times is not None
+    steps = len(found) if in_time else None
+    first = found[0] if in_time else found
     told: list[bool] = []
 
     def draw(view: Camera, size: Any, step: int | None) -> Any:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import difflib
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any, NoReturn
 
+from pyvista_vdi import registry
 from pyvista_vdi._version import __version__
 from pyvista_vdi.cli import declare
 from pyvista_vdi.model.packing import PRECISIONS
@@ -108,12 +108,12 @@ def _refuse_argument(verb: _Parser, argument: str) -> NoReturn:
 
 def run_verb(options: argparse.Namespace) -> int:
     """Import the verb's module, which brings what it needs, and run it."""
-    verb = import_module(f".{options.module}", __package__)
+    verb = registry.load(options.place)
     if getattr(options, "device", None) is not None:
         from pyvista_vdi.device import get_runtime
 
         get_runtime(options.device)  # a wrong name is said before minutes of reading
-    return int(getattr(verb, options.verb)(options))
+    return int(verb(options))
 
 
 def _suggestion(name: str, known: Sequence[str]) -> str:
@@ -135,7 +135,11 @@ def _make_parser(asked: str) -> tuple[_Parser, dict[str, _Parser]]:
     parser.add_argument("--version", action="version", version=f"pyvista-vdi {__version__}")
     subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
     verbs: dict[str, _Parser] = {}
-    for name, (module, summary, example, add_options) in _VERBS.items():
+    added = registry.verbs()
+    known = {name: verb[1:] for name, verb in _VERBS.items()} | {
+        name: (verb.summary, verb.example, None) for name, verb in added.items()
+    }
+    for name, (summary, example, add_options) in known.items():
         verbs[name] = subparsers.add_parser(
             name,
             help=summary,
@@ -145,8 +149,9 @@ def _make_parser(asked: str) -> tuple[_Parser, dict[str, _Parser]]:
             allow_abbrev=False,
         )
         if name == asked:
-            add_options(verbs[name])
-        verbs[name].set_defaults(run=run_verb, module=module)
+            (add_options or registry.load(added[name].options))(verbs[name])
+        of_core = f"{__package__}.{_VERBS[name][0]}:{name}" if name in _VERBS else None
+        verbs[name].set_defaults(run=run_verb, place=of_core or added[name].run)
     return parser, verbs
 
 
@@ -186,20 +191,6 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     thickness = "world units, given to samples that have none (surfaces)"
     declare.option(group, "--thickness", thickness, "LENGTH", declare.parse_number)
     declare.switch(group, "--from-linear", "the colours are linear light: show it by sRGB's curve")
-
-
-def _add_paraview(parser: argparse.ArgumentParser) -> None:
-    declare.switch(
-        parser,
-        "--environment",
-        "print, for a shell's eval, the variables that make ParaView find this package and "
-        "load the plugin",
-    )
-    check = (
-        "start ParaView's Python, see that it loads the plugin, and list the devices that it "
-        "finds; PVPYTHON: where that is, if not on the PATH"
-    )
-    declare.option(parser, "--check", check, "PVPYTHON", nargs="?", const="pvpython")
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:
@@ -314,87 +305,6 @@ def _add_movie(parser: argparse.ArgumentParser) -> None:
     declare.option(parser, "--turn", text, "DEGREES", declare.parse_number, default=0.0)
     declare.camera(parser, "the first view is the VDI's own, or one that the volume fills")
     declare.classification(parser)
-    declare.device(parser)
-
-
-def _add_serve(parser: argparse.ArgumentParser) -> None:
-    declare.volumes(parser)
-    group = parser.add_argument_group("server")
-    host = "address to listen at (default: 127.0.0.1, this machine alone)"
-    declare.option(group, "--host", host, "ADDRESS", default="127.0.0.1")
-    port = "(default: 8765; 0: one that is free)"
-    declare.option(group, "--port", port, "N", declare.parse_port, default=8765)
-    token = "what the URL must carry (default: a random one)"
-    declare.option(group, "--token", token, "TEXT")
-    names = "another name by which browsers may call this server; may be repeated"
-    declare.option(group, "--allow-host", names, "NAME", action="append", default=[])
-    text = "most lists of a VDI (default: 1280x720)"
-    declare.option(group, "--lists", text, "WxH", declare.parse_size, default=(1280, 720))
-    below = "estimated SSIM below which a view gets a VDI of its own (default: 0.95)"
-    declare.option(group, "--regenerate-below", below, "SSIM", declare.parse_number, default=0.95)
-    declare.classification(parser)
-    declare.occlusion(parser)
-    group = parser.add_argument_group("limits")
-    declare.longest(group, "longest list (default: 8)", 8)
-    declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
-    declare.memory_limit(group)
-    declare.device(parser)
-
-
-def _add_series(parser: argparse.ArgumentParser) -> None:
-    text = (
-        f"VDIs, or other series, .vdis; or volumes, each {declare.VOLUME_FILE}. Of a store, a "
-        ".pvd, a .vti.series and other files with time steps all are taken. Names in a shell's "
-        "order are put in that of their numbers, step_2 before step_10"
-    )
-    declare.option(parser, "files", text, "FILE", nargs="+")
-    declare.output(parser, ".vdis to write")
-    times = "of the steps, ascending (default: those in the files, else 0,1,2,...)"
-    declare.option(parser, "--times", times, "A,B,...", declare.parse_numbers)
-    group = parser.add_argument_group("file")
-    text = (
-        "what colours times opacity, and opacities, of a supersegment may differ by, 0 to 1, where "
-        "that saves bytes (default: 0, every bit is kept)"
-    )
-    declare.option(group, "--tolerance", text, "T", declare.parse_number, default=0.0)
-    text = "most steps from one that needs no other to the next (default: 16)"
-    declare.option(group, "--key-every", text, "N", declare.parse_count, default=16)
-    text = "of the supersegments (default: 8-byte, the only one that is written by differences)"
-    declare.option(group, "--precision", text, choices=PRECISIONS)
-    text = "zstd (default), lz4, deflate or none"
-    declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))
-    declare.option(group, "--compression-level", "1 (fast) to 9 (small)", "N", declare.parse_whole)
-    group = parser.add_argument_group("volumes", "What VDIs are made of them; not for VDIs.")
-    declare.grid(group)
-    declare.size(group, WINDOW_SIZE)
-    declare.longest(group, "longest list (default: 20)")
-    declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
-    declare.memory_limit(group)
-    declare.scheduler(group)
-    declare.camera(parser, "the view that the first volume fills")
-    declare.classification(parser)
-    declare.device(parser)
-
-
-def _add_set(parser: argparse.ArgumentParser) -> None:
-    declare.volume(parser)
-    declare.output(parser, ".vdiset to write")
-    declare.size(parser, (640, 360))
-    group = parser.add_argument_group("goal")
-    ssim = "SSIM of every direction against volume rendering (default: 0.98)"
-    declare.option(group, "--target-ssim", ssim, "S", declare.parse_number)
-    most = "most bytes of the file, like 70MB; goes before the SSIM"
-    declare.option(group, "--max-bytes", most, "SIZE", declare.parse_bytes)
-    most = "most VDIs (default: 400)"
-    declare.option(group, "--max-views", most, "N", declare.parse_count)
-    group = parser.add_argument_group("lists", "By default a short measurement chooses them.")
-    declare.option(group, "--lists", "lists per pixel along an edge", "N", declare.parse_number)
-    declare.option(group, "--max-supersegments", "longest list", "N", declare.parse_whole)
-    declare.step(group, "step along the ray, model units (default: half the smallest spacing)")
-    declare.memory_limit(group)
-    declare.camera(parser, "the view that the volume fills; it tells distance, lens and up")
-    declare.classification(parser)
-    declare.occlusion(parser)
     declare.device(parser)
 
 
@@ -549,12 +459,6 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "pyvista-vdi movie run.vdis -o run.mp4 --turn 20",
         _add_movie,
     ),
-    "serve": (
-        "serve",
-        "serve VDIs of a volume to web pages, in which it is turned while it stays here",
-        "pyvista-vdi serve knee.nrrd --cmap bone --opacity sigmoid_6",
-        _add_serve,
-    ),
     "info": (
         "files",
         "say what a file holds: a VDI or a volume",
@@ -584,23 +488,5 @@ _VERBS: dict[str, tuple[str, str, str, Any]] = {
         "write a VDI, or each one of a series or set, as .vdi, .exr, .vti or .html; a set as .cdb",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
-    ),
-    "series": (
-        "series",
-        "write VDIs, or those of volumes, that are time steps to one file",
-        "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
-        _add_series,
-    ),
-    "set": (
-        "sets",
-        "write VDIs of a volume from as many sides as pictures from everywhere need",
-        "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
-        _add_set,
-    ),
-    "paraview": (
-        "paraview",
-        "print the path of the plugin for ParaView",
-        "pyvista-vdi paraview --environment",
-        _add_paraview,
     ),
 }

@@ -22,12 +22,10 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.extensions.series.player import RATE
-from pyvista_vdi.extensions.series.reader import is_series_file
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io import checked_png_target, to_bytes, write_png
+from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -41,7 +39,7 @@ _SERIES = "series, .vdis"
 def render(options: argparse.Namespace) -> int:
     """Render a VDI from a new view and write the picture."""
     target = checked_png_target(options.output)
-    if not any(is_series_file(file) for file in options.files):
+    if not any(holds(file) == "series" for file in options.files):
         refuse(options, ("time",), _SERIES)
     vdis, share = [], 0.5 / len(options.files)
     with measuring("rendering") as bar:
@@ -92,15 +90,15 @@ def view(options: argparse.Namespace) -> int:
     return 0
 
 
-def _at(found: VDI | VDISeries | VDISet, time: float | None) -> VDI | VDISet:
+def _at(found: VDI | VDICollection, time: float | None) -> Any:
     """Return a VDI or a set, or of a series the step nearest in time, by default the first."""
-    if isinstance(found, VDISeries):
+    if isinstance(found, VDICollection) and found.times is not None:
         return found[0 if time is None else found.nearest(time)]
     return found
 
 
 def _show(
-    shown: VDI | VDISeries | VDISet | Volume,
+    shown: VDI | VDICollection | Volume,
     camera: Camera,
     size: tuple[int, int],
     looks: dict[str, Any],
@@ -126,7 +124,7 @@ def _show(
             device=options.device,
             **looks,
         )
-        if isinstance(shown, VDISeries):
+        if isinstance(shown, VDICollection) and shown.times is not None:
             _begin(actor, plotter, options, slider=screenshot is None)
         aim(plotter.camera, camera)
         plotter.camera_set = True

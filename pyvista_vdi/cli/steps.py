@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.cli.inputs import laid_out, open_store, quietly, read_volume
 from pyvista_vdi.cli.text import printable
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions.series import reader
-from pyvista_vdi.io import read as read_vdi
-from pyvista_vdi.io import read_info
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.time_steps import in_step_order, listed_steps, lists_steps
 from pyvista_vdi.io.volumes import needs_pyvista
-from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.volume import Volume
 
 
@@ -46,20 +39,6 @@ def in_order(files: Sequence[str]) -> list[str]:
             file=sys.stderr,
         )
     return ordered
-
-
-def steps_of_vdis(files: Sequence[str]) -> list[Step]:
-    """Return the steps of files that hold VDIs or series of them."""
-    steps = []
-    for file in files:
-        if reader.is_series_file(file):
-            series = reader.read(file)
-            for i, at in enumerate(series.times):
-                steps.append(Step(f"{file}, step {i}", at, partial(series.__getitem__, i)))
-        else:
-            at = as_number(read_info(file).metadata.get("time"))  # as a simulation's is written
-            steps.append(Step(file, None if math.isnan(at) else at, partial(read_vdi, file)))
-    return steps
 
 
 def steps_of_volumes(
@@ -100,29 +79,3 @@ def _steps_of(
 def _read_step(several: Sequence[Any], i: int, options: argparse.Namespace) -> Volume:
     with quietly():
         return laid_out(several[i], options)
-
-
-def timed(steps: Sequence[Step], given: Sequence[float] | None) -> list[Step]:
-    """Return steps with the times that are given, else with the files' where these ascend.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If others are given than there are steps.
-    """
-    if given is not None:
-        if len(given) != len(steps):
-            raise InvalidArgumentError(
-                f"--times gives a time to each step: there are {len(steps)} steps and "
-                f"{len(given)} times"
-            )
-        return [replace(step, time=at) for step, at in zip(steps, given, strict=True)]
-    known = [step.time for step in steps if step.time is not None]
-    if known and (len(known) < len(steps) or any(b <= a for a, b in pairwise(known))):
-        print(
-            "The times in the files do not ascend, or some have none: steps are numbered "
-            "(--times gives times)",
-            file=sys.stderr,
-        )
-        return [replace(step, time=None) for step in steps]
-    return list(steps)

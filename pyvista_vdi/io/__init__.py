@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from pyvista_vdi.io.files import (
-    SUFFIXES,
     check_write_options,
     checked_target,
     is_vdi_file,
     read,
     read_info,
+    suffixes,
     write,
 )
 from pyvista_vdi.io.png import checked_png_target, to_bytes, write_png
 from pyvista_vdi.io.vdi_file.layout import FORMAT_VERSION, SUFFIX
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.whole_file import check_writable, whole_file
+from pyvista_vdi.model.whole_file import check_writable, whole_file
 
 __all__ = [
     "FORMAT_VERSION",
     "SUFFIX",
-    "SUFFIXES",
     "FileInfo",
     "check_writable",
     "check_write_options",
@@ -28,6 +27,7 @@ __all__ = [
     "is_vdi_file",
     "read",
     "read_info",
+    "suffixes",
     "to_bytes",
     "whole_file",
     "write",

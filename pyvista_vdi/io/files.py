@@ -1,30 +1,62 @@
-"""A file's format follows from its name: ``.vdi``, ``.exr``, ``.html`` or, by VTK, ``.vti``."""
+"""The format of a file follows from its name; which formats there are, the registry says."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIFileError
+from pyvista_vdi import registry
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.vdi_file import layout, reader, writer
-from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
-from pyvista_vdi.io.vdi_file.layout import DEFLATE
+from pyvista_vdi.io.vdi_file import reader
+from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.packing import check_precision
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import check_writable, with_suffix
+from pyvista_vdi.registry import FileFormat
 
-#: What the name of a file may end in; the first is our own format.
-EXR_SUFFIX = ".exr"
-VTI_SUFFIX = ".vti"
-HTML_SUFFIX = ".html"
-SUFFIXES = (layout.SUFFIX, EXR_SUFFIX, VTI_SUFFIX, HTML_SUFFIX)
 
-_VTI_COMPRESSIONS = ("lz4", "zlib", "lzma", "none")
+def suffixes() -> tuple[str, ...]:
+    """Return what the name of a file with a VDI may end in; the first is our own format."""
+    return tuple(each.suffix for each in registry.formats() if each.holds == "VDI")
+
+
+def format_named(path: Any) -> FileFormat | None:
+    """Return the format that a file's name stands for; ``None`` if it stands for none."""
+    name = str(path).lower()
+    return next((each for each in registry.formats() if name.endswith(each.suffix)), None)
+
+
+def format_of(path: Any) -> FileFormat | None:
+    """Return the format in which a file is read: by its name, in a page by what it holds.
+
+    ``None`` if its name stands for none.
+    """
+    found = format_named(path)
+    if found is not None and found.page:
+        page = found.load()
+        for inside in registry.formats():
+            if inside.magic and page.begins_with(path, inside.magic):
+                return inside
+    return found
+
+
+def holds(path: Any) -> str | None:
+    """Return what a file is read as, ``"VDI"``, ``"series"`` or ``"set"``; ``None``: by no name."""
+    found = format_of(path)
+    return None if found is None else found.holds
+
+
+def opened(path: str | os.PathLike[str]) -> BinaryIO:
+    """Open a file, or the one that a page holds."""
+    found = format_named(path)
+    if found is not None and found.page:
+        stream: BinaryIO = found.load().data_in(path)
+        return stream
+    return Path(path).open("rb")
 
 
 def write(
@@ -80,19 +112,20 @@ def write(
     check_write_options(target, options)
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
-    if _is_exr(target):
-        return provider("exr_files").write(vdi, target, progress=progress, **options)  # type: ignore[no-any-return]
-    if _is_vti(target):
-        written: Path = _vti().write(vdi, target, **options)
+    found = format_named(target) or _own()
+    written: Path
+    if found.reports_progress:
+        written = found.load().write(vdi, target, progress=progress, **options)
+    else:
+        written = found.load().write(vdi, target, **options)
         Pieces(progress, 1)()
-        return written
-    if _is_html(target):
-        return provider("html_files").write(vdi, target, progress=progress, **options)  # type: ignore[no-any-return]
-    return writer.write(vdi, target, progress=progress, **options)
+    return written
 
 
-def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> VDI:
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> Any:
     """Read a VDI from a ``.vdi`` file, an OpenEXR deep image, VTK's image file or a page.
+
+    Or a series or a set of them: whatever the format of that name holds.
 
     Parameters
     ----------
@@ -107,7 +140,7 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
 
     Returns
     -------
-    VDI
+    VDI or VDISeries or VDISet
         The same to the last bit as was written by :func:`write`.
 
     Raises
@@ -122,17 +155,13 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     MissingDependencyError
         If VTK is not installed and the name ends in ``.vti``.
     """
-    if _is_exr(path):
-        _check_names("read", path, options, ("camera", "thickness", "linear"))
-        return provider("exr_files").read(path, progress=progress, **options)  # type: ignore[no-any-return]
-    _check_names("read", path, options, ())
-    if _is_vti(path):
-        vdi: VDI = _vti().read(path)
-        Pieces(progress, 1)()
-        return vdi
-    if _is_html(path):
-        return provider("html_files").read(path, progress=progress)  # type: ignore[no-any-return]
-    return reader.read(path, progress=progress)
+    found = format_of(path) or _own()
+    _check_names("read", path, options, found.read_options)
+    if found.reports_progress:
+        return found.load().read(path, progress=progress, **options)
+    read_whole = found.load().read(path, **options)
+    Pieces(progress, 1)()
+    return read_whole
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
@@ -153,13 +182,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     VDIFileError
         As for :func:`read`, except that damaged arrays of a ``.vdi`` file are not noticed.
     """
-    if _is_vti(path):
-        return _vti().read_info(path)  # type: ignore[no-any-return]
-    if _is_html(path):
-        return provider("html_files").read_info(path)  # type: ignore[no-any-return]
-    if _is_exr(path):
-        return provider("exr_files").read_info(path)  # type: ignore[no-any-return]
-    return reader.read_info(path)
+    return (format_of(path) or _own()).load().read_info(path)  # type: ignore[no-any-return]
 
 
 def is_vdi_file(path: str | os.PathLike[str]) -> bool:
@@ -180,10 +203,9 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     MissingDependencyError
         If VTK is not installed and the name ends in ``.vti``.
     """
-    if _is_vti(path):
-        return _vti().holds_vdi(path)  # type: ignore[no-any-return]
-    if Path(path).suffix.lower() in SUFFIXES:
-        return True
+    found = format_named(path)
+    if found is not None and found.holds == "VDI":
+        return bool(found.load().holds_vdi(path)) if found.shared else True
     return os.path.isfile(path) and reader.begins_as_vdi(path)  # noqa: PTH113 - too long a name, too
 
 
@@ -193,7 +215,7 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     path : path-like
-        The target; its name ends in one of :data:`SUFFIXES`.
+        The target; its name ends in one of :func:`suffixes`.
 
     Returns
     -------
@@ -209,22 +231,14 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
         target = Path(path)
     except TypeError as error:
         raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
-    return check_writable(with_suffix(target, SUFFIXES, "a VDI"))
+    return check_writable(with_suffix(target, suffixes(), "a VDI"))
 
 
 def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:
     """Raise InvalidArgumentError now if :func:`write` would refuse an option for this file."""
-    names: tuple[str, ...] = ("compression", "level")
-    compressions: tuple[str, ...] = (*CODECS, "none")
-    if _is_exr(path):
-        names, compressions = (*names, "exact", "linear"), provider("exr_files").COMPRESSIONS
-    elif _is_vti(path):
-        compressions = _VTI_COMPRESSIONS
-    elif _is_html(path):
-        names, compressions = (*names, "precision", "title", "background"), (DEFLATE,)
-    else:
-        names = (*names, "precision")
-    _check_names("written", path, options, names)
+    found = format_named(path) or _own()
+    _check_names("written", path, options, ("compression", "level", *found.write_options))
+    compressions = found.compressions
     compression, level = options.get("compression", compressions[0]), options.get("level")
     if not isinstance(compression, str) or compression not in compressions:
         known = f"one of {', '.join(compressions[:-1])} and " if compressions[1:] else ""
@@ -236,27 +250,9 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
         check_precision(options["precision"])
 
 
-def _is_exr(path: Any) -> bool:
-    return str(path).lower().endswith(EXR_SUFFIX)
-
-
-def _is_vti(path: Any) -> bool:
-    return str(path).lower().endswith(VTI_SUFFIX)
-
-
-def _is_html(path: Any) -> bool:
-    return str(path).lower().endswith(HTML_SUFFIX)
-
-
-def _vti() -> Any:
-    """Return the module that has VTK write and read."""
-    try:
-        return provider("vti_files")
-    except ImportError as error:
-        raise MissingDependencyError(
-            f".vti files need VTK, which cannot be loaded ({error}): install it by "
-            'pip install "pyvista-vdi[plot]", or use .vdi files'
-        ) from error
+def _own() -> FileFormat:
+    """Return our own format, in which a file is read whose name stands for none."""
+    return next(registry.formats())
 
 
 def _check_names(what: str, path: Any, options: Mapping[str, Any], known: tuple[str, ...]) -> None:

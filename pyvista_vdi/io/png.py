@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.model.metrics import over_background
+from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 
 #: The name that a picture's name ends in.
 PNG_SUFFIX = ".png"

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.io import image_stack
 from pyvista_vdi.io.time_steps import listed_steps, lists_steps
 from pyvista_vdi.model.host_memory import require_free_memory
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
 
 #: What NumPy raises for files that are no arrays: their header is a Python expression.
@@ -76,15 +76,15 @@ def read_file(file: Path, by_pyvista: Callable[[Path], Any] | None = None) -> An
                 f"{file} cannot be read as an array ({error}): write one by numpy.save"
             ) from error
         return Volume(array)
-    if suffix in (".nrrd", ".nhdr"):
-        # By pynrrd: VTK takes the first axis for components in files that do not say what their
-        # axes are
-        return provider("read_nrrd")(file, "values")
-    return (by_pyvista or provider("read_by_pyvista"))(file)
+    # NRRD by pynrrd: VTK takes the first axis for components in files that do not say what their
+    # axes are
+    read = registry.reader(suffix) if suffix else None
+    return (read or by_pyvista or registry.reader(""))(file)
 
 
 def needs_pyvista(file: Path) -> bool:
     """Whether a file, no folder, is read by PyVista: by its name."""
-    known = (".raw", ".npy", ".nrrd", ".nhdr")
+    suffix = file.suffix.lower()
     folder = os.path.isdir(file)  # noqa: PTH112 - pathlib's raises for a name that is too long
-    return not folder and file.suffix.lower() not in known
+    known = suffix in (".raw", ".npy") or (suffix and registry.reader(suffix) is not None)
+    return not folder and not known

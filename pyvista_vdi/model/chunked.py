@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, VDIError
-from pyvista_vdi.model.providers import provider
+from pyvista_vdi.model.chunk_ranges import keeper_of
+from pyvista_vdi.model.store_identity import by_absolute_path, identity_of
 
 #: The least and the largest scalar of each chunk, NaN left out; NaN where there is nothing else.
 Ranges = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -48,7 +49,7 @@ class ChunkedArray:
         checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
         dtype: Any = None,
     ) -> None:
-        source = provider("by_absolute_path")(source)
+        source = by_absolute_path(source)
         library = type(source).__module__.partition(".")[0]
         self.lazy = source if library == "dask" else None
         self._array = source
@@ -82,7 +83,7 @@ class ChunkedArray:
             self.lazy = self._array = self.lazy.map_blocks(
                 _held, checked, self.dtype, dtype=self.dtype
             )
-        self._keeper: Keeper = provider("range_keeper")(self._array, index)
+        self._keeper: Keeper = keeper_of(self._array, index)
         self._ranges: Ranges | None = None
 
     def _chunks(self, kept: Sequence[int]) -> tuple[int, int, int]:
@@ -180,7 +181,7 @@ class ChunkedArray:
 
     def identity(self) -> Any:
         """Return what tells the array's files from others, ``None`` where it is in none here."""
-        found = provider("store_identity")(self._array, self._index)
+        found = identity_of(self._array, self._index)
         return None if found is None else found.absolute()
 
     def found_ranges(self) -> Ranges:
@@ -209,7 +210,7 @@ class ChunkedArray:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _array=opened(state["_array"]))
-        self._keeper = provider("range_keeper")(self._array, self._index)
+        self._keeper = keeper_of(self._array, self._index)
 
     def __repr__(self) -> str:
         return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVolumeError,
@@ -18,7 +19,6 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.model.checks import as_flag, one_of
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -162,7 +162,7 @@ class Classification:
         if "transfer_function" in self._in_place:
             return self._checked_transfer_function()
         if "volume_property" in self._in_place:
-            from_property = provider("transfer_function_from_property")
+            from_property = registry.method("TransferFunction.from_property")
             return from_property(  # type: ignore[no-any-return]
                 self._in_place["volume_property"], volume, rgba=volume.rgba
             )
@@ -175,7 +175,7 @@ class Classification:
         left_out = (*_CHOOSE_THE_ARRAY, "blending")
         arguments = {n: v for n, v in {**DEFAULTS, **self._given}.items() if n not in left_out}
         arguments["clim"] = range_to_classify(self.scalars, arguments["clim"])
-        from_arguments = provider("transfer_function_from_arguments")
+        from_arguments = registry.method("TransferFunction.from_arguments")
         return from_arguments(  # type: ignore[no-any-return]
             volume.array, rgba=volume.rgba, **arguments
         )

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidArgumentTypeError,
     InvalidVDIError,
     InvalidVolumeError,
     InvalidVolumeTypeError,
 )
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 
@@ -25,7 +25,7 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     Parameters
     ----------
     volume : Volume or vtkImageData or pyvista.ImageData
-        VTK is imported only for its own objects.
+        Or what an extension makes one of. VTK is imported only for its own objects.
     scalars : str or array_like, optional
         Name of the array, or values per point; the active array by default.
     preference : {"point", "cell"}
@@ -39,9 +39,9 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     if isinstance(volume, Volume):
         return _with_scalars(volume, scalars)
     if hasattr(volume, "GetClassName"):
-        from_vtk = provider("volume_from_vtk")
+        from_vtk = registry.method("Volume.from_vtk")
         if scalars is not None and not isinstance(scalars, str):
-            volume, scalars = provider("image_with_scalars")(volume, scalars, None)
+            volume, scalars = registry.method("Volume.with_scalars")(volume, scalars, None)
         return from_vtk(  # type: ignore[no-any-return]
             volume, scalars=scalars, preference=preference
         )
@@ -50,6 +50,9 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
             f"got a NumPy array of shape {volume.shape}, which has no spacing: "
             "wrap it as pyvista_vdi.Volume(array, spacing), indexed [z, y, x]"
         )
+    from_data = registry.made_of("volumes", volume)
+    if from_data is not None:
+        return from_data(volume, scalars, preference)  # type: ignore[no-any-return]
     opened = ": open it by pyvista_vdi.open_volume(path) or pyvista.read(path)"
     raise InvalidVolumeTypeError(
         f"expected a pyvista.ImageData, a vtkImageData or a pyvista_vdi.Volume; "
@@ -98,7 +101,7 @@ def as_vdi(vdi: Any) -> VDI:
     if isinstance(vdi, VDI):
         return vdi
     if hasattr(vdi, "GetClassName"):
-        return provider("vdi_from_image")(vdi)  # type: ignore[no-any-return]
+        return registry.method("VDI.from_image")(vdi)  # type: ignore[no-any-return]
     hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
     raise InvalidVDIError(
         f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
+from pyvista_vdi.model.list_subsampling import subsampled_lists
 from pyvista_vdi.model.packing import Packed8, Packing, check_precision, packing_of
-from pyvista_vdi.model.providers import provider
 
 if TYPE_CHECKING:
     import os
@@ -279,14 +280,14 @@ class VDI:
 
         See :func:`pyvista_vdi.model.list_subsampling.subsampled_lists`.
         """
-        return provider("thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
+        return subsampled_lists(self, along_x, along_y)  # type: ignore[no-any-return]
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file that `pyvista_vdi.read` opens.
 
         The options are those of :func:`pyvista_vdi.io.write`.
         """
-        return provider("write_vdi")(self, path, **options)  # type: ignore[no-any-return]
+        return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         width, height = self.window_size
@@ -324,15 +325,17 @@ class VDI:
         >>> import pyvista_vdi as pvdi
         >>> pvdi.read("brain.vdi").plot()  # doctest: +SKIP
         """
-        return provider("plot")(self, **arguments)
+        return registry.method("VDI.plot")(self, **arguments)
 
     def _repr_html_(self) -> str | None:
         """Return a thumbnail and the figures, for what shows HTML and no viewer."""
-        return provider("notebook_html")(self)  # type: ignore[no-any-return]
+        form = registry.method("VDI._repr_html_", lambda vdi: None)
+        return form(self)  # type: ignore[no-any-return]
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         """Return what a notebook shows: a viewer, or a picture."""
-        return provider("notebook_bundle")(self, include, exclude)
+        forms = registry.method("VDI._repr_mimebundle_", lambda vdi, *_: {"text/plain": repr(vdi)})
+        return forms(self, include, exclude)
 
     def _check_media(self) -> None:
         if len(self.front) == 0:

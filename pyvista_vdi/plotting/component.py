@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.classification import (
     DEFAULTS,
     Classification,
     range_to_classify,
     refuse_unknown,
 )
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
@@ -353,7 +352,7 @@ class AddVDI(Component):
         blending = blending_name(blending)
         classified = {"scalars": scalars, "preference": preference, "blending": blending}
         changed = _changed({**classified, **vars(looks)}, DEFAULTS)
-        several = volume if isinstance(volume, VDISeries | VDISet) else None
+        several = volume if isinstance(volume, VDICollection) else None
         if several is not None:
             volume = several[0]  # which all steps, and all views, look like
         shown: VDI | VDISource
@@ -448,12 +447,8 @@ class AddVDI(Component):
         actor = PlotterVDIActor()
         if prop is not None:
             actor.prop = prop
-        if isinstance(shown, VDISeries):
-            mapper.SetSeries(shown)
-        elif isinstance(shown, VDISet):
-            mapper.SetVDISet(shown)
-        elif isinstance(shown, VDI):
-            mapper.SetVDI(shown)
+        if isinstance(shown, VDI | VDICollection):
+            mapper.SetInputData(shown)
         else:
             mapper.SetInputConnection(shown.GetOutputPort())
         actor.mapper = mapper

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import os
+from types import MethodType
+from typing import Any
 
 import pyvista as pv
 import pyvista.plotting  # whole: pv.Plotter is missing while another thread imports it
 
-from pyvista_vdi.model.providers import provider
+from pyvista_vdi import registry
 from pyvista_vdi.plotting.registration import Component
 
 
@@ -57,5 +59,17 @@ class PlotterVDIs(Component):
         >>> actor = plotter.add_vdi(pv.Wavelet(), cmap="bone")
         >>> plotter.vdi.export_html("scene.html")  # doctest: +SKIP
         """
-        page: io.StringIO | None = provider("scene_pages")(self._plotter, filename)
+        page: io.StringIO | None = registry.method("plotter.vdi.export_html")(
+            self._plotter, filename
+        )
         return page
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a method that an extension brings."""
+        place = None if name.startswith("_") else registry.methods("plotter.vdi.").get(name)
+        if place is None:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return MethodType(registry.load(place), self._plotter)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *registry.methods("plotter.vdi.")})

@@ -53,6 +53,7 @@ def vdi(default_runtime):
     return pvdi.generate(volume, view, SIZE, transfer_function=look)
 
 
+@pytest.mark.extension("web")
 def test_html_shows_a_thumbnail(vdi):
     said = vdi._repr_html_()
     assert "64 x 48 lists" in said

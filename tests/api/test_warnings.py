@@ -82,7 +82,7 @@ CASES = [
     slices_that_are_missing,
     an_effect_that_does_not_see_it,
     drawn_by_a_renderer,
-    a_page_without_all,
+    pytest.param(a_page_without_all, marks=pytest.mark.extension("web")),
     a_view_from_inside,
 ]
 

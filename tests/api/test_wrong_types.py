@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import functools
+import importlib
 import inspect
 import re
 import shutil
@@ -16,13 +17,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extension_marks import cases
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.extensions.insitu import InSitu
-from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi
-from pyvista_vdi.extensions.sets import cinema
 from pyvista_vdi.model.classification import DEFAULTS
 from pyvista_vdi.model.grid import Grid
 
@@ -66,6 +65,7 @@ class OneRank:
 
 
 def in_situ(path, camera, window_size, dimensions, every, values, first, at, **options):
+    InSitu = importlib.import_module("pyvista_vdi.extensions.insitu").InSitu
     with InSitu(path, camera, window_size, dimensions, every=every, **options) as show:
         show(values, first, at)
 
@@ -143,7 +143,7 @@ ENTRIES = {
         ["spacing", "origin", "append", "device", "max_supersegments"],
     ),
     "generate_on_mpi": lambda vdi: (
-        generate_on_mpi,
+        importlib.import_module("pyvista_vdi.extensions.large.on_mpi").generate_on_mpi,
         {"values": ARRAY, "first": (0, 0, 0), "grid": Grid.of(VOLUME), "camera": CAMERA}
         | {"window_size": SIZE, "transfer_function": TABLE, "comm": OneRank()},
         ["options", "device", "name", "metadata", "tolerance"],
@@ -200,7 +200,11 @@ ENTRIES = {
         {"path": "c.cdb"},
         ["background", "vdis", "device", "progress"],
     ),
-    "cinema.write": lambda vdi: (cinema.write, {"vdi_set": 0, "path": "d.cdb"}, None),
+    "cinema.write": lambda vdi: (
+        importlib.import_module("pyvista_vdi.extensions.sets.cinema").write,
+        {"vdi_set": 0, "path": "d.cdb"},
+        None,
+    ),
     "Camera.azimuth": lambda vdi: (CAMERA.azimuth, {"degrees": 1}, None),
     "Camera.tile": lambda vdi: (
         CAMERA.tile,
@@ -224,7 +228,12 @@ def vdi(default_runtime, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     "entry",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name == "generate_set")) for name in ENTRIES],
+    [
+        pytest.param(
+            *case.values, marks=[*case.marks, *[pytest.mark.slow] * (name == "generate_set")]
+        )
+        for name, case in zip(ENTRIES, cases(*ENTRIES), strict=True)
+    ],
 )
 def test_only_errors_of_the_package_come_out(entry, vdi, tmp_path):
     if entry == "open_volume":

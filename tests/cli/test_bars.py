@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from deep_programs import pair
+from extension_marks import cases
 from virtual_screen import virtual_screen
 
 import pyvista_vdi as pvdi
@@ -49,7 +50,7 @@ def told(monkeypatch):
     return Bar.told
 
 
-@pytest.mark.parametrize("suffix", [".vdi", ".exr", ".vti"])
+@pytest.mark.parametrize("suffix", cases(".vdi", ".exr", ".vti"))
 def test_files_say_how_far_they_are(suffix, tmp_path):
     path, written, read = tmp_path / f"a{suffix}", [], []
     VDI.save(path, progress=written.append)
@@ -61,7 +62,7 @@ def test_files_say_how_far_they_are(suffix, tmp_path):
         assert len(written) == len(read) == VDI.window_size[1]
 
 
-@pytest.mark.parametrize("suffix", [".vdi", ".exr"])
+@pytest.mark.parametrize("suffix", cases(".vdi", ".exr"))
 def test_a_callback_ends_reading_and_writing(suffix, tmp_path):
     path = VDI.save(tmp_path / f"a{suffix}")
     before = path.read_bytes()
@@ -73,6 +74,7 @@ def test_a_callback_ends_reading_and_writing(suffix, tmp_path):
         pvdi.read(path, progress=lambda _: False)
 
 
+@pytest.mark.extension("deep_exr")
 def test_convert_and_render_have_a_bar(told, tmp_path, default_runtime):
     files = [str(vdi.save(tmp_path / f"{i}.exr")) for i, vdi in enumerate(pair())]
     rows = 2 * VDI.window_size[1]
@@ -92,7 +94,7 @@ def test_convert_and_render_have_a_bar(told, tmp_path, default_runtime):
 
 def test_generate_has_a_bar_for_its_file(told, tmp_path, default_runtime):
     np.save(tmp_path / "v.npy", np.random.default_rng(1).random((8, 8, 8), np.float32))
-    arguments = ["generate", str(tmp_path / "v.npy"), "-o", str(tmp_path / "a.exr")]
+    arguments = ["generate", str(tmp_path / "v.npy"), "-o", str(tmp_path / "a.vdi")]
     assert cli.main([*arguments, "--size", "16x12"]) == 0
     assert told[-1] == ("writing it", 1.0, None)
 

@@ -76,6 +76,7 @@ def test_a_volume_is_drawn_by_volume_rendering(volume, capsys, tmp_path):
         np.testing.assert_array_equal(found, to_bytes(picture, (0, 0, 0)))
 
 
+@pytest.mark.extension("series")
 def test_a_series_plays_and_turns_meanwhile(saved, capsys, tmp_path):
     vdi = pvdi.read(saved)
     steps = [vdi, vdi.with_precision("8-byte"), vdi]

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from extension_marks import cases
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
@@ -79,6 +80,7 @@ def test_generate_on_a_cluster(image, tmp_path, default_runtime):
     np.testing.assert_array_equal(one.color, other.color)
 
 
+@pytest.mark.extension("series")
 def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
     target = tmp_path / "x.vdis"
     command = ["series", str(image), str(image), "-o", str(target), "--size", "16x9", *LOOK]
@@ -117,7 +119,7 @@ def test_mistakes_are_named(arguments, message, image, tmp_path, capsys, monkeyp
         ("s.h5::/w", "", "has no array 'w' .*: open one of s.h5::v"),
     ],
 )
-@pytest.mark.parametrize("verb", ["info", "generate", "series"])
+@pytest.mark.parametrize("verb", cases("info", "generate", "series"))
 def test_what_a_store_has_not_is_named(
     verb, store, options, message, image, tmp_path, capsys, monkeypatch
 ):

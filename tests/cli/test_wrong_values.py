@@ -9,6 +9,7 @@ import shlex
 
 import numpy as np
 import pytest
+from extension_marks import cases
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
@@ -248,7 +249,7 @@ def is_named(option, value, message):
     return (named or called) and all(part.lower() in message.lower() for part in parts)
 
 
-@pytest.mark.parametrize("verb", RIGHT)
+@pytest.mark.parametrize("verb", cases(*RIGHT, by=lambda verb: f"{verb} {RIGHT[verb]}"))
 def test_wrong_values_are_named_and_nothing_is_written(
     verb, folder, capsys, monkeypatch, default_runtime
 ):

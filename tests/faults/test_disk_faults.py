@@ -24,11 +24,11 @@ from pyvista_vdi import io
 from pyvista_vdi.errors import VDIFileError
 
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and limits")
-formats = pytest.mark.parametrize("suffix", io.SUFFIXES)
+formats = pytest.mark.parametrize("suffix", io.suffixes())
 
-#: With processes: a `.vti` file goes the way of the others (`io.whole_file`), hence every night.
+#: With processes: a `.vti` file goes the way of the others (`model.whole_file`), hence every night.
 formats_in_processes = pytest.mark.parametrize(
-    "suffix", [pytest.param(s, marks=[pytest.mark.slow] * (s == ".vti")) for s in io.SUFFIXES]
+    "suffix", [pytest.param(s, marks=[pytest.mark.slow] * (s == ".vti")) for s in io.suffixes()]
 )
 
 #: Where this process finds what tests share.
@@ -262,7 +262,7 @@ print(json.dumps(events))
 
 def test_reading_opens_nothing_else_and_runs_nothing(tmp_path):
     """Python's audit events of reading every file that fuzzing keeps, and whole ones."""
-    files = [str(vdi_number(1).save(tmp_path / f"a{suffix}")) for suffix in io.SUFFIXES]
+    files = [str(vdi_number(1).save(tmp_path / f"a{suffix}")) for suffix in io.suffixes()]
     for kind, suffix in (("vdi_bytes", ".vdi"), ("exr_bytes", ".exr")):
         for path in sorted((SUPPORT.parent / "fuzz" / "corpus" / kind).iterdir()):
             files.append(shutil.copy(path, tmp_path / (path.name + suffix)))

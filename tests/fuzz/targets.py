@@ -37,6 +37,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume, cli, io
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
+from pyvista_vdi.extensions.series import files as series_files
 from pyvista_vdi.extensions.series import layout
 from pyvista_vdi.extensions.series import reader as series_reader
 from pyvista_vdi.extensions.sets import files as set_files
@@ -127,7 +128,7 @@ READERS: dict[str, tuple[int, Callable[[Path], Any], Callable[[Path], Iterable[V
     "vdi": (VDI_RATIO, io.read_info, lambda path: [io.read(path)]),
     "exr": (EXR_RATIO, io.read_info, lambda path: [io.read(path)]),
     "html": (VDI_RATIO, io.read_info, lambda path: [io.read(path)]),
-    "vdis": (VDIS_RATIO, series_reader.read_info, _steps_of),
+    "vdis": (VDIS_RATIO, series_files.read_info, _steps_of),
     "vdiset": (VDIS_RATIO, set_files.read_info, _views_of),
 }
 

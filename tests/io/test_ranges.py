@@ -11,7 +11,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidVolumeError
-from pyvista_vdi.io.ranges import keeper_of
+from pyvista_vdi.model.chunk_ranges import keeper_of
 
 VALUES = np.random.default_rng(6).normal(size=(12, 10, 14)).astype(np.float32)
 VALUES[:4, :5, :7] = np.nan

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extension_marks import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rewriting import JUNK, check_changed_bytes, declaring, described, rewritten
@@ -172,7 +173,7 @@ def test_colours_are_stored_as_differences_of_channels():
     np.testing.assert_array_equal(colors_of_differences(stored), colors)
 
 
-@pytest.mark.parametrize("suffix", ["vdi", "exr", "html"])
+@pytest.mark.parametrize("suffix", cases("vdi", "exr", "html"))
 def test_no_level_is_the_usual_one(suffix, tmp_path):
     path = tmp_path / f"a.{suffix}"
     usual = small_vdi().save(path).read_bytes()
@@ -349,7 +350,7 @@ def test_permissions_are_the_users_and_kept_and_links_are_followed(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "options", "message"),
-    [
+    cases(
         ("a.vdi", {"compression": "gzip"}, r"must be one of lz4, zstd, deflate and none; got 'gz"),
         ("a.vdi", {"level": 0}, "level must be a whole number from 1 to 9; got 0"),
         ("a.vdi", {"level": "best"}, "level must be a whole number from 1 to 9; got 'best'"),
@@ -362,7 +363,7 @@ def test_permissions_are_the_users_and_kept_and_links_are_followed(tmp_path):
         ("a.html", {"compression": "zstd"}, "must be deflate; got 'zstd'"),
         ("a.html", {"exact": True}, "got exact"),
         ("a.html", {"background": (2, 0)}, "background"),
-    ],
+    ),
 )
 def test_options_are_checked_before_anything_is_written(name, options, message, tmp_path):
     with pytest.raises(InvalidArgumentError, match=message):

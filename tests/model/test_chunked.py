@@ -9,7 +9,6 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, UnsupportedError, Volume
-from pyvista_vdi.extensions.large.generate import generate_chunked
 from pyvista_vdi.model.chunked import ChunkedArray
 
 VALUES = np.random.default_rng(4).integers(0, 200, (30, 21, 26), np.uint8)
@@ -152,7 +151,10 @@ def test_colours_and_uneven_chunks_are_refused_by_name(source, tmp_path):
         Volume(dask.from_array(VALUES, chunks=((8, 12, 10), 9, 10)))
 
 
+@pytest.mark.extension("large")
 def test_generate_makes_it_block_by_block(default_runtime):
+    from pyvista_vdi.extensions.large.generate import generate_chunked
+
     volume = Volume(Counted(), (1, 2, 3))
     camera = Camera((60, 50, 170), (13, 20, 45), (0, 1, 0))
     vdi = pvdi.generate(volume, camera, (32, 18), opacity="linear", device=default_runtime.info)

@@ -267,7 +267,7 @@ def test_formats_on_the_page_of_files_are_written_and_read(tmp_path):
 
 
 def test_properties_on_the_page_of_paraview_are_the_plugin_s():
-    plugin = (CHECKOUT / "pyvista_vdi/extensions/paraview/vdi_plugin.py").read_text(
+    plugin = (CHECKOUT / "pyvista_vdi/extensions/paraview/plugin/vdi_plugin.py").read_text(
         encoding="utf-8"
     )
     text = (DOCS / "guide_paraview.md").read_text(encoding="utf-8")

@@ -150,7 +150,7 @@ def mistakes(folder):
 def pipeline(folder):
     """VTK's pipeline with a part of the volume on each rank, as in a parallel server."""
     signal.alarm(200)
-    from pyvista_vdi.vtk_pipeline.filters import ranks
+    from pyvista_vdi.extensions.large import vtk_ranks as ranks
     from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce
     from pyvista_vdi.vtk_pipeline.filters.files import VDIWriter
     from pyvista_vdi.vtk_pipeline.vtk import (

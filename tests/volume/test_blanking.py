@@ -9,7 +9,6 @@ from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
 from pyvista_vdi import AmbientOcclusion, InvalidVolumeError, Volume, reference, render_volume
 from pyvista_vdi.errors import UnsupportedError
-from pyvista_vdi.extensions.large.generate import generate_chunked
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.chunked import ChunkedArray
 
@@ -77,6 +76,12 @@ def test_what_cannot_have_blank_octants_says_so():
     chunked = ChunkedArray(np.zeros(shape))
     with pytest.raises(UnsupportedError, match="load it"):
         Volume(chunked, blanked=np.zeros(shape, np.uint8))
+
+
+@pytest.mark.extension("large")
+def test_volumes_in_blocks_cannot_have_blank_octants():
+    from pyvista_vdi.extensions.large.generate import generate_chunked
+
     volume = blanked("uint8", 8)
     scene = (volume, VIEWS["all of it"](volume), (4, 3), transfer_for(volume))
     with pytest.raises(UnsupportedError, match="volumes in blocks"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from extension_marks import cases
 from plugin_scenes import soft_ball, vdi_of_one_list
 from vtk_sources import ready_source
 
@@ -185,7 +186,7 @@ def test_what_is_no_vdi_has_no_picture(vdi, expected_messages):
     assert said in expected_messages.GetOutput()
 
 
-@pytest.mark.parametrize("suffix", [".vdi", ".exr"])
+@pytest.mark.parametrize("suffix", cases(".vdi", ".exr"))
 def test_files_keep_every_bit(vdi, suffix, tmp_path):
     path = tmp_path / f"ball{suffix}"
     writer = VDIWriter()
@@ -217,7 +218,7 @@ def test_files_are_written_as_asked_for(vdi, tmp_path):
     with pytest.raises(errors.InvalidArgumentError, match="precision must be one of.*'4-byte'"):
         writer.SetPrecision("4-byte")
     for change, value, message in (
-        ("FileName", tmp_path / "a.exr", "a.exr.* precision"),
+        ("FileName", tmp_path / "a.vti", "a.vti.* precision"),
         ("Compression", "zip", "compression of .*'zip'"),
         ("Tolerance", 0.1, "a.vdi.* tolerance"),
     ):

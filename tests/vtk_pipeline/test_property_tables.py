@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from extension_marks import cases
 from matplotlib.colors import ListedColormap
 from vtk_sources import camera_at
 from watched_windows import on_screen
@@ -294,7 +295,7 @@ def test_gradients_beyond_the_nodes_are_as_vtk_has_them():
     assert found.gradient_opacities[-2] > 0.99
 
 
-@pytest.mark.parametrize("kind", ["series", "chunks"])
+@pytest.mark.parametrize("kind", cases("series", "chunks"))
 def test_every_volume_has_the_table_of_its_own_scalars(kind):
     """A peak that only some thousand entries over a volume's own scalars show."""
     prop = property_of(opacity=function_of((-1e9, 0), (9.3, 0), (9.7, 1), (10.4, 0), (1e9, 0)))

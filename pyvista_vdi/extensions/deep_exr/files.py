@@ -56,10 +56,10 @@ from pyvista_vdi.extensions.deep_exr.view import (
 )
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import whole_file
 
 #: The name that a file's name ends in.
 SUFFIX = ".exr"

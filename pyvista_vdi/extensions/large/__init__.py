@@ -1,1 +1,13 @@
-"""Volumes of any size: read and marched in blocks, whose lists are merged behind each other."""
+"""Volumes in blocks: of chunked stores, on the workers of a Dask cluster, on ranks of MPI."""
+
+from __future__ import annotations
+
+from pyvista_vdi.registry import Extension
+
+EXTENSION = Extension(
+    generators={
+        "blocks": "pyvista_vdi.extensions.large.entrance:generate_in_blocks",
+        "clients": "pyvista_vdi.extensions.large.entrance:connected",
+        "ranks": "pyvista_vdi.extensions.large.on_mpi:generate_on_mpi",
+    },
+)

@@ -7,10 +7,8 @@ lost with a worker. Which worker did what, and what came first, changes no bit.
 
 from __future__ import annotations
 
-import threading
 import uuid
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import partial
 from itertools import zip_longest
 from typing import Any
@@ -21,27 +19,21 @@ from distributed import (
     Client,
     Future,
     KilledWorker,
-    Worker,
     as_completed,
-    get_worker,
     wait,
 )
-from distributed.protocol.pickle import dumps, loads
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import (
-    Cancelled,
     DeviceError,
-    DeviceMemoryError,
     InvalidVolumeError,
     NoDeviceError,
     VDIError,
-    VDIFileError,
     warn_external,
 )
-from pyvista_vdi.extensions.large.blocks import Indices, Values, ends_of
+from pyvista_vdi.extensions.large import dask_tasks as work
+from pyvista_vdi.extensions.large.blocks import Indices, ends_of
 from pyvista_vdi.extensions.large.generate import (
     NOWHERE,
     chunks_of,
@@ -50,14 +42,13 @@ from pyvista_vdi.extensions.large.generate import (
     task_of,
     vdi_of,
 )
-from pyvista_vdi.extensions.large.passes import Opacities, Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.extensions.large.passes import Rows, Seen, Task, light_entering
 from pyvista_vdi.extensions.large.reading import Plan, Read
 from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.generation.generate import Progress, report
-from pyvista_vdi.io.store_identity import StoreIdentity, check_once, identity_of
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.store_identity import StoreIdentity
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -65,8 +56,6 @@ from pyvista_vdi.model.volume import Volume
 #: Share of the workers' memory that values may take which are kept from the first pass to the
 #: second; otherwise they are read again.
 _SHARE_FOR_VALUES = 0.25
-#: Errors that keep their type where they say which block they are of.
-_OURS = (DeviceMemoryError, InvalidVolumeError, NoDeviceError, VDIFileError)
 #: Times that Dask tries again what a lost worker was at.
 _RETRIES = 3
 #: Seconds after which is looked whether the only workers that may do something are still there.
@@ -75,8 +64,6 @@ _LOOK_EVERY = 5.0
 RANGES_PER_WORKER = 4
 #: Shares of the two passes and of the merging in what is reported.
 _SHARES = (0.4, 0.4, 0.2)
-#: A worker's threads do one block after the other: a block's memory is needed once.
-_one_block = threading.Lock()
 
 
 def generate_on_dask(
@@ -156,7 +143,7 @@ class _Run:
         # now and then by one without workers, from another thread.)
         some = {"workers": workers, "allow_other_workers": False}
         self._where: dict[str, Any] = some if len(workers) < len(client.nthreads()) else {}
-        limits = client.run(_memory_limit, workers=workers, on_error="ignore")
+        limits = client.run(work.memory_limit, workers=workers, on_error="ignore")
         memory = sum(limit or np.inf for limit in limits.values())
         self._sent = self._array_for_workers()
         self._kept = volume.array.nbytes <= _SHARE_FOR_VALUES * memory
@@ -177,18 +164,23 @@ class _Run:
         values = self._values(reads)
         in_window = [windows.get(block, NOWHERE) for block in order]
         first = self._mapped(
-            "first-pass", order, self._bound(_first_pass), order, values.values(), in_window
+            "first-pass",
+            order,
+            self._bound(work.first_pass),
+            order,
+            values.values(),
+            in_window,
         )
-        seen = self._gathered("seen", first, _without_slabs, _SHARES[0])
+        seen = self._gathered("seen", first, work.without_slabs, _SHARES[0])
         if known is None and len(seen) == len(blocks):
             self._check_ranges(seen)
             keep_ranges(self._volume, task, seen)
         entering = light_entering(task, windows, seen)
         ambient: list[Any] = [None] * len(entering)
         if task.occlusion is not None:
-            parts = self._mapped("opacities", order, _opacities, first.values())
+            parts = self._mapped("opacities", order, work.opacities, first.values())
             columns = ([part] for part in parts.values())
-            (found,) = self._mapped("ambient", [()], self._bound(_ambient), *columns).values()
+            (found,) = self._mapped("ambient", [()], self._bound(work.ambient), *columns).values()
             ambient = [found] * len(entering)
         again = () if self._kept else entering
         self.counted["points_read"] = sum(reads[block].points for block in [*order, *again])
@@ -196,7 +188,7 @@ class _Run:
         pieces = self._mapped(
             "second-pass",
             entering,
-            self._bound(_second_pass),
+            self._bound(work.second_pass),
             entering,
             [values[block] for block in entering],
             [windows[block] for block in entering],
@@ -205,7 +197,7 @@ class _Run:
             *([first.get(found.get(at)) for found in around] for at in halo.offsets()),
         )
         del values, seen
-        lengths = self._gathered("lengths", pieces, _lengths, _SHARES[1])
+        lengths = self._gathered("lengths", pieces, work.lengths, _SHARES[1])
         first.clear()
         self.counted["runs_merged"] = int(sum(many.sum() for many in lengths.values()))
         return self._merged(windows, pieces, lengths)
@@ -226,7 +218,7 @@ class _Run:
             return dict(zip(reads, futures, strict=True))
         if not self._kept:
             return dict(reads)
-        return self._mapped("read", reads, partial(_read, self._task), reads, reads.values())
+        return self._mapped("read", reads, partial(work.read, self._task), reads, reads.values())
 
     def _array_for_workers(self) -> Any:
         """Return the array as it goes to workers, each of which has shown that it has its files."""
@@ -234,16 +226,18 @@ class _Run:
         if array is None:
             return self._volume.array
         if array.lazy is not None:
-            for identity in _identities_in(array.lazy):
+            for identity in work.identities_in(array.lazy):
                 self._require_files(identity)
             return array
         own = array.identity()
         if own is not None:
             self._require_files(own)
-        return _Sent(array, own, self._token)
+        return work.Sent(array, own, self._token)
 
     def _require_files(self, identity: StoreIdentity) -> None:
-        answers = self._client.run(_wrong_with, identity, workers=self._workers, on_error="return")
+        answers = self._client.run(
+            work.wrong_with, identity, workers=self._workers, on_error="return"
+        )
         failed = {at: error for at, error in answers.items() if error is not None}
         if failed:
             at, error = next(iter(failed.items()))
@@ -278,7 +272,7 @@ class _Run:
             here = ends_of(array[box])
             if here != (low[at], high[at]):
                 raise InvalidVolumeError(
-                    f"{_named(self._task, block)}: the workers read values from {low[at]} to "
+                    f"{work.named(self._task, block)}: the workers read values from {low[at]} to "
                     f"{high[at]} where this process reads {here[0]} to {here[1]} in "
                     f"{array.source}: all must have the same files, which stay as they are"
                 )
@@ -345,7 +339,7 @@ class _Run:
         rows = self._mapped(
             "rows",
             [(*block, y0) for block, y0, _ in cut],
-            _rows,
+            work.rows,
             [pieces[block] for block, _, _ in cut],
             *zip(*(ends for _, *ends in cut), strict=True),
         )
@@ -356,7 +350,7 @@ class _Run:
         mapped = self._mapped(
             "merge",
             ranges,
-            self._bound(_merge),
+            self._bound(work.merge),
             ranges,
             *zip_longest(*of_ranges.values()),
             priority=1,
@@ -402,15 +396,15 @@ class _Run:
             return self._value(future)
         except KilledWorker as error:
             raise DeviceError(
-                f"{_named(self._task, at)} could not be made: the workers that were at it died, "
-                f"{_RETRIES + 1} in all (of too little memory, mostly): give workers more memory, "
-                f"or store the volume in smaller chunks; {error}"
+                f"{work.named(self._task, at)} could not be made: the workers that were at it "
+                f"died, {_RETRIES + 1} in all (of too little memory, mostly): give workers more "
+                f"memory, or store the volume in smaller chunks; {error}"
             ) from error
         except (VDIError, CancelledError):
             raise
         except Exception as error:  # of whoever reads: it does not know what for
             raise DeviceError(
-                f"{_named(self._task, at)} could not be made: {type(error).__name__}: {error}"
+                f"{work.named(self._task, at)} could not be made: {type(error).__name__}: {error}"
             ) from error
 
     def _report(self, share: float) -> None:
@@ -423,7 +417,10 @@ def _workers_with_device(
 ) -> dict[str, str]:
     """Return the device of each worker that has one; warn of the others."""
     answers = client.run(
-        _device_name, device, workers=None if workers is None else list(workers), on_error="return"
+        work.device_name,
+        device,
+        workers=None if workers is None else list(workers),
+        on_error="return",
     )
     if not answers:
         raise NoDeviceError("the cluster has no workers: start some, or wait for them")
@@ -437,151 +434,3 @@ def _workers_with_device(
             f"{names}"
         )
     return {at: name for at, name in answers.items() if at not in without}
-
-
-def _wrong_with(identity: StoreIdentity) -> str | None:
-    """Return what is wrong with a worker's files, if anything is."""
-    try:
-        identity.check()
-    except InvalidVolumeError as error:
-        return str(error)
-    return None
-
-
-def _device_name(device: Any) -> str:
-    return get_runtime(device).info.name
-
-
-def _memory_limit(dask_worker: Worker) -> int | None:
-    """Return how many bytes a worker may take; Dask hands it in by the parameter's name."""
-    return dask_worker.memory_manager.memory_limit
-
-
-class _Sent:
-    """A chunked array on its way to workers: unpickled where a part is read.
-
-    Dask waits for ever where arguments cannot be unpickled, as arrays of files that are not there.
-
-    Parameters
-    ----------
-    array : ChunkedArray
-        The array.
-    identity : StoreIdentity, optional
-        Of its files, if there are any.
-    run : str
-        Tells one generation from the next.
-    """
-
-    def __init__(self, array: ChunkedArray, identity: StoreIdentity | None, run: str) -> None:
-        self.dtype, self._array = array.dtype, dumps(array)
-        self._identity, self._run = identity, run
-
-    def __getitem__(self, box: tuple[slice, ...]) -> Values:
-        if self._identity is not None:
-            check_once(self._identity, self._run)
-            self._identity.check_chunks(box)
-        try:
-            array: ChunkedArray = loads(self._array)
-        except Exception as error:
-            raise InvalidVolumeError(
-                f"the volume's array cannot be opened there ({type(error).__name__}: {error}): "
-                "each worker needs the library that reads it, and the right to read its files"
-            ) from error
-        return array[box]
-
-
-def _identities_in(lazy: Any) -> list[StoreIdentity]:
-    """Return what tells the files of arrays in a Dask graph from others."""
-    layers = getattr(lazy.dask, "layers", {}).values()
-    found = (identity_of(value) for layer in layers if len(layer) == 1 for value in layer.values())
-    return [identity for identity in found if identity is not None]
-
-
-# What follows runs on workers
-
-
-def _read(task: Task, block: Indices, read: Read) -> Values:
-    with _naming(task, block):
-        return read()
-
-
-def _first_pass(task: Task, device: Any, block: Indices, values: Any, window: Rectangle) -> Seen:
-    with _at(task, block):
-        return task.first_pass(block, _at_hand(values), window, device)
-
-
-def _second_pass(
-    task: Task,
-    device: Any,
-    block: Indices,
-    values: Any,
-    window: Rectangle,
-    light: NDArray[np.float16],
-    ambient: NDArray[np.float32] | None,
-    *around: Seen | None,
-) -> Piece:
-    with _at(task, block):
-        halo = task.halo
-        neighbours = zip(halo.offsets(), around, strict=True)
-        parts = {at: halo.from_slabs(seen.slabs, at) for at, seen in neighbours if seen is not None}
-        whole = task.blocks.with_halo(_at_hand(values), parts, halo)
-        return task.second_pass(block, whole, window, light, device, ambient)
-
-
-def _rows(piece: Piece, y0: int, y1: int) -> Piece:
-    part = piece.rows(y0, y1)
-    return part._replace(runs=part.runs.copy())
-
-
-def _merge(task: Task, device: Any, at: tuple[int, int], *pieces: Piece | None) -> Rows:
-    with _at(task, at):
-        return task.merge(*at, [piece for piece in pieces if piece is not None], device)
-
-
-def _without_slabs(seen: Seen) -> Seen:
-    return seen._replace(slabs={}, opacities=None)
-
-
-def _opacities(seen: Seen) -> Opacities | None:
-    return seen.opacities
-
-
-def _ambient(task: Task, device: Any, *opacities: Opacities | None) -> NDArray[np.float32]:
-    with _at(task, ()):
-        return task.ambient(opacities, device)
-
-
-def _lengths(piece: Piece) -> NDArray[np.int64]:
-    return piece.counts.sum(axis=1, dtype=np.int64)
-
-
-def _at_hand(values: Any) -> Values:
-    found: Values = values() if isinstance(values, Read) else values
-    return found
-
-
-@contextmanager
-def _at(task: Task, at: tuple[int, ...]) -> Iterator[None]:
-    """Do one thing at a time in a process, and say what failed where."""
-    with _naming(task, at), _one_block:
-        yield
-
-
-@contextmanager
-def _naming(task: Task, at: tuple[int, ...]) -> Iterator[None]:
-    try:
-        yield
-    except (Cancelled, MemoryError):
-        raise
-    except Exception as error:
-        kind = type(error) if isinstance(error, _OURS) else DeviceError
-        raise kind(f"{_named(task, at)} on worker {get_worker().address}: {error}") from error
-
-
-def _named(task: Task, at: tuple[int, ...]) -> str:
-    if not at:
-        return "the VDI's ambient occlusion"
-    if len(at) < 3:
-        return f"rows {at[0]} and following of the VDI"
-    box = ", ".join(f"{part.start}:{part.stop}" for part in task.blocks.own((at[0], at[1], at[2])))
-    return f"block {at[:3]} (points [{box}] of the volume)"

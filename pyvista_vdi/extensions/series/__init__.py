@@ -1,1 +1,37 @@
-"""Series of VDIs: one scene at several times, in memory and in ``.vdis`` files."""
+"""Series: the VDIs of a scene at several times, their files, and what plays them."""
+
+from __future__ import annotations
+
+from pyvista_vdi.registry import Extension, FileFormat, Verb
+
+EXTENSION = Extension(
+    names={
+        "SeriesWriter": "pyvista_vdi.extensions.series.writer:SeriesWriter",
+        "VDISeries": "pyvista_vdi.extensions.series.series:VDISeries",
+        "generate_series": "pyvista_vdi.extensions.series.generate:generate_series",
+    },
+    formats=(
+        FileFormat(
+            ".vdis",
+            "pyvista_vdi.extensions.series.files",
+            holds="series",
+            magic=b"\x89VDIS\r\n\x1a",
+            verbs="pyvista_vdi.extensions.series.cli",
+        ),
+    ),
+    shown={
+        "pyvista_vdi.extensions.series.series:VDISeries": (
+            "pyvista_vdi.extensions.series.shown:SeriesInput"
+        ),
+    },
+    verbs=(
+        Verb(
+            "series",
+            "write VDIs, or those of volumes, that are time steps to one file",
+            "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
+            "pyvista_vdi.extensions.series.options:add_options",
+            "pyvista_vdi.extensions.series.cli:series",
+        ),
+    ),
+    methods={"VDISeries.save": "pyvista_vdi.extensions.series.files:save"},
+)

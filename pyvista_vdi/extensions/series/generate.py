@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterable, Sequence, Sized
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,10 @@ import numpy as np
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidArgumentTypeError,
-    UnsupportedError,
     naming,
     warn_external,
     with_article,
 )
-from pyvista_vdi.extensions.large.entrance import generate_in_blocks
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -25,12 +23,11 @@ from pyvista_vdi.model.checks import check_callback
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, bytes_of, warn_missed
-from pyvista_vdi.quality.probe import generate_by_dial
+from pyvista_vdi.quality.generate_anywhere import generate_anywhere
 
 _DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")
 _GRID = ("spacing", "origin")
@@ -253,47 +250,15 @@ class StepMaker:
         )
 
 
-def generate_anywhere(
-    volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
-    transfer_function: TransferFunction,
-    dial: Dial | None,
-    options: GenerationOptions,
-    *,
-    client: Any = None,
-    device: Any = None,
-    progress: Progress | None = None,
-    metadata: Mapping[str, Any] | None = None,
-) -> VDI:
-    """Make a VDI of a volume in memory, or of a chunked one in blocks, here or by workers.
-
-    Arguments and errors are those of :func:`pyvista_vdi.generate`.
-    """
-    scene = (volume, camera, window_size, transfer_function)
-    made: dict[str, Any] = {"device": device, "progress": progress, "metadata": metadata}
-    if volume.chunked:
-        if dial is not None:
-            raise UnsupportedError(
-                "quality, target_ssim, target_fps and max_bytes measure the scene, and "
-                f"{volume.name!r} is chunked: give max_supersegments, or load a coarse level"
-            )
-        return generate_in_blocks(*scene, options, client=client, **made)
-    if client is not None:
-        raise InvalidArgumentError(
-            f"client is for chunked volumes, and {volume.name!r} is in memory: give a Volume of a "
-            "Dask array (dask.array.from_array), or leave client out"
-        )
-    return generate_by_dial(*scene, dial, options, **made)
-
-
 def _steps(
     volumes: Any, times: Iterable[float] | None
 ) -> tuple[Iterable[Any], tuple[float, ...] | None]:
     """Return the steps' volumes, a sequence where they can be had again, and their times."""
     known = None if times is None else checked_times(times)
     if hasattr(volumes, "GetOutputPort") or hasattr(volumes, "time_values"):
-        volumes, own = provider("temporal_volumes")(volumes)
+        from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
+
+        volumes, own = steps_and_times(volumes)
         known = checked_times(own) if known is None else known
     elif callable(volumes):
         if known is None:

@@ -13,12 +13,11 @@ from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
+from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
-#: Steps per second of films.
-RATE = 24.0
 #: Steps that are decoded before their time comes: what takes longer than the others finds them.
 _AHEAD = 3
 #: Bytes of decoded steps that are kept, so that the next round need not decode them.

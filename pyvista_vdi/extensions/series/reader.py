@@ -10,7 +10,6 @@ import zlib
 from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from threading import Lock
@@ -33,31 +32,25 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.extensions.series import layout
 from pyvista_vdi.extensions.series.codes import ENTRIES, Samples, Tables
 from pyvista_vdi.extensions.series.differences import Stepped, decoded
+from pyvista_vdi.extensions.series.frames import Frames, found_between, indexed
+from pyvista_vdi.extensions.series.info import SeriesInfo
 from pyvista_vdi.extensions.series.layout import FrameHeader
 from pyvista_vdi.extensions.series.on_device import decoded_on, runtime_for_decoding
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.files import opened
 from pyvista_vdi.io.vdi_file import reader as vdi_reader
 from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.packing import check_precision
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 
 _log = logging.getLogger(__name__)
-
-#: What the names of pages end in.
-_PAGE = ".html"
 
 _REMEDY = "copy it from its source again, or generate the series anew"
 
 #: Decoded steps that are kept: those that others are made from.
 _KEPT_STEPS = 3
-
-#: Bytes that are searched at a time.
-_WINDOW = 1 << 20
 
 #: What arrays that contradict each other may raise on their way, beside errors of our own.
 _CONTRADICTIONS = (
@@ -70,59 +63,6 @@ _CONTRADICTIONS = (
     TypeError,
     ValueError,
 )
-
-
-@dataclass(frozen=True)
-class SeriesInfo:
-    """What a .vdis file says about itself.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    format_version : int
-        Version of the format.
-    written_by : str
-        Program and version.
-    camera : Camera
-        The first step's generating view V_O.
-    window_size : (int, int)
-        The first step's lists along each edge of the viewport.
-    bounds : tuple of float
-        The first step's, in the model frame.
-    metadata : dict
-        What made the first step.
-    times : tuple of float
-        Of the steps.
-    step_bytes : tuple of int
-        What each step takes.
-    keys : tuple of int
-        Steps that need no other.
-    precision, codec : str
-        As written.
-    tolerance : float
-        As written.
-    closed : bool
-        Whether the writer came to its end: otherwise it is still at work, or was killed.
-    file_bytes : int
-        Size of the file.
-    """
-
-    path: Path
-    format_version: int
-    written_by: str
-    camera: Camera
-    window_size: tuple[int, int]
-    bounds: tuple[float, ...]
-    metadata: dict[str, Any]
-    times: tuple[float, ...]
-    step_bytes: tuple[int, ...]
-    keys: tuple[int, ...]
-    precision: str
-    codec: str
-    tolerance: float
-    closed: bool
-    file_bytes: int
 
 
 _Value = TypeVar("_Value")
@@ -176,11 +116,7 @@ class StepsReader(Sequence[VDI]):
     def __init__(self, path: str | os.PathLike[str]) -> None:
         try:
             self._path = Path(path)
-            self._stream: BinaryIO = (
-                provider("html_files").data_in(path)
-                if str(path).lower().endswith(_PAGE)
-                else self._path.open("rb")
-            )
+            self._stream: BinaryIO = opened(self._path)
             weakref.finalize(self, self._stream.close)
             self._file_bytes = self._stream.seek(0, os.SEEK_END)
         except (OSError, ValueError, TypeError) as error:
@@ -197,9 +133,12 @@ class StepsReader(Sequence[VDI]):
         try:
             self._head, begin = self._read_head()
             self._codec = str(self._head["codec"])
-            frames = self._indexed(begin)
+            frames = indexed(self._bytes_at, begin, self._file_bytes)
             self.closed = frames is not None
-            self._frames = self._found(begin) if frames is None else frames
+            if frames is None:
+                frames = found_between(self._bytes_at, begin, self._file_bytes)
+                self._say_what_is_lost(frames)
+            self._frames = frames
             #: Steps that others are written by; no other one is worth keeping
             self._needed = {header.by for _, header in self._frames}
             if len(self._frames) < self._LEAST:
@@ -306,53 +245,7 @@ class StepsReader(Sequence[VDI]):
     def _check_head(self, found: dict[str, Any]) -> None:
         """Take what else the head says; VDIError, KeyError, TypeError or ValueError if wrong."""
 
-    def _indexed(self, begin: int) -> list[tuple[int, FrameHeader]] | None:
-        """Return the frames that the index names; None where there is none, or it is damaged."""
-        size = layout.TRAILER.size
-        data = self._bytes_at(max(0, self._file_bytes - size), size)
-        if len(data) < size:
-            return None
-        at, magic = layout.TRAILER.unpack(data)
-        if magic != layout.TRAILER_MAGIC or not begin <= at <= self._file_bytes - size:
-            return None
-        header = FrameHeader.of_bytes(self._bytes_at(at, layout.HEADER_BYTES))
-        if header is None or header.what != layout.INDEX:
-            return None
-        entry = layout.ENTRY.size + layout.HEADER_BYTES
-        content_at = at + layout.HEADER_BYTES
-        if (
-            header.n_bytes != header.number * entry
-            or content_at + header.n_bytes > self._file_bytes
-        ):
-            return None
-        content = self._bytes_at(content_at, header.n_bytes)
-        if zlib.crc32(content) != header.checksum:
-            return None
-        frames: list[tuple[int, FrameHeader]] = []
-        last = begin
-        for k in range(header.number):
-            (place,) = layout.ENTRY.unpack_from(content, k * entry)
-            step = FrameHeader.of_bytes(content[k * entry + layout.ENTRY.size : (k + 1) * entry])
-            if step is None or place != last or not self._follows(step, frames):
-                return None
-            last = place + layout.HEADER_BYTES + step.n_bytes
-            frames.append((int(place), step))
-        return frames if last == at else None
-
-    def _found(self, begin: int) -> list[tuple[int, FrameHeader]]:
-        """Return the frames that are there whole, found one behind the other."""
-        frames: list[tuple[int, FrameHeader]] = []
-        place: int | None = begin
-        while place is not None:
-            header = FrameHeader.of_bytes(self._bytes_at(place, layout.HEADER_BYTES))
-            if header is None or not self._follows(header, frames):
-                place = self._next(place + 1, frames)
-                continue
-            end = place + layout.HEADER_BYTES + header.n_bytes
-            if end > self._file_bytes:
-                break  # still being written, or cut off
-            frames.append((place, header))
-            place = end
+    def _say_what_is_lost(self, frames: Frames) -> None:
         numbers = [header.number for _, header in frames]
         lost = sorted(set(range(numbers[-1] + 1)) - set(numbers)) if numbers else []
         if lost:
@@ -360,35 +253,6 @@ class StepsReader(Sequence[VDI]):
                 f"{self._path} is damaged: {self._PART}s {', '.join(map(str, lost))} cannot be "
                 f"found, {len(frames)} others are read; {_REMEDY}"
             )
-        return frames
-
-    def _next(self, place: int, frames: list[tuple[int, FrameHeader]]) -> int | None:
-        """Return where the next header is that may follow, behind one that is damaged."""
-        overlap = layout.HEADER_BYTES - 1
-        while place < self._file_bytes:
-            window = self._bytes_at(place, _WINDOW + overlap)
-            found = window.find(layout.STEP)
-            while found >= 0:
-                header = FrameHeader.of_bytes(window[found : found + layout.HEADER_BYTES])
-                if header is not None and self._follows(header, frames):
-                    return place + found
-                found = window.find(layout.STEP, found + 1)
-            place += _WINDOW
-        return None
-
-    @staticmethod
-    def _follows(header: FrameHeader, frames: list[tuple[int, FrameHeader]]) -> bool:
-        """Whether a header is one of a step behind these."""
-        before = frames[-1][1] if frames else None
-        return (
-            header.what == layout.STEP
-            and header.kind in (layout.VDI_FILE, layout.LISTS, layout.AGAIN)
-            and -1 <= header.by < header.number
-            and (header.by < 0) <= (header.kind != layout.AGAIN)
-            and (header.by >= 0) <= (header.kind != layout.VDI_FILE)
-            and math.isfinite(header.time)
-            and (before is None or (before.number < header.number and before.time < header.time))
-        )
 
     def _bytes_at(self, place: int, n: int) -> bytes:
         try:
@@ -593,36 +457,3 @@ def _tables(arrays: dict[str, NDArray[Any]]) -> Tables:
         raise InvalidVDIError("its extinctions are not finite")
     # Copies: the arrays of a frame lie in one memory
     return Tables(colors.reshape(-1, 3).copy(), extinctions.copy())
-
-
-def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
-    """Read a series from a .vdis file; steps are decoded when they are asked for.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    progress : callable, optional
-        Called with 1: opening reads no step.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
-    """
-    steps = StepsReader(path)
-    Pieces(progress, 1)()
-    return VDISeries(steps, steps.times)
-
-
-def read_info(path: str | os.PathLike[str]) -> SeriesInfo:
-    """Read what a .vdis file says about itself, without its steps: errors as for :func:`read`."""
-    return StepsReader(path).info()
-
-
-def is_series_file(path: Any) -> bool:
-    """Whether a file is read as a series: by its name, and a page by its content."""
-    name = str(path).lower()
-    if name.endswith(_PAGE):
-        return bool(provider("html_files").begins_with(path, layout.MAGIC))
-    return name.endswith(layout.SUFFIX)

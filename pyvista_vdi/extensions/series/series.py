@@ -12,14 +12,15 @@ from typing import Any, overload
 
 import numpy as np
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.inputs import as_vdi, each_of
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 
 
-class VDISeries(Sequence[VDI]):
+class VDISeries(VDICollection):
     """The VDIs of one scene at several times: a sequence of :class:`VDI`.
 
     Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` from a ``.vdis`` file,
@@ -47,6 +48,8 @@ class VDISeries(Sequence[VDI]):
     volumes : sequence or None
         As above.
     """
+
+    times: tuple[float, ...]
 
     def __init__(
         self,
@@ -202,9 +205,7 @@ class VDISeries(Sequence[VDI]):
         InvalidArgumentError
             If an option is out of its range.
         """
-        if str(path).lower().endswith(".html"):
-            return provider("html_files").write_series(self, path, **options)  # type: ignore[no-any-return]
-        return provider("write_series")(self, self.times, path, **options)  # type: ignore[no-any-return]
+        return registry.method("VDISeries.save")(self, path, **options)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         width, height = self.window_size

@@ -1,1 +1,38 @@
-"""Sets of VDIs: one scene from many sides, in memory and in ``.vdiset`` files."""
+"""Sets: the VDIs of a scene from many views, their files, and what chooses among them."""
+
+from __future__ import annotations
+
+from pyvista_vdi.registry import Extension, FileFormat, Verb
+
+EXTENSION = Extension(
+    names={
+        "VDISet": "pyvista_vdi.extensions.sets.vdi_set:VDISet",
+        "generate_set": "pyvista_vdi.extensions.sets.generate:generate_set",
+    },
+    formats=(
+        FileFormat(
+            ".vdiset",
+            "pyvista_vdi.extensions.sets.files",
+            holds="set",
+            magic=b"\x89VDIV\r\n\x1a",
+            verbs="pyvista_vdi.extensions.sets.cli",
+        ),
+    ),
+    shown={
+        "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput",
+    },
+    verbs=(
+        Verb(
+            "set",
+            "write VDIs of a volume from as many sides as pictures from everywhere need",
+            "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
+            "pyvista_vdi.extensions.sets.options:add_options",
+            "pyvista_vdi.extensions.sets.cli:generate",
+        ),
+    ),
+    methods={
+        "VDISet.save": "pyvista_vdi.extensions.sets.files:write",
+        "VDISet.save_cinema": "pyvista_vdi.extensions.sets.cinema:write",
+    },
+    requires=("series",),  # whose files theirs are but for the head
+)

@@ -17,17 +17,17 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentTypeError, VDIFileError
-from pyvista_vdi.extensions.sets.render import blended
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io.png import to_bytes, write_png
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import check_background
 from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.quality.view_error import eye_from_centre
+from pyvista_vdi.raycasting.blend import blended
 
 SUFFIX = ".cdb"
 _VECTORS = ("position", "focal_point", "view_up")

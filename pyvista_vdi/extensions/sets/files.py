@@ -8,18 +8,18 @@ import os
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.extensions.series.info import SeriesInfo
 from pyvista_vdi.extensions.series.layout import index_bytes
-from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
-from pyvista_vdi.extensions.series.writer import StepsWriter
+from pyvista_vdi.extensions.series.reader import StepsReader
+from pyvista_vdi.extensions.series.steps_writer import StepsWriter
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
-from pyvista_vdi.io.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.quality.view_error import eye_from_centre
 
 FORMAT_NAME = "pyvista-vdi-set"
@@ -132,9 +132,7 @@ def _begin(writer: StepsWriter, stream: BinaryIO, vdi_set: VDISet) -> None:
     )
 
 
-def read(
-    path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any
-) -> VDISet:
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISet:
     """Read a set from a .vdiset file; VDIs are decoded when they are asked for.
 
     Parameters
@@ -143,20 +141,12 @@ def read(
         The file.
     progress : callable, optional
         Called with 1: opening reads no VDI.
-    **options
-        There are no others.
 
     Raises
     ------
     VDIFileError
         If the file is absent, foreign, of a newer version or damaged, or has no finished view.
-    InvalidArgumentError
-        If an option is given.
     """
-    if options:
-        raise InvalidArgumentError(
-            f"{path!s} is read without the option {', '.join(sorted(options))}"
-        )
     views = SetReader(path)
     Pieces(progress, 1)()
     return VDISet(
@@ -168,15 +158,6 @@ def read(
     )
 
 
-def read_info(path: str | os.PathLike[str]) -> tuple[SeriesInfo, dict[str, Any]]:
-    """Read what a .vdiset file says about itself, and what made it: errors as for :func:`read`."""
-    views = SetReader(path)
-    return views.info(), views.about
-
-
-def is_set_file(path: Any) -> bool:
-    """Whether a file is read as a set: by its name, and a page by its content."""
-    name = str(path).lower()
-    if name.endswith(".html"):
-        return bool(provider("html_files").begins_with(path, MAGIC))
-    return name.endswith(SUFFIX)
+def read_info(path: str | os.PathLike[str]) -> SeriesInfo:
+    """Read what a .vdiset file says about itself: errors as for :func:`read`."""
+    return SetReader(path).info()

@@ -11,11 +11,12 @@ from typing import Any, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.inputs import as_vdi, each_of
-from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
 
@@ -39,7 +40,7 @@ class Maker(Protocol):
         ...
 
 
-class VDISet(Sequence[VDI]):
+class VDISet(VDICollection):
     """The VDIs of one scene from many views V_O: a sequence of :class:`VDI`.
 
     Made by :func:`pyvista_vdi.generate_set`, by :func:`pyvista_vdi.read` from a ``.vdiset`` file,
@@ -253,6 +254,16 @@ class VDISet(Sequence[VDI]):
         shares = np.append(1.0, shares[shares > 0])
         return [(int(i), float(w)) for i, w in zip(order, shares / shares.sum(), strict=False)]
 
+    def parts(self, camera: Any) -> list[tuple[VDI, float]]:
+        """Return the VDIs of which a view's picture is blended, with weights, the nearest first.
+
+        Parameters
+        ----------
+        camera : Camera or vtkCamera or pyvista.Camera
+            The view.
+        """
+        return [(self[i], weight) for i, weight in self.weights(camera)]
+
     @property
     def can_grow(self) -> bool:
         """Whether the volume is at hand, so that :meth:`generate` works: of files it is not."""
@@ -338,14 +349,14 @@ class VDISet(Sequence[VDI]):
         InvalidArgumentError
             If an option is out of its range.
         """
-        return provider("write_set")(self, path, **options)  # type: ignore[no-any-return]
+        return registry.method("VDISet.save")(self, path, **options)  # type: ignore[no-any-return]
 
     def save_cinema(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a Cinema database (specification D): a folder of pictures and their table.
 
         See :func:`pyvista_vdi.extensions.sets.cinema.write`.
         """
-        return provider("write_cinema")(self, path, **options)  # type: ignore[no-any-return]
+        return registry.method("VDISet.save_cinema")(self, path, **options)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         width, height = self.window_size

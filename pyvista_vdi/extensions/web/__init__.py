@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from pyvista_vdi.registry import Extension, FileFormat, Verb
+
 if TYPE_CHECKING:
     from pyvista_vdi.extensions.web.server import Server, serve
     from pyvista_vdi.extensions.web.widget import VDIWidget
@@ -13,6 +15,33 @@ if TYPE_CHECKING:
 _HOMES = {"Server": "server", "VDIWidget": "widget", "serve": "server"}
 
 __all__ = ["Server", "VDIWidget", "serve"]
+
+EXTENSION = Extension(
+    formats=(
+        FileFormat(
+            ".html",
+            "pyvista_vdi.extensions.web.page",
+            write_options=("precision", "title", "background"),
+            compressions=("deflate",),
+            page=True,
+        ),
+    ),
+    verbs=(
+        Verb(
+            "serve",
+            "serve VDIs of a volume to web pages, in which it is turned while it stays here",
+            "pyvista-vdi serve knee.nrrd --cmap bone --opacity sigmoid_6",
+            "pyvista_vdi.extensions.web.options:add_options",
+            "pyvista_vdi.extensions.web.cli:serve",
+        ),
+    ),
+    methods={
+        "VDI._repr_html_": "pyvista_vdi.extensions.web.notebook:html_of",
+        "VDI._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
+        "plotter.vdi.export_html": "pyvista_vdi.extensions.web.scenes.export:export_html",
+    },
+    requires=("series", "sets"),  # which pages show as well
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -20,17 +20,17 @@ from numpy.typing import NDArray
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import VDIFileError
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.series.writer import KEY_EVERY, StepsWriter, write_all
+from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter, write_all
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.vdi_file.writer import write_to
-from pyvista_vdi.io.whole_file import check_writable, whole_file
 from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.metrics import over_background
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import check_writable, whole_file
 
 #: What the script elements that hold a .vdi file as base64 say of themselves.
 DATA_TYPE = "application/vdi+base64"

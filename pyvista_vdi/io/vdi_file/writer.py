@@ -27,7 +27,6 @@ from pyvista_vdi.io.vdi_file.layout import (
     layouts,
     version_of,
 )
-from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.list_subsampling import coarser
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
@@ -37,6 +36,7 @@ from pyvista_vdi.model.packing import (
     gaps_and_thicknesses,
 )
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, warn_external
-from pyvista_vdi.extensions.series.player import Player
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
@@ -88,7 +87,7 @@ class VDIActorMethods(PlayingMethods):
         self._mapper_for(" that could show a VDI").SetVDI(vdi)
 
     @property
-    def vdi_set(self: Any) -> VDISet | None:
+    def vdi_set(self: Any) -> VDICollection | None:
         """The set of which the nearest VDI is shown; ``None`` where a single one or a volume is.
 
         Another one that is set is shown from the next frame on.
@@ -97,7 +96,7 @@ class VDIActorMethods(PlayingMethods):
         return None if mapper is None else mapper.GetVDISet()
 
     @vdi_set.setter
-    def vdi_set(self: Any, vdi_set: VDISet) -> None:
+    def vdi_set(self: Any, vdi_set: VDICollection) -> None:
         self._mapper_for(" that could show a set").SetVDISet(vdi_set)
 
     def _mapper_for(self: Any, what: str) -> Any:
@@ -224,11 +223,11 @@ class VDIActorMethods(PlayingMethods):
         """
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
-        player = None if mapper is None else mapper.painter.upkeep.player
-        if player is not None:
-            return self._step_anew(player, camera, window_size)  # type: ignore[no-any-return]
-        if mapper is not None and mapper.GetVDISet() is not None:
-            return self._view_added(mapper.GetVDISet(), camera)  # type: ignore[no-any-return]
+        if source is None and mapper is not None and mapper.painter.input is not None:
+            vdi = self._regenerated(mapper.painter, camera, window_size)
+            if vdi is not None:
+                mapper.Modified()
+                return vdi  # type: ignore[no-any-return]
         if source is None:
             raise InvalidArgumentError(
                 "this actor shows a VDI without its volume, which cannot be generated anew: add "
@@ -247,34 +246,16 @@ class VDIActorMethods(PlayingMethods):
             shown.take_size(renderer)
         return source.GetVDI()  # type: ignore[no-any-return]
 
-    def _view_added(self: Any, vdi_set: VDISet, camera: Any) -> VDI:
-        """Add a VDI of a view to the set, by default of the view that is shown."""
-        renderer = self.GetMapper().painter.renderer()
-        if camera is None and renderer is not None:
-            camera = renderer.GetActiveCamera()
-        if camera is None:
-            raise InvalidArgumentError(
-                "nothing shows this actor, so there is no view: pass camera, or add the actor to "
-                "a renderer first"
-            )
-        vdi = vdi_set.generate(camera_of(camera, as_array(self.GetMatrix())))
-        vdi_set.add(vdi)
-        self.GetMapper().Modified()
-        return vdi
-
-    def _step_anew(self: Any, player: Player, camera: Any, window_size: Any) -> VDI:
-        """Generate the step that is shown for another view, and show that while the step lasts."""
-        renderer = self.GetMapper().painter.renderer()
+    def _regenerated(self: Any, painter: Any, camera: Any, window_size: Any) -> VDI | None:
+        """Generate a VDI of several for a view, by default that of the renderer, if it can be."""
+        renderer = painter.renderer()
         if camera is None and renderer is not None:
             camera = renderer.GetActiveCamera()
         if window_size is None and renderer is not None and min(renderer.GetSize()) > 0:
             window_size = renderer.GetSize()
         if camera is not None:
             camera = camera_of(camera, as_array(self.GetMatrix()))
-        vdi = player.series.generate(player.step, camera, window_size)
-        player.replace(vdi)
-        self.GetMapper().Modified()
-        return vdi
+        return painter.input.regenerated(camera, window_size)  # type: ignore[no-any-return]
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

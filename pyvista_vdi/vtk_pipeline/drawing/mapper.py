@@ -12,8 +12,7 @@ import gc
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
@@ -133,7 +132,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
         """Draw this VDI."""
         self._set_input(input_of(vdi))
 
-    def SetSeries(self, series: VDISeries) -> None:
+    def SetSeries(self, series: VDICollection) -> None:
         """Draw a step of this series, the first one at first: see :attr:`VDIActor.time`.
 
         Raises
@@ -141,19 +140,19 @@ class VDIMapperMethods(ArrayChoiceMethods):
         InvalidArgumentError
             If it is none.
         """
-        if not isinstance(series, VDISeries):
+        if not isinstance(series, VDICollection) or series.times is None:
             raise InvalidArgumentError(
                 f"SetSeries takes a VDISeries; got {type(series).__name__}: VDISeries.of makes one "
                 "of several VDIs"
             )
         self._set_input(input_of(series))
 
-    def GetSeries(self) -> VDISeries | None:
+    def GetSeries(self) -> VDICollection | None:
         """Return the series of which a step is drawn; ``None`` where there is none."""
-        player = self.painter.upkeep.player
-        return None if player is None else player.series
+        shown = self._collection
+        return None if shown is None or shown.times is None else shown
 
-    def SetVDISet(self, vdi_set: VDISet) -> None:
+    def SetVDISet(self, vdi_set: VDICollection) -> None:
         """Draw a set: of each frame's view the VDI that is nearest, or a blend of several.
 
         Where its volume is at hand it grows behind the frames while nobody turns, by views that
@@ -164,17 +163,21 @@ class VDIMapperMethods(ArrayChoiceMethods):
         InvalidArgumentError
             If it is none.
         """
-        if not isinstance(vdi_set, VDISet):
+        if not isinstance(vdi_set, VDICollection) or vdi_set.times is not None:
             raise InvalidArgumentError(
                 f"SetVDISet takes a VDISet; got {type(vdi_set).__name__}: VDISet.of makes one of "
                 "several VDIs"
             )
         self._set_input(input_of(vdi_set))
 
-    def GetVDISet(self) -> VDISet | None:
+    def GetVDISet(self) -> VDICollection | None:
         """Return the set that is drawn; ``None`` where there is none."""
-        shower = self.painter.upkeep.shower
-        return None if shower is None else shower.vdi_set
+        shown = self._collection
+        return None if shown is None or shown.times is not None else shown
+
+    @property
+    def _collection(self) -> VDICollection | None:
+        return None if self.painter.input is None else self.painter.input.collection
 
     def GetVDI(self) -> VDI | None:
         """Return the VDI that was drawn last, or would be drawn; ``None`` before the first."""

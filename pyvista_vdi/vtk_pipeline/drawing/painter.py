@@ -13,11 +13,11 @@ import numpy as np
 
 from pyvista_vdi.device import Runtime, aligned_empty, get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
-from pyvista_vdi.extensions.sets.render import blended
 from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
+from pyvista_vdi.raycasting.blend import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.box import Box
@@ -184,6 +184,7 @@ class Painter:
     def status(self) -> VDIStatus:
         """Return how the last frame was drawn, and what goes on."""
         vdi, last, view, fps = self.upkeep.vdi, self._last, None, None
+        player = None if self.input is None else self.input.player
         if self._scene is not None:
             view, weak = self._scene
             clock = weak()
@@ -204,7 +205,7 @@ class Painter:
             vdi=vdi,
             stand_in=last.stand_in,
             drawn=last.way,
-            time=None if self.upkeep.player is None else self.upkeep.player.time,
+            time=None if player is None else player.time,
         )
 
     def before_frame(self) -> None:

@@ -5,26 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions.series.player import RATE, Player
-from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.model.collection import RATE, VDICollection
 
 
 class PlayingMethods:
-    """Mixed into what shows a VDI; see :class:`pyvista_vdi.extensions.series.player.Player`."""
+    """Mixed into what shows a VDI; see :attr:`Input.player`."""
 
     @property
-    def series(self: Any) -> VDISeries | None:
+    def series(self: Any) -> VDICollection | None:
         """The series that is shown; ``None`` where a single VDI or a volume is.
 
         Another one that is set is shown from the next frame on, at the step nearest in time.
         """
         mapper = self.GetMapper()
-        return None if mapper is None else mapper.GetSeries()  # type: ignore[no-any-return]
+        return None if mapper is None else mapper.GetSeries()
 
     @series.setter
-    def series(self: Any, series: VDISeries) -> None:
+    def series(self: Any, series: VDICollection) -> None:
         mapper = self._mapper_for(" that could show a series")
-        before = None if mapper.painter.upkeep.player is None else self.time
+        before = None if mapper.GetSeries() is None else self.time
         mapper.SetSeries(series)
         if before is not None:
             self.time = before
@@ -60,8 +59,8 @@ class PlayingMethods:
     def playing(self: Any) -> bool:
         """Whether one step is shown after the other."""
         mapper = self.GetMapper()
-        player = None if mapper is None else mapper.painter.upkeep.player
-        return player is not None and player.playing
+        shown = None if mapper is None else mapper.painter.input
+        return shown is not None and shown.player is not None and shown.player.playing
 
     def play(
         self: Any,
@@ -109,11 +108,11 @@ class PlayingMethods:
         """
         self._player().pause()
 
-    def _player(self: Any) -> Player:
-        player = self._mapper_for(" that could show a series").painter.upkeep.player
-        if player is None:
+    def _player(self: Any) -> Any:
+        shown = self._mapper_for(" that could show a series").painter.input
+        if shown is None or shown.player is None:
             raise InvalidArgumentError(
                 "this actor shows no series, which alone has times: add one (plotter.add_vdi("
                 "pyvista_vdi.read('x.vdis'))), or set it (actor.series = series)"
             )
-        return player  # type: ignore[no-any-return]
+        return shown.player

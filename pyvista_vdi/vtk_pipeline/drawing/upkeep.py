@@ -12,8 +12,6 @@ from typing import Any, Literal
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
-from pyvista_vdi.extensions.series.player import Player
-from pyvista_vdi.extensions.sets.shower import SetShower
 from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
@@ -29,14 +27,14 @@ from pyvista_vdi.quality.view_error import (
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SeriesInput, SetInput, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimators
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import Regeneration
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
-from pyvista_vdi.vtk_pipeline.interaction.ticker import PERIOD, LoopTicker, Ticker, period_of
+from pyvista_vdi.vtk_pipeline.interaction.ticker import PERIOD, LoopTicker, Ticker
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Interaction, WindowClock, reduced
 
 _log = logging.getLogger(__name__)
@@ -138,25 +136,13 @@ class Upkeep:
         return self.regeneration.ssim(self.vdi) if error is None else error.ssim
 
     @property
-    def player(self) -> Player | None:
-        """What shows one step of a series after the other, where a series is shown."""
-        return self.input.player if isinstance(self.input, SeriesInput) else None
-
-    @property
-    def shower(self) -> SetShower | None:
-        """What shows the VDIs of a set, where a set is shown."""
-        return self.input.shower if isinstance(self.input, SetInput) else None
-
-    @property
     def _busy(self) -> bool:
         """Whether something goes on that the event loop has to look at."""
-        if self.shower is not None:
-            return self.shower.growing
-        return self.regeneration.busy or (self.player is not None and self.player.playing)
+        return self.regeneration.busy or (self.input is not None and self.input.busy)
 
     def blended_parts(self, vdi: VDI) -> list[tuple[VDI, float]]:
-        """Return the VDIs of a set that a picture is blended of, with weights; none for one."""
-        parts = [] if self.shower is None else self.shower.parts()
+        """Return the VDIs that a picture is blended of, with weights; none for one."""
+        parts = [] if self.input is None else self.input.parts()
         return parts if len(parts) > 1 and parts[0][0] is vdi else []
 
     def retry(self) -> None:
@@ -210,10 +196,7 @@ class Upkeep:
         joint: bool,
     ) -> VDI | StandIn | None:
         if not isinstance(source, SourceInput):
-            if isinstance(source, SeriesInput):
-                source.player.device = frame.painter.device
-            if isinstance(source, SetInput):
-                self._look_around(source.shower, frame)
+            source.look(frame.view.camera, frame.painter.device, self._growth(frame))
             vdi = self._updated(source)
             self._say_what_is_lacking(vdi, frame)
             return vdi
@@ -344,24 +327,21 @@ class Upkeep:
             source.source.TakeVDI(vdi, wanted)
         return vdi
 
-    def _look_around(self, shower: SetShower, frame: Frame) -> None:
-        """Show a set's VDI that is nearest to the frame's view; add one where pictures lack."""
+    def _growth(self, frame: Frame) -> str | None:
+        """Return whether VDIs of a view are made that are lacking: see :meth:`Input.look`."""
         window = frame.renderer.GetRenderWindow()
-        shower.device = frame.painter.device
-        shower.look(frame.view.camera)
         if self._interaction.moving(window):
-            shower.stop_growing()
-        elif self.regeneration.policy == "auto":
-            if self._interaction.asynchronous(window):
-                shower.grow()
-            elif self.draw == "auto":
-                shower.grow_now()
+            return "later"
+        if self.regeneration.policy != "auto":
+            return None
+        if self._interaction.asynchronous(window):
+            return "behind"
+        return "now" if self.draw == "auto" else None
 
     def tick(self, window: Any) -> None:
         """Start the event loop's timer, if something goes on and no hand moves."""
         if self._busy and not self._interaction.moving(window):
-            player = self.player
-            period = PERIOD if player is None else period_of(player.rate)
+            period = PERIOD if self.input is None else self.input.period or PERIOD
             if browser.watches(window):
                 self._loop_ticker.start(period)
             self._ticker.start(window.GetInteractor(), period)
@@ -508,12 +488,7 @@ class Upkeep:
         angle = angle_from_generating_view(vdi, view.camera)
         covered = coverage(vdi, view.camera, view.size)
         detail = magnification(vdi, frame.camera, frame.full_size)
-        volumes = None if self.player is None else self.player.series.volumes
-        remedy = (
-            "without its volume it cannot be made anew"
-            if volumes is None
-            else "actor.regenerate() makes this step anew"
-        )
+        remedy = Input.remedy if self.input is None else self.input.remedy
         lacking = {}
         if angle > cone:
             lacking["angle"] = (
@@ -538,11 +513,8 @@ class Upkeep:
     def collect(self) -> bool:
         """Take what was made in the background; whether there is another VDI to be drawn."""
         try:
-            if self.player is not None:
-                return self.player.advance()
-            if self.shower is not None:
-                return self.shower.advance()
-            return self.regeneration.collect()
+            another = None if self.input is None else self.input.advance()
+            return self.regeneration.collect() if another is None else another
         except Exception as error:
             self._complain(error)
             return False
@@ -559,11 +531,9 @@ class Upkeep:
             clock.render()
 
     def _complain(self, error: Exception) -> None:
-        if self.player is not None:
-            self._warnings.warn(f"a step is left out: {type(error).__name__}: {error}", error)
-            return
-        self._warnings.warn(
+        said = None if self.input is None else self.input.complaint(error)
+        usual = (
             f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
-            "and actor.regenerate() tries again",
-            error,
+            "and actor.regenerate() tries again"
         )
+        self._warnings.warn(said or usual, error)

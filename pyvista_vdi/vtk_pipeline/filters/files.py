@@ -7,11 +7,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIError
-from pyvista_vdi.extensions.series.reader import StepsReader, is_series_file
-from pyvista_vdi.extensions.series.reader import read as read_series
-from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.errors import InvalidArgumentError, VDIError, VDIFileError
 from pyvista_vdi.io import checked_target, read, read_info
+from pyvista_vdi.io.files import format_of, holds
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
@@ -49,7 +48,7 @@ class VDIReader(Algorithm):
     def __init__(self) -> None:
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
         self._path: str | None = None
-        self._series: VDISeries | None = None
+        self._series: VDICollection | None = None
         self._seen: Any = None
 
     def SetFileName(self, path: str | os.PathLike[str] | None) -> None:
@@ -60,7 +59,7 @@ class VDIReader(Algorithm):
         """Return the file."""
         return self._path
 
-    def GetSeries(self) -> VDISeries:
+    def GetSeries(self) -> VDICollection:
         """Return the series of a ``.vdis`` file, with the steps that are finished by now.
 
         Raises
@@ -69,7 +68,9 @@ class VDIReader(Algorithm):
             If the file is no readable series.
         """
         self.UpdateInformation()
-        return read_series(self._path or "") if self._series is None else self._series
+        if holds(self._path) != "series":
+            raise VDIFileError(f"{self._path} is not a series of VDIs: name a .vdis file")
+        return read(self._path or "") if self._series is None else self._series  # type: ignore[no-any-return]
 
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
@@ -86,25 +87,23 @@ class VDIReader(Algorithm):
         about: Any = None
         self._series = None
         with suppress(VDIError, OSError):  # RequestData says it
-            if is_series_file(self._path):
-                steps = StepsReader(self._path or "")
-                about, self._series = steps.info(), VDISeries(steps, steps.times)
-            elif self._path:
+            if self._path:
                 about = read_info(self._path)
+                self._series = read(self._path) if holds(self._path) == "series" else None
         self.picture_size = picture_size(about.window_size, about.metadata) if about else None
         announce(outputs, about.window_size if about else (1, 1))
-        announce_times(outputs, self._series.times if self._series else ())
+        announce_times(outputs, about.times if self._series is not None else ())
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         if self._path is None:
             raise InvalidArgumentError("VDIReader has no file name: call SetFileName(path)")
         image = vtkImageData.GetData(outputs, 0)
-        if not is_series_file(self._path):
+        if holds(self._path) != "series":
             image.ShallowCopy(vdi_to_image(read(self._path)))
             return
         # What is wrong with it is raised by opening it again
-        series = read_series(self._path) if self._series is None else self._series
+        series: Any = read(self._path) if self._series is None else self._series
         time = wanted_time(outputs.GetInformationObject(0))
         step = 0 if time is None else series.nearest(time)
         vdi = series[step]
@@ -196,11 +195,12 @@ class VDIWriter(Algorithm):
         VDIFileError
             If the file's name ends in no format's, or it cannot be written.
         """
-        if is_series_file(self._path) and self.GetNumberOfInputConnections(0):
+        found = format_of(self._path)
+        if found is not None and found.holds == "series" and self.GetNumberOfInputConnections(0):
             images, times = steps_and_times(self.GetInputAlgorithm(0, 0))
             vdis = StepSequence(lambda i: vdi_from_image(images[i]), len(times))
             options = {"precision": "8-byte", **self._options()}
-            VDISeries(vdis, times).save(self._path or "", **options)
+            found.load().write_steps(vdis, times, self._path or "", **options)
             return
         self.Modified()
         self.Update()

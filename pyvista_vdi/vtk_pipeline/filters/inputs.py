@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.extensions.series.player import Player
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.shower import SetShower
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
@@ -23,7 +21,16 @@ from pyvista_vdi.vtk_pipeline.vtk import require_this_build
 
 
 class Input:
-    """A VDI that does not change."""
+    """A VDI that does not change; and what others do who show several VDIs, or make them."""
+
+    #: The series or the set whose VDIs are shown.
+    collection: VDICollection | None = None
+    #: What chooses among the steps of a series and plays them: see ``extensions.series.player``.
+    player: Any = None
+    #: What remedies a view that the VDI does not serve, where there is no source.
+    remedy = "without its volume it cannot be made anew"
+    #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
+    period: int | None = None
 
     def __init__(self, vdi: VDI | None = None) -> None:
         self._vdi = vdi
@@ -71,65 +78,36 @@ class Input:
     def rest(self) -> None:
         """End what goes on behind the frames, which may begin anew."""
 
+    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
+        """Choose what a view shows, before a frame.
 
-class SeriesInput(Input):
-    """The step of a series that a player shows."""
+        ``growth`` says whether VDIs that are lacking are made: ``"now"``, ``"behind"`` the frames,
+        or not yet, ``"later"``, because the view turns; ``None``: never.
+        """
 
-    def __init__(self, player: Player) -> None:
-        super().__init__()
-        self.player = player
+    @property
+    def busy(self) -> bool:
+        """Whether something goes on that the event loop has to look at."""
+        return False
 
-    def vdi(self) -> VDI | None:
-        """Return the step's VDI, decoded now if it is not ready."""
-        self._vdi = self.player.vdi
-        return self._vdi
+    def advance(self) -> bool | None:
+        """Take what is due between two frames; whether there is another VDI to be drawn.
 
-    def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds of the step that was shown last, or of the first."""
-        return self.player.series.bounds if self._vdi is None else self._vdi.bounds
+        ``None`` where nothing goes on by itself.
+        """
+        return None
 
-    def stamp(self) -> Any:
-        """Return the step."""
-        return self.player.step
+    def complaint(self, error: Exception) -> str | None:
+        """Return what is said of an error between two frames; ``None``: what is usual."""
+        return None
 
-    def shared(self) -> Input:
-        """Return an input that shows the same step, and plays by itself."""
-        other = Player(self.player.series)
-        other.step = self.player.step
-        return SeriesInput(other)
+    def parts(self) -> list[tuple[VDI, float]]:
+        """Return the VDIs that a picture is blended of, with weights; none for one."""
+        return []
 
-    def rest(self) -> None:
-        """Pause, and leave no thread."""
-        self.player.close()
-
-
-class SetInput(Input):
-    """The VDI of a set that is nearest to the view."""
-
-    def __init__(self, shower: SetShower) -> None:
-        super().__init__()
-        self.shower = shower
-
-    def vdi(self) -> VDI | None:
-        """Return the nearest VDI, decoded now if it is not ready."""
-        self._vdi = self.shower.vdi
-        return self._vdi
-
-    def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds that all VDIs have."""
-        return self.shower.vdi_set.bounds
-
-    def stamp(self) -> Any:
-        """Return which VDI it is."""
-        return self.shower.nearest
-
-    def shared(self) -> Input:
-        """Return an input that looks at the same set by itself."""
-        return SetInput(SetShower(self.shower.vdi_set))
-
-    def rest(self) -> None:
-        """Leave no thread."""
-        self.shower.close()
+    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI | None:
+        """Generate what is shown for a view, and show that; ``None`` where this cannot be."""
+        return None
 
 
 class SourceInput(Input):
@@ -299,19 +277,18 @@ def _size(renderer: Any) -> tuple[int, int]:
 
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, a series or set of them, an image of one or a VDISource."""
+    """Return what to draw for a VDI, an image of one, a VDISource, or what extensions show."""
     if isinstance(data, VDI):
         return Input(data)
-    if isinstance(data, VDISeries):
-        return SeriesInput(Player(data))
-    if isinstance(data, VDISet):
-        return SetInput(SetShower(data))
     if isinstance(data, VDISource):
         return SourceInput(data)
     if is_vdi_image(data):
         image = ImageInput(data)
         image.vdi()  # refuse a damaged one now
         return image
+    show = registry.made_of("shown", data)
+    if show is not None:
+        return show(data)  # type: ignore[no-any-return]
     require_this_build(type(data))
     raise InvalidVDIError(
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "

@@ -13,8 +13,8 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidVDIError, VDIFileError
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.whole_file import whole_file
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import whole_file
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     DESCRIPTION,

@@ -21,7 +21,7 @@ from stepped_vdis import SIZE, damaged, frames_of, packed_steps, same, stepped_v
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, VDIWarning
-from pyvista_vdi.extensions.series import layout, reader, writer
+from pyvista_vdi.extensions.series import files, layout, reader, steps_writer
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -136,12 +136,12 @@ def test_a_seek_decodes_three_steps_at_most(tmp_path):
     for i in range(20):
         fresh = reader.StepsReader(path)
         assert fresh[i].equals(steps[i])
-        assert 1 <= fresh.n_decoded <= writer.MOST_DECODED
+        assert 1 <= fresh.n_decoded <= steps_writer.MOST_DECODED
     walk = reader.StepsReader(path)
     for i in range(20):
         assert walk[i].equals(steps[i])
     assert walk.n_decoded <= 20  # one after the other, each is decoded once
-    assert max(np.diff([*reader.read_info(path).keys, 20])) <= writer.KEY_EVERY
+    assert max(np.diff([*files.read_info(path).keys, 20])) <= steps_writer.KEY_EVERY
 
 
 def test_a_tolerance_is_kept(tmp_path):
@@ -150,7 +150,7 @@ def test_a_tolerance_is_kept(tmp_path):
     exact = VDISeries.of(steps).save(tmp_path / "a.vdis")
     path = VDISeries.of(steps).save(tmp_path / "b.vdis", tolerance=tolerance)
     assert path.stat().st_size < exact.stat().st_size
-    assert reader.read_info(path).tolerance == tolerance
+    assert files.read_info(path).tolerance == tolerance
     for read, vdi in zip(pvdi.read(path), steps, strict=True):
         for name in ("offsets", "front", "back"):
             assert np.array_equal(getattr(read, name), getattr(vdi, name))
@@ -266,7 +266,7 @@ def test_an_interrupt_leaves_no_half_step(steps, tmp_path, stream):
         with pytest.raises(KeyboardInterrupt):
             out.append(steps[1])
         out.append(steps[2])
-    assert reader.read_info(path).closed
+    assert files.read_info(path).closed
     assert all_same(pvdi.read(path), [steps[0], steps[2]])
 
 
@@ -287,13 +287,13 @@ def test_what_was_appended_is_readable_at_once(steps, tmp_path):
             out.append(vdi, 10.0 + k)
             series = pvdi.read(path)
             assert (len(out), len(series)) == (k + 1, k + 1)
-            assert not reader.read_info(path).closed
+            assert not files.read_info(path).closed
             assert all(same(read, step) for read, step in zip(series, steps, strict=False))
         with pytest.raises(InvalidArgumentError, match="ascend"):
             out.append(steps[0], 14.0)
         with pytest.raises(InvalidArgumentError, match="camera and window_size"):
             out.append(object(), 15.0)
-    assert reader.read_info(path).closed
+    assert files.read_info(path).closed
     assert pvdi.read(path).times == (10.0, 11.0, 12.0, 13.0, 14.0)
     with pytest.raises(VDIFileError, match="closed"):
         out.append(steps[0])
@@ -322,7 +322,7 @@ def test_a_file_is_gone_on_with_or_kept(steps, tmp_path):
     with pvdi.SeriesWriter(path, append=True) as out:
         for vdi in steps[3:5]:
             out.append(vdi)
-    assert reader.read_info(path).closed
+    assert files.read_info(path).closed
     assert all_same(pvdi.read(path), steps[:5])
     with pvdi.SeriesWriter(path, overwrite=True) as out:
         out.append(steps[0])
@@ -347,7 +347,7 @@ def test_every_cut_of_a_killed_run_is_gone_on_with(tmp_path):
         finished = sum(end <= n for end in ends)
         with pvdi.SeriesWriter(cut, append=True) as out:
             out.append(small[3], 9.0)
-        assert reader.read_info(cut).closed
+        assert files.read_info(cut).closed
         assert all_same(pvdi.read(cut), [*small[:finished], small[3]])
 
 
@@ -439,7 +439,7 @@ def test_a_step_without_its_header_is_told(tmp_path):
 def test_a_damaged_index_is_not_needed(saved, steps):
     path = damaged(saved, lambda data: data.__setitem__(-30, data[-30] ^ 1))
     assert all_same(pvdi.read(path), steps)
-    assert not reader.read_info(path).closed
+    assert not files.read_info(path).closed
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,14 @@ from typing import Any
 
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.extensions.series.series import Called
-from pyvista_vdi.extensions.series.writer import KEY_EVERY, StepsWriter
-from pyvista_vdi.extensions.series.writer import write_all as write_series
+from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
+from pyvista_vdi.extensions.series.steps_writer import write_all as write_series
 from pyvista_vdi.extensions.sets.files import write_all as write_set
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.page import View, assembled, in_parts
 from pyvista_vdi.extensions.web.placing import thinned
 from pyvista_vdi.extensions.web.scenes.scene import css, scene_of
-from pyvista_vdi.io.whole_file import whole_file
+from pyvista_vdi.model.whole_file import whole_file
 
 
 def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.StringIO | None:

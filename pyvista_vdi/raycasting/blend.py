@@ -1,4 +1,4 @@
-"""Pictures of sets: of the nearest VDI, or blended where two or three are about as near."""
+"""Pictures that are blended of several VDIs' of the same scene."""
 
 from __future__ import annotations
 
@@ -8,15 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.raycast import render_vdi
-
-
-def render_set(vdi_set: VDISet, request: FrameRequest) -> NDArray[np.float32]:
-    """Raycast what a set has for a view: see :func:`pyvista_vdi.render`."""
-    return blended([(vdi_set[i], w) for i, w in vdi_set.weights(request.camera)], request)
 
 
 def blended(parts: Sequence[tuple[VDI, float]], request: FrameRequest) -> NDArray[np.float32]:

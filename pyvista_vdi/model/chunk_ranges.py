@@ -20,9 +20,9 @@ from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, VDIFileError
-from pyvista_vdi.io.store_identity import ARRAY_FILES, local_files
-from pyvista_vdi.io.whole_file import whole_file
+from pyvista_vdi.model.store_identity import ARRAY_FILES, local_files
 from pyvista_vdi.model.user_cache import user_cache
+from pyvista_vdi.model.whole_file import whole_file
 
 Ranges = tuple[NDArray[np.float64], NDArray[np.float64]]
 

@@ -1,4 +1,4 @@
-"""What shows a set: the VDIs of the view at hand, others decoded ahead, and more of them made."""
+"""What a mapper draws of a set: the VDIs nearest to the view, others decoded ahead, more made."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import threading
 from typing import Any
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.errors import Cancelled
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.extensions.series.player import MEMORY, ON_DEVICE, Decoding
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 
 #: How many of the VDIs nearest to a view are decoded.
 _AHEAD = 8
@@ -20,13 +21,13 @@ _AHEAD = 8
 _MOVED = 1.0
 
 
-class SetShower:
-    """Keeps at hand what frames need of a set.
+class SetInput(Input):
+    """The VDI of a set that is nearest to the view, or a blend of several.
 
-    The thread that draws tells where it looks from by :meth:`look`, asks for :attr:`vdi` and
-    :meth:`parts` in its frames, and calls :meth:`advance` between two of them. Another thread
-    decodes what is nearest to the view, and brings it to the device, as far as there is memory;
-    a third makes VDIs of views that do not reach the set's target, where :meth:`grow` is called.
+    :meth:`look` is told where the thread that draws looks from, and :meth:`advance` is called
+    between two frames. Another thread decodes what is nearest to the view, and brings it to the
+    device, as far as there is memory; a third makes VDIs of views that do not reach the set's
+    target.
 
     Parameters
     ----------
@@ -35,19 +36,18 @@ class SetShower:
 
     Attributes
     ----------
-    vdi_set : VDISet
-        As above.
-    device : optional
-        Where VDIs are drawn, see :func:`pyvista_vdi.list_devices`.
     memory : float
         Bytes that decoded VDIs may take, on the device and beside it; those that are drawn are
         always kept.
     """
 
+    collection: VDISet
+
     def __init__(self, vdi_set: VDISet) -> None:
-        self.vdi_set = vdi_set
-        self.device: Any = None
+        super().__init__()
+        self.collection = vdi_set
         self.memory: float = MEMORY
+        self._device: Any = None
         self._view: Camera = vdi_set.cameras[0]
         self._weights = vdi_set.weights(self._view)
         self._lock = threading.Lock()
@@ -58,28 +58,50 @@ class SetShower:
         self._grower = Worker("pyvista-vdi set's growth")
         self._grown_for: Camera | None = None
 
-    def look(self, camera: Camera) -> None:
-        """Look from a view, whose model transform places the set, and decode what is near it."""
-        self._view = camera
-        self._weights = self.vdi_set.weights(camera)
-        if not self._decoder.running and self._wanted() is not None:
-            self._decoder.put(Decoding(lambda on, _report: self._decode(on), self.device))
+    def vdi(self) -> VDI | None:
+        """Return the nearest VDI, decoded now if it is not ready."""
+        self._vdi = self._at(self.stamp())
+        return self._vdi
 
-    @property
-    def nearest(self) -> int:
-        """Index of the VDI whose V_O is nearest."""
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the bounds that all VDIs have."""
+        return self.collection.bounds
+
+    def stamp(self) -> int:
+        """Return which VDI is nearest."""
         return self._weights[0][0]
 
-    @property
-    def vdi(self) -> VDI:
-        """The nearest, decoded now if it is not ready.
+    def shared(self) -> Input:
+        """Return an input that looks at the same set by itself."""
+        return SetInput(self.collection)
 
-        Raises
-        ------
-        VDIError
-            If it cannot be decoded.
-        """
-        return self._at(self.nearest)
+    def rest(self) -> None:
+        """Leave no thread; the next frame may begin anew."""
+        for worker in (self._decoder, self._grower):
+            worker.clear()
+            worker.join()
+        with self._lock:
+            self._ready.clear()
+            self._bytes.clear()
+
+    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
+        """Choose what a view shows, and decode what is near it; grow where the picture lacks."""
+        self._view, self._device = camera, device
+        self._weights = self.collection.weights(camera)
+        if not self._decoder.running and self._wanted() is not None:
+            self._decoder.put(Decoding(lambda on, _report: self._decode(on), device))
+        if growth == "later" and self._grower.running:
+            self._grower.clear()
+            self._grown_for = None
+        elif growth == "behind":
+            self._grow_behind()
+        elif growth == "now":
+            self._grow_now()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a VDI is being made, or was made and :meth:`advance` has not taken it."""
+        return self._grower.job is not None
 
     def parts(self) -> list[tuple[VDI, float]]:
         """Return what a picture is blended of, with weights; the nearest first."""
@@ -89,49 +111,38 @@ class SetShower:
         with self._lock:
             known = self._ready.get(i)
         if known is None:
-            known = self.vdi_set[i]
+            known = self.collection[i]
             self._keep(i, known)
         return known
 
-    @property
-    def growing(self) -> bool:
-        """Whether a VDI is being made, or was made and :meth:`advance` has not taken it."""
-        return self._grower.job is not None
-
-    def grow(self) -> None:
+    def _grow_behind(self) -> None:
         """Generate a VDI of the view behind the frames, if its picture misses the target."""
         view, before = self._view, self._grown_for
-        if self.growing or not self.vdi_set.can_grow:
+        if self.busy or not self.collection.can_grow:
             return
-        if before is not None and self.vdi_set.apart(view, before) < _MOVED:
+        if before is not None and self.collection.apart(view, before) < _MOVED:
             return
         self._grown_for = view
 
         def make(runtime: Runtime, _report: Any) -> list[VDI]:
-            vdi = self.vdi_set.lacking(view)
+            vdi = self.collection.lacking(view)
             if vdi is not None:
                 prepared_vdi(runtime, vdi)
             return [] if vdi is None else [vdi]
 
-        self._grower.put(Job(make, self.device))
+        self._grower.put(Job(make, self._device))
 
-    def grow_now(self) -> None:
+    def _grow_now(self) -> None:
         """Add a VDI of the view to the set, made first, if its picture misses the target."""
         view = self._view
-        if view == self._grown_for or not self.vdi_set.can_grow:
+        if view == self._grown_for or not self.collection.can_grow:
             return
         self._grown_for = view
-        vdi = self.vdi_set.lacking(view)
+        vdi = self.collection.lacking(view)
         if vdi is not None:
-            self.vdi_set.add(vdi)
-            self._keep(len(self.vdi_set) - 1, vdi)
-            self._weights = self.vdi_set.weights(view)
-
-    def stop_growing(self) -> None:
-        """Cancel what is being made: the view turns."""
-        if self._grower.running:
-            self._grower.clear()
-            self._grown_for = None
+            self.collection.add(vdi)
+            self._keep(len(self.collection) - 1, vdi)
+            self._weights = self.collection.weights(view)
 
     def advance(self) -> bool:
         """Add what was made to the set; whether there is another VDI to be drawn.
@@ -143,22 +154,24 @@ class SetShower:
         """
         made = self._grower.take()
         for vdi in made or ():
-            self.vdi_set.add(vdi)
-            self._keep(len(self.vdi_set) - 1, vdi)
+            self.collection.add(vdi)
+            self._keep(len(self.collection) - 1, vdi)
         return bool(made)
 
-    def close(self) -> None:
-        """Leave no thread; the next frame may begin anew."""
-        for worker in (self._decoder, self._grower):
-            worker.clear()
-            worker.join()
-        with self._lock:
-            self._ready.clear()
-            self._bytes.clear()
+    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI:
+        """Add a VDI of a view to the set."""
+        if camera is None:
+            raise InvalidArgumentError(
+                "nothing shows this actor, so there is no view: pass camera, or add the actor to "
+                "a renderer first"
+            )
+        vdi = self.collection.generate(camera)
+        self.collection.add(vdi)
+        return vdi
 
     def _order(self) -> list[int]:
         """Return all VDIs, the nearest to the view first."""
-        return [int(i) for i in self.vdi_set.distances(self._view).argsort(kind="stable")]
+        return [int(i) for i in self.collection.distances(self._view).argsort(kind="stable")]
 
     def _wanted(self) -> int | None:
         """Return the next VDI to be decoded; None where enough are, or there is no memory."""
@@ -175,7 +188,7 @@ class SetShower:
     def _decode(self, runtime: Runtime) -> bool:
         while (i := self._wanted()) is not None and self._decoder.running:
             try:
-                vdi = self.vdi_set[i]
+                vdi = self.collection[i]
                 prepared_vdi(runtime, vdi)
             except Cancelled:
                 raise

@@ -19,18 +19,18 @@ from pyvista_vdi.cli.inputs import (
     refuse,
     say_written,
 )
-from pyvista_vdi.cli.series import OF_READ_IMAGES, OF_WRITTEN_IMAGES, write_each
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
+from pyvista_vdi.extensions.series.cli import OF_READ_IMAGES, OF_WRITTEN_IMAGES, write_each
 from pyvista_vdi.extensions.sets import cinema, files
 from pyvista_vdi.extensions.sets.generate import generate_set
-from pyvista_vdi.io.whole_file import check_writable, with_suffix
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
 #: Options that are arguments of ``generate_set`` of the same name, given only if the user did.
 _GOAL = ("target_ssim", "max_bytes", "max_views", "lists", "max_supersegments")
 
 
-def set(options: argparse.Namespace) -> int:  # noqa: A001 - the verb's name
+def generate(options: argparse.Namespace) -> int:
     """Generate a set of VDIs and write it."""
     target = check_writable(with_suffix(Path(options.output), (files.SUFFIX,), "a set"))
     looks = classification(options)
@@ -63,8 +63,8 @@ def set(options: argparse.Namespace) -> int:  # noqa: A001 - the verb's name
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file of a set says about itself."""
-    about, made = files.read_info(options.file)
-    vdi_set = files.read(options.file)
+    about, vdi_set = files.read_info(options.file), files.read(options.file)
+    made = vdi_set.about
     if options.json:
         state = {**vars(about), "path": str(about.path), "camera": vdi_set.camera.to_dict()}
         del state["times"], state["keys"]

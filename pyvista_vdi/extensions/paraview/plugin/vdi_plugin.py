@@ -30,12 +30,13 @@ try:
 except ImportError as error:
     raise ImportError(
         f"ParaView's Python cannot import pyvista_vdi ({error}): start ParaView with PYTHONPATH="
-        f"{Path(__file__).resolve().parents[3]}"
+        f"{Path(__file__).resolve().parents[4]}"
     ) from error
 
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.extensions.large.on_mpi import together
-from pyvista_vdi.extensions.series.reader import is_series_file
+from pyvista_vdi.extensions.large.vtk_ranks import RanksVDISource, communicator, is_first_rank
+from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce_times, wanted_time, watch
@@ -44,7 +45,6 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     scalars_of,
     vdi_from_image,
 )
-from pyvista_vdi.vtk_pipeline.filters.ranks import RanksVDISource, communicator, is_first_rank
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
 #: What ParaView's plugin manager shows.
@@ -681,7 +681,7 @@ class VDIWriter(vtk_pipeline.VDIWriter):
         """Write the file; ParaView's output window says what went wrong."""
         comm = communicator()
         try:
-            if comm is None or not is_series_file(self.GetFileName()):
+            if comm is None or holds(self.GetFileName()) != "series":
                 super().Write()
                 return
             with together(comm, "writing the series"):

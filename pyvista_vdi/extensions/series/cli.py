@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from pyvista_vdi import registry
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     OF_ANY_VOLUME,
@@ -20,19 +27,20 @@ from pyvista_vdi.cli.inputs import (
     refuse,
     say_written,
 )
-from pyvista_vdi.cli.steps import Step, in_order, steps_of_vdis, steps_of_volumes, timed
+from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.errors import InvalidArgumentError, naming
-from pyvista_vdi.extensions.large.entrance import connected
-from pyvista_vdi.extensions.series import reader
+from pyvista_vdi.extensions.series import files as of_series
 from pyvista_vdi.extensions.series.layout import SUFFIX
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.writer import SeriesWriter
-from pyvista_vdi.io import check_write_options, checked_target
-from pyvista_vdi.io.files import HTML_SUFFIX
-from pyvista_vdi.io.whole_file import check_writable, with_suffix
+from pyvista_vdi.io import check_write_options, checked_target, read_info
+from pyvista_vdi.io import read as read_vdi
+from pyvista_vdi.io.files import format_named, holds
+from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
 #: Options of ``convert`` that are for deep images of other programs, and for those that it writes.
 OF_READ_IMAGES = ("camera_json", "thickness", "from_linear")
@@ -53,16 +61,16 @@ def series(options: argparse.Namespace) -> int:
     if kinds[0] == "volume":
         steps = steps_of_volumes(files, options, in_chunks=True)
     else:
-        steps = steps_of_vdis(files)
+        steps = _steps_of_vdis(files)
     if kinds[0] != "series":
-        steps = timed(steps, options.times)
+        steps = _timed(steps, options.times)
     looks = classification(options)
     Classification(looks, "series")  # refused before a volume is read
     target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
     # A writer's file grows step by step: it gets its name when it is whole, and all have been read
     with (
         tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder,
-        connected(options.scheduler) as client,
+        _connected(options.scheduler) as client,
         measuring("writing a series") as bar,
     ):
         part = Path(folder) / target.name
@@ -74,7 +82,7 @@ def series(options: argparse.Namespace) -> int:
                     out.append(step.read(), step.time)
                     bar((i + 1) / len(steps))
         part.replace(target)
-    about = reader.read_info(options.output)
+    about = of_series.read_info(options.output)
     print(f"{printable(options.output)}: {len(about.times)} steps, {mebibytes(about.file_bytes)}")
     return 0
 
@@ -104,6 +112,11 @@ def _write_volumes(
             bar((i + 1) / len(steps))
 
 
+def _connected(address: str | None) -> Any:
+    """Connect to a Dask scheduler, if one is given."""
+    return nullcontext() if address is None else registry.generator("clients")(address)
+
+
 def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
     return {
         **of_the_file(options),
@@ -112,17 +125,57 @@ def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def _steps_of_vdis(files: Sequence[str]) -> list[Step]:
+    """Return the steps of files that hold VDIs or series of them."""
+    steps = []
+    for file in files:
+        if holds(file) == "series":
+            series = read_vdi(file)
+            for i, at in enumerate(series.times):
+                steps.append(Step(f"{file}, step {i}", at, partial(series.__getitem__, i)))
+        else:
+            at = as_number(read_info(file).metadata.get("time"))  # as a simulation's is written
+            steps.append(Step(file, None if math.isnan(at) else at, partial(read_vdi, file)))
+    return steps
+
+
+def _timed(steps: Sequence[Step], given: Sequence[float] | None) -> list[Step]:
+    """Return steps with the times that are given, else with the files' where these ascend.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If others are given than there are steps.
+    """
+    if given is not None:
+        if len(given) != len(steps):
+            raise InvalidArgumentError(
+                f"--times gives a time to each step: there are {len(steps)} steps and "
+                f"{len(given)} times"
+            )
+        return [replace(step, time=at) for step, at in zip(steps, given, strict=True)]
+    known = [step.time for step in steps if step.time is not None]
+    if known and (len(known) < len(steps) or any(b <= a for a, b in pairwise(known))):
+        print(
+            "The times in the files do not ascend, or some have none: steps are numbered "
+            "(--times gives times)",
+            file=sys.stderr,
+        )
+        return [replace(step, time=None) for step in steps]
+    return list(steps)
+
+
 def _kind(file: str) -> str:
     from pyvista_vdi.io import is_vdi_file
 
-    if reader.is_series_file(file):
+    if holds(file) == "series":
         return "series"
     return "VDI" if is_vdi_file(file) else "volume"
 
 
 def info(options: argparse.Namespace) -> int:
     """Print what a file of a series says about itself."""
-    about = reader.read_info(options.file)
+    about = of_series.read_info(options.file)
     if options.json:
         state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
         print(json.dumps(state, indent=1))
@@ -152,9 +205,10 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Write a series anew, as a page, or each of its steps to a file of its own."""
     refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a series")
-    steps: VDISeries = reader.read(options.file)
+    steps: VDISeries = of_series.read(options.file)
     target, arguments = Path(options.output), of_the_file(options)
-    if target.suffix.lower() in (SUFFIX, HTML_SUFFIX):
+    found = format_named(target)
+    if found is not None and (found.suffix == SUFFIX or found.page):
         refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {target.suffix}")
         with measuring("converting") as bar:
             steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)

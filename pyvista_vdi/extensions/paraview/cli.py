@@ -9,11 +9,12 @@ import subprocess
 import sysconfig
 from pathlib import Path
 
+from pyvista_vdi.cli import declare
 from pyvista_vdi.errors import MissingDependencyError, NoDeviceError, UnsupportedError
 
 #: The package, and the plugin in it.
-_PACKAGE = Path(__file__).resolve().parents[1]
-PLUGIN = _PACKAGE / "extensions" / "paraview" / "vdi_plugin.py"
+_PACKAGE = Path(__file__).resolve().parents[2]
+PLUGIN = Path(__file__).resolve().parent / "plugin" / "vdi_plugin.py"
 
 #: What ParaView's Python is asked: status 3 says that the plugin is there, and no device.
 _QUESTIONS = """
@@ -27,6 +28,21 @@ print(describe_devices(), flush=True)
 os._exit(0 if any(device.usable for device in list_devices()) else 3)
 """
 _NO_DEVICE = 3
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the verb ``paraview``."""
+    declare.switch(
+        parser,
+        "--environment",
+        "print, for a shell's eval, the variables that make ParaView find this package and "
+        "load the plugin",
+    )
+    check = (
+        "start ParaView's Python, see that it loads the plugin, and list the devices that it "
+        "finds; PVPYTHON: where that is, if not on the PATH"
+    )
+    declare.option(parser, "--check", check, "PVPYTHON", nargs="?", const="pvpython")
 
 
 def paraview(options: argparse.Namespace) -> int:

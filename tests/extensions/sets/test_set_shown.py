@@ -12,7 +12,8 @@ from watched_windows import MOVING, finish, frame, frames_until, picture_of, thr
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.extensions.sets import generate, shower
+from pyvista_vdi.extensions.sets import generate
+from pyvista_vdi.extensions.sets import shown as of_sets
 
 GROWTH = "set's growth"
 
@@ -110,7 +111,7 @@ def test_a_set_from_a_file_is_decoded_ahead(plotter, made, decoded, tmp_path):
 
 
 def test_with_little_memory_what_is_drawn_stays(plotter, made, decoded, monkeypatch):
-    monkeypatch.setattr(shower, "MEMORY", 1.0)
+    monkeypatch.setattr(of_sets, "MEMORY", 1.0)
     shown(plotter, made, regenerate="never")
     drawn = []
     for _ in range(5):

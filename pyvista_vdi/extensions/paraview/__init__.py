@@ -1,0 +1,18 @@
+"""ParaView: the command that says where its plugin is; the plugin is a file of its own."""
+
+from __future__ import annotations
+
+from pyvista_vdi.registry import Extension, Verb
+
+EXTENSION = Extension(
+    verbs=(
+        Verb(
+            "paraview",
+            "print the path of the plugin for ParaView",
+            "pyvista-vdi paraview --environment",
+            "pyvista_vdi.extensions.paraview.cli:add_options",
+            "pyvista_vdi.extensions.paraview.cli:paraview",
+        ),
+    ),
+    requires=("large", "series"),  # of which ranks and files with times are made
+)

@@ -1,0 +1,79 @@
+"""What a mapper draws of a series: the step that a player shows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pyvista_vdi.extensions.series.player import Player
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.interaction.ticker import period_of
+
+
+class SeriesInput(Input):
+    """The step of a series that a player shows."""
+
+    player: Player
+
+    def __init__(self, series: VDISeries) -> None:
+        super().__init__()
+        self.player, self.collection = Player(series), series
+
+    def vdi(self) -> VDI | None:
+        """Return the step's VDI, decoded now if it is not ready."""
+        self._vdi = self.player.vdi
+        return self._vdi
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the bounds of the step that was shown last, or of the first."""
+        return self.player.series.bounds if self._vdi is None else self._vdi.bounds
+
+    def stamp(self) -> Any:
+        """Return the step."""
+        return self.player.step
+
+    def shared(self) -> Input:
+        """Return an input that shows the same step, and plays by itself."""
+        other = SeriesInput(self.player.series)
+        other.player.step = self.player.step
+        return other
+
+    def rest(self) -> None:
+        """Pause, and leave no thread."""
+        self.player.close()
+
+    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
+        """Decode for a device."""
+        self.player.device = device
+
+    @property
+    def busy(self) -> bool:
+        """Whether it plays."""
+        return self.player.playing
+
+    @property
+    def period(self) -> int:  # type: ignore[override]
+        """Milliseconds between two looks at what goes on."""
+        return period_of(self.player.rate)
+
+    def advance(self) -> bool:
+        """Show the step that is due; whether it is another one."""
+        return self.player.advance()
+
+    def complaint(self, error: Exception) -> str:
+        """Return that a step is left out."""
+        return f"a step is left out: {type(error).__name__}: {error}"
+
+    @property
+    def remedy(self) -> str:  # type: ignore[override]
+        """What remedies a view that the step does not serve."""
+        at_hand = self.player.series.volumes is not None
+        return "actor.regenerate() makes this step anew" if at_hand else super().remedy
+
+    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI:
+        """Generate the step that is shown for another view, and show that as long as it is."""
+        vdi = self.player.series.generate(self.player.step, camera, window_size)
+        self.player.replace(vdi)
+        return vdi

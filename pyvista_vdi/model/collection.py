@@ -1,0 +1,38 @@
+"""Several VDIs of one scene, shown as one: what extensions derive series and sets from."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.vdi import VDI
+
+#: Steps per second at which those of several times are played.
+RATE = 24.0
+
+
+class VDICollection(Sequence[VDI]):
+    """Several VDIs of one scene: of several times, or of several views.
+
+    Attributes
+    ----------
+    times : tuple of float or None
+        Of the VDIs, ascending, where they are steps in time.
+    """
+
+    times: tuple[float, ...] | None = None
+
+    @property
+    @abstractmethod
+    def camera(self) -> Camera:
+        """The view to begin with."""
+
+    @abstractmethod
+    def nearest(self, at: Any) -> int:
+        """Return the index of the VDI that is nearest to a time, or to a view."""
+
+    def parts(self, camera: Camera) -> list[tuple[VDI, float]]:
+        """Return the VDIs of which a view's picture is blended, with weights, the nearest first."""
+        return [(self[self.nearest(camera)], 1.0)]

@@ -1,0 +1,110 @@
+"""The verb ``paraview``: where the plugin is, and what ParaView's Python must see."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pyvista_vdi import cli
+from pyvista_vdi.extensions.paraview import cli as verb
+
+
+def run(capsys, *arguments):
+    """Run the command line in this process; return status, output and the error's lines."""
+    status = cli.main([str(a) for a in arguments])
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def said(capsys, *arguments):
+    """Run what must succeed; return its output, and what it has said beside it."""
+    status, out, err = run(capsys, *arguments)
+    assert status == 0, err
+    return out + err
+
+
+def complaint(capsys, *arguments, status=1):
+    """Run what must fail; return the message after checking that it is one line."""
+    found, out, err = run(capsys, *arguments)
+    assert found == status
+    assert out == ""
+    assert err.count("\n") == 1, err
+    prefix = "pyvista-vdi: error: "
+    assert err.startswith(prefix)
+    return err[len(prefix) :].strip()
+
+
+@pytest.fixture
+def plain_installation(tmp_path, monkeypatch):
+    """An environment that holds the package and no VTK, in a folder that a shell must quote."""
+    package = tmp_path / "a folder" / "pyvista_vdi"
+    for room in ("opencl", "extensions/paraview"):
+        (package / room).mkdir(parents=True)
+    (package / "opencl" / "__init__.py").touch()
+    copied = shutil.copy(verb.__file__, package / "extensions" / "paraview")
+    specification = importlib.util.spec_from_file_location(verb.__name__, copied)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    monkeypatch.setitem(sys.modules, verb.__name__, module)
+    monkeypatch.setattr(module.sysconfig, "get_path", lambda name: str(package.parent))
+    return package
+
+
+def test_paraview_prints_the_plugins_path(capsys):
+    out = said(capsys, "paraview")
+    assert Path(out.strip()).is_file()
+
+
+def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
+    out = said(capsys, "paraview", "--environment")
+    shown = subprocess.run(
+        ["sh", "-c", f'{out}echo "$PYTHONPATH"; echo "$PV_PLUGIN_PATH"'],
+        env={"PYTHONPATH": "/before"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    site = plain_installation.parent
+    assert shown.stdout.splitlines() == [
+        f"{site}:/before",
+        f"{site}/pyvista_vdi/extensions/paraview/plugin",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("does", "message"),
+    [
+        ('echo "$PYTHONPATH:$PV_PLUGIN_PATH"', None),
+        ("exit 3", "loads the plugin, and finds no OpenCL device"),
+        ("exit 1", "does not load the plugin (status 1)"),
+    ],
+)
+def test_paraview_is_asked_whether_it_finds_a_device(
+    plain_installation, tmp_path, capfd, monkeypatch, does, message
+):
+    monkeypatch.setenv("PYTHONPATH", "/before")
+    monkeypatch.delenv("PV_PLUGIN_PATH", raising=False)
+    pvpython = tmp_path / "pvpython"
+    pvpython.write_text(f"#!/bin/sh\n{does}\n")
+    pvpython.chmod(0o755)
+    if message is None:
+        site = plain_installation.parent
+        expected = f"{site}:/before:{site}/pyvista_vdi/extensions/paraview/plugin\n"
+        assert run(capfd, "paraview", "--check", pvpython) == (0, expected, "")
+    else:
+        assert message in complaint(capfd, "paraview", "--check", pvpython)
+
+
+def test_paraview_is_not_shown_what_it_cannot_use(plain_installation, capsys):
+    assert "does not start" in complaint(capsys, "paraview", "--check", "/no/pvpython")
+    (plain_installation / "opencl" / "__init__.py").unlink()
+    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")
+    (plain_installation / "opencl" / "__init__.py").touch()
+    (plain_installation.parent / "vtkmodules").mkdir()
+    message = complaint(capsys, "paraview", "--environment")
+    assert "holds a VTK of its own" in message

@@ -1,0 +1,65 @@
+"""Each extension can be deleted: the core's tests pass without it, and those that need it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+import pyvista_vdi
+from pyvista_vdi import registry
+
+TESTS = Path(__file__).parents[1]
+FOLDERS = ("api", "cli", "io", "model", "generation", "raycasting", "plotting", "vtk_pipeline")
+
+
+def gone_with(name):
+    """Return an extension, and those that are left out without it."""
+    return [name, *(n for n, each in registry.extensions().items() if name in each.requires)]
+
+
+@pytest.fixture
+def without(tmp_path):
+    """What makes a copy of package and tests without an extension."""
+
+    def copy(name):
+        ignored = shutil.ignore_patterns("__pycache__", "opencl")
+        package = Path(pyvista_vdi.__file__).parent
+        shutil.copytree(package, tmp_path / "pyvista_vdi", ignore=ignored)
+        kernels = Path(str(resources.files("pyvista_vdi.opencl")))
+        shutil.copytree(kernels, tmp_path / "pyvista_vdi" / "opencl")
+        shutil.copytree(TESTS, tmp_path / "tests", ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copy(TESTS.parent / "pyproject.toml", tmp_path)
+        shutil.rmtree(tmp_path / "pyvista_vdi" / "extensions" / name)
+        for each in gone_with(name):
+            shutil.rmtree(tmp_path / "tests" / "extensions" / each)
+        return tmp_path
+
+    return copy
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(registry.extensions()))
+def test_the_cores_tests_pass_without(name, without):
+    place = without(name)
+    folders = [f"tests/{folder}" for folder in FOLDERS]
+    command = [sys.executable, "-m", "pytest", "-q", "-n0", "-m", "fast", "-p", "no:cacheprovider"]
+    done = subprocess.run(
+        [*command, *os.environ.get("PYVISTA_VDI_TEST_FOLDERS", " ".join(folders)).split()],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(place)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-2000:]
+
+
+def test_an_extension_that_needs_another_goes_with_it():
+    assert gone_with("series") == ["series", "insitu", "paraview", "sets", "web"]
+    assert gone_with("deep_exr") == ["deep_exr"]
