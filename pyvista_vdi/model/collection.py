@@ -16,6 +16,9 @@ RATE = 24.0
 class VDICollection(Sequence[VDI]):
     """Several VDIs of one scene: of several times, or of several views.
 
+    One of several views has ``parts(camera)``, which returns the VDIs that a view's picture is
+    blended of, with weights, the nearest first.
+
     Attributes
     ----------
     times : tuple of float or None
@@ -32,7 +35,3 @@ class VDICollection(Sequence[VDI]):
     @abstractmethod
     def nearest(self, at: Any) -> int:
         """Return the index of the VDI that is nearest to a time, or to a view."""
-
-    def parts(self, camera: Camera) -> list[tuple[VDI, float]]:
-        """Return the VDIs of which a view's picture is blended, with weights, the nearest first."""
-        return [(self[self.nearest(camera)], 1.0)]

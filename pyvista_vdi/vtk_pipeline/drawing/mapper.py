@@ -149,7 +149,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
 
     def GetSeries(self) -> VDICollection | None:
         """Return the series of which a step is drawn; ``None`` where there is none."""
-        shown = self._collection
+        shown = self._collection()
         return None if shown is None or shown.times is None else shown
 
     def SetVDISet(self, vdi_set: VDICollection) -> None:
@@ -172,10 +172,9 @@ class VDIMapperMethods(ArrayChoiceMethods):
 
     def GetVDISet(self) -> VDICollection | None:
         """Return the set that is drawn; ``None`` where there is none."""
-        shown = self._collection
+        shown = self._collection()
         return None if shown is None or shown.times is not None else shown
 
-    @property
     def _collection(self) -> VDICollection | None:
         return None if self.painter.input is None else self.painter.input.collection
 
