@@ -66,7 +66,8 @@ def public() -> Iterator[str]:
     points = {(each.group, each.name) for each in distribution("pyvista-vdi").entry_points}
     yield from sorted(map(": ".join, points))
     for name in ("add_vdi", "add_vdi_clip_plane", "vdi"):
-        yield f"Plotter.{name}{inspect.signature(getattr(pv.Plotter, name))}"
+        found = getattr(pv.Plotter, name)
+        yield f"Plotter.{name}{inspect.signature(vars(found).get('__call__', found))}"
     yield from signatures("ImageData.vdi", pv.ImageData.vdi)
 
 

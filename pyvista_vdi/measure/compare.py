@@ -223,11 +223,11 @@ def measure(
     InvalidArgumentError
         If the transfer function leaves nothing to see.
     """
-    looks = Classification(settings.classification, "compare")
+    looks = Classification.composited(settings.classification, "compare")
     steps, begun = Steps(progress, 1 + 2 * len(settings.angles)), now()
     with Bench(
         volume,
-        looks.transfer_function(volume),
+        looks.transfer_function_of(volume),
         settings.window_size,
         device=settings.device,
         vtk=settings.vtk,

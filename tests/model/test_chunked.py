@@ -6,10 +6,10 @@ import pickle
 
 import numpy as np
 import pytest
+from drawing import generate_chunked
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, UnsupportedError, Volume
-from pyvista_vdi.extensions.large.generate import generate_chunked
 from pyvista_vdi.model.chunked import ChunkedArray
 
 VALUES = np.random.default_rng(4).integers(0, 200, (30, 21, 26), np.uint8)

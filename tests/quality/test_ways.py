@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.quality.ways import Ways, checked_draw
+from pyvista_vdi.model.drawing_options import checked_draw
+from pyvista_vdi.quality.ways import Ways
 
 pytestmark = pytest.mark.fast
 

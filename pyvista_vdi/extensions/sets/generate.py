@@ -7,7 +7,7 @@ import io
 import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from pyvista_vdi.model.metrics import SSIM_WINDOW, compare_images
 from pyvista_vdi.model.options import (
     GENERATION_NAMES,
     GenerationOptions,
+    GenerationRequest,
     check_max_supersegments,
 )
 from pyvista_vdi.model.packing import Packed8
@@ -227,13 +228,13 @@ def generate_set(
             f"a window of {size[0]} x {size[1]} pixels has no SSIM to place views by: it takes "
             f"{SSIM_WINDOW} along each edge"
         )
-    looks = Classification(
+    looks = Classification.composited(
         {n: v for n, v in options.items() if n not in _OPTIONS}, "generate_set", _OPTIONS
     )
     read = as_volume(volume, looks.scalars, looks.preference)
     maker = ViewMaker(
         read,
-        looks.transfer_function(read),
+        looks.transfer_function_of(read),
         size,
         GenerationOptions(
             **{
@@ -306,18 +307,11 @@ class ViewMaker:
         corners = bounds_corners(self.volume.bounds)
         covering = covering_view(view, (width, height), corners)
         camera, size = covering or (view, (width, height))
-        return _lean(
-            generate_vdi(
-                self.volume,
-                camera,
-                size,
-                self._table,
-                self._options,
-                max_supersegments=max_supersegments,
-                device=self._device,
-                metadata=self._metadata,
-            )
+        options = replace(self._options, max_supersegments=max_supersegments)
+        request = GenerationRequest(
+            self.volume, self._table, camera, size, options, self._device, metadata=self._metadata
         )
+        return _lean(generate_vdi(request))
 
     def of(self, settings: SetSettings) -> Callable[[Camera], VDI]:
         """Return what makes the VDI of a view by these settings."""

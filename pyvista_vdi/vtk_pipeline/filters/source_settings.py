@@ -14,8 +14,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial
+from pyvista_vdi.model.options import GenerationOptions, QualityTarget
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     DEVICE,
     Algorithm,
@@ -49,7 +48,7 @@ _PLAIN = (
     "_scalars",
     "_preference",
     "_options",
-    "_dial",
+    "_target",
     "_device",
     "_lights",
     "_progress",
@@ -95,7 +94,7 @@ class SourceSettings(Algorithm):
         self._scalars: str | None = None
         self._preference = "point"
         self._options = GenerationOptions()
-        self._dial: Dial | None = None
+        self._target: QualityTarget | None = None
         self._device: Any = None
         self._lights: Lights | None = None
         self._lit_by = vtkWeakReference()
@@ -342,8 +341,8 @@ class SourceSettings(Algorithm):
         *,
         target_ssim: float | None = None,
         target_fps: float | None = None,
-        max_bytes: int | None = None,
-        target_angle: float = TARGET_ANGLE,
+        max_bytes: float | None = None,
+        target_angle: float = 30.0,
     ) -> None:
         """Have settings chosen by what the VDI is to reach; without arguments, no longer.
 
@@ -361,12 +360,17 @@ class SourceSettings(Algorithm):
         InvalidArgumentError
             If one is out of range, or they contradict each other.
         """
-        dial = Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle)
-        self._change("_dial", dial)
+        self.SetTarget(
+            QualityTarget.checked(quality, target_ssim, target_fps, max_bytes, target_angle)
+        )
 
-    def GetDial(self) -> Dial | None:
+    def SetTarget(self, target: QualityTarget) -> None:
+        """Have settings chosen by what the VDI is to reach, as by :meth:`SetDial`."""
+        self._change("_target", target or None)
+
+    def GetDial(self) -> QualityTarget | None:
         """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
-        return self._dial
+        return self._target
 
     SetDevice, GetDevice = accessors("Device", "_device", "device", *DEVICE)
 
