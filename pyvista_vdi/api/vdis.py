@@ -189,7 +189,8 @@ def generate(
         *(scalars, preference, blending, clim, n_colors, opacity, cmap, flip_scalars),
         *(opacity_unit_distance, log_scale, shade, ambient, diffuse, specular, specular_power),
         *(interpolation, volume_property, transfer_function),
-    ).require_composite()
+    )
+    look.require_composite()
     target = QualityTarget.checked(quality, target_ssim, target_fps, max_bytes, target_angle)
     options = GenerationOptions.checked(
         *(sample_distance, lights, ambient_occlusion, memory_limit),
@@ -288,7 +289,8 @@ def estimate(
         *(scalars, preference, blending, clim, n_colors, opacity, cmap, flip_scalars),
         *(opacity_unit_distance, log_scale, shade, ambient, diffuse, specular, specular_power),
         *(interpolation, volume_property, transfer_function),
-    ).require_composite()
+    )
+    look.require_composite()
     read = as_volume(volume, scalars, preference)
     from pyvista_vdi.generation.estimate import estimate as estimate_bytes
 

@@ -18,13 +18,13 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
     UnsupportedError,
 )
-from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.options import (
     GenerationOptions,
     Options,
     QualityTarget,
     declared,
     option,
+    record,
 )
 from pyvista_vdi.model.providers import provider
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -50,8 +50,17 @@ def range_to_classify(scalars: ScalarsLike | None, clim: RangeLike | None) -> Ra
     return float(np.nanmin(scalars)), float(np.nanmax(scalars))
 
 
+class Described(Options):
+    """Options of which metadata tell those that are given."""
+
+    def describe(self) -> dict[str, Any]:
+        """Return what differs from the defaults, in values that JSON can hold."""
+        return {name: _plain(value) for name, value in self.given.items()}
+
+
+@record
 @dataclass(frozen=True, eq=False)
-class ArrayChoice(Options):
+class ArrayChoice(Described):
     """``add_volume``'s arguments that say which scalars are seen, and how along a ray."""
 
     scalars: ScalarsLike | None = option(None, "name of an array, or the values")
@@ -64,9 +73,19 @@ class ArrayChoice(Options):
         "composite", "what becomes of the scalars along a ray", choices=BLENDINGS
     )
 
+    def require_composite(self) -> None:
+        """Refuse blend modes that a VDI does not have."""
+        if self.blending != BLENDINGS[0]:
+            raise UnsupportedError(
+                f"blending={self.blending!r} is not supported: a VDI stores what is composited "
+                "along a ray; pass blending='composite', or draw the volume itself by "
+                "Plotter.add_volume or pyvista_vdi.render_volume"
+            )
 
+
+@record
 @dataclass(frozen=True, eq=False)
-class Look(Options):
+class Look(Described):
     """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
 
     ``interpolation``, which ``add_volume`` leaves at VTK's default, is one of them. What is not
@@ -81,15 +100,15 @@ class Look(Options):
     cmap: ColorMapLike | None = option(
         None, "colour map; the theme's by default", aliases=("colormap",)
     )
-    flip_scalars: bool = option(False, "reverse the colour map", as_flag)
+    flip_scalars: bool = option(False, "reverse the colour map")
     opacity_unit_distance: float | None = option(
         None,
         "length over which opacities are reached, model units; the volume's diagonal over its mean "
         "number of cells by default",
         aliases=("unit_distance",),
     )
-    log_scale: bool = option(False, "map values to colours by their logarithm", as_flag)
-    shade: bool = option(False, "light the volume", as_flag)
+    log_scale: bool = option(False, "map values to colours by their logarithm")
+    shade: bool = option(False, "light the volume")
     ambient: float | None = option(None, "ambient light that is reflected, where shaded")
     diffuse: float | None = option(0.7, "diffuse light that is reflected, where shaded")
     specular: float | None = option(0.2, "specular light that is reflected, where shaded")
@@ -102,6 +121,7 @@ class Look(Options):
     )
 
 
+@record
 @dataclass(frozen=True, eq=False)
 class Classification(Look, ArrayChoice):
     """The classification arguments of one call, checked.
@@ -126,7 +146,7 @@ class Classification(Look, ArrayChoice):
             raise InvalidArgumentError(
                 "volume_property and transfer_function were both given: pass one of them"
             )
-        replaced = sorted({*self.given} & {*declared(Look)}) if in_place else ()
+        replaced = sorted({*self.given} & {*Look.declared}) if in_place else ()
         if replaced:
             raise InvalidArgumentError(
                 f"{in_place[0]} stands in place of {', '.join(replaced)}: leave out either "
@@ -150,17 +170,9 @@ class Classification(Look, ArrayChoice):
             If a value cannot be used.
         """
         refuse_unknown(given, function, (*declared(Classification), *others))
-        return cls(**given).require_composite()
-
-    def require_composite(self) -> Classification:
-        """Refuse blend modes that a VDI does not have."""
-        if self.blending != BLENDINGS[0]:
-            raise UnsupportedError(
-                f"blending={self.blending!r} is not supported: a VDI stores what is composited "
-                "along a ray; pass blending='composite', or draw the volume itself by "
-                "Plotter.add_volume or pyvista_vdi.render_volume"
-            )
-        return self
+        made = cls(**given)
+        made.require_composite()
+        return made
 
     @property
     def in_place(self) -> bool:
@@ -200,10 +212,6 @@ class Classification(Look, ArrayChoice):
         return from_arguments(  # type: ignore[no-any-return]
             volume.array, rgba=volume.rgba, **arguments
         )
-
-    def describe(self) -> dict[str, Any]:
-        """Return what differs from the defaults, in values that JSON can hold."""
-        return {name: _plain(value) for name, value in self.given.items()}
 
 
 def _checked_transfer_function(table: object) -> TransferFunction:

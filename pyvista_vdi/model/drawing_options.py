@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.options import Options, option
+from pyvista_vdi.model.options import Options, option, record
 
 #: When a view gets a VDI of its own; a function gets the actor's status.
 Policy: TypeAlias = Literal["auto", "never"] | Callable[[Any], object]
@@ -52,6 +52,7 @@ def checked_draw(draw: Any) -> Literal["auto", "vdi", "volume"]:
     raise InvalidArgumentError(f"draw must be 'auto', 'vdi' or 'volume'; got {draw!r}")
 
 
+@record
 @dataclass(frozen=True)
 class DrawingOptions(Options):
     """How frames are drawn, with the names and defaults of :meth:`AddVDI.__call__`."""
@@ -59,19 +60,17 @@ class DrawingOptions(Options):
     target_fps: float | None = option(
         30.0,
         "frames per second to be kept while the view moves",
-        lambda value, name: None if value is None else checked_rate(name, value),
+        lambda rate: None if rate is None else checked_rate("target_fps", rate),
     )
     adjust_multi_samples: bool = option(
         True, "go without multisampling while the view moves and frames would be late"
     )
-    regenerate: Policy = option(
-        "auto", "when a view gets a VDI of its own", lambda value, _: checked_policy(value)
-    )
+    regenerate: Policy = option("auto", "when a view gets a VDI of its own", checked_policy)
     regenerate_below: float | None = option(
         None,
         "estimated SSIM, 0 to 1, below which a VDI does not do for a view",
-        lambda value, _: None if value is None else checked_bound(value),
+        lambda ssim: None if ssim is None else checked_bound(ssim),
     )
     draw: Literal["auto", "vdi", "volume"] = option(
-        "auto", "what is raycast where the volume is at hand", lambda value, _: checked_draw(value)
+        "auto", "what is raycast where the volume is at hand", checked_draw
     )

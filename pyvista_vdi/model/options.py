@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import (
+    as_flag,
     as_float,
     as_whole,
     check_callback,
@@ -62,7 +63,8 @@ class Option:
     what : str
         What it means, in a sentence that begins small and has no full stop.
     check : callable, optional
-        Returns a value as it is kept, or raises InvalidArgumentError; it gets the name as well.
+        Returns a value as it is kept, or raises InvalidArgumentError. Without one a value is one
+        of the choices, a truth value where the default is one, and else whatever is given.
     choices : tuple of str
         The texts that are taken, where these are all.
     aliases : tuple of str
@@ -72,45 +74,47 @@ class Option:
     name: str
     default: Any
     what: str
-    check: Callable[[Any, str], Any] | None = None
+    check: Callable[[Any], Any] | None = None
     choices: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
+
+    def kept(self, value: Any) -> Any:
+        """Return a value as it is kept; raises InvalidArgumentError if it cannot be used."""
+        if self.check is not None:
+            return self.check(value)
+        if self.choices and not value is self.default is None:
+            return one_of(value, self.name, self.choices)
+        return as_flag(value, self.name) if isinstance(self.default, bool) else value
 
 
 def option(
     default: Any,
     what: str,
-    check: Callable[[Any, str], Any] | None = None,
+    check: Callable[[Any], Any] | None = None,
     *,
     choices: Sequence[str] = (),
     aliases: Sequence[str] = (),
 ) -> Any:
     """Declare an option as a field of a record."""
-    if choices and check is None:
-        check = lambda value, name: one_of(value, name, choices)  # noqa: E731
     told = Option("", default, what, check, tuple(choices), tuple(aliases))
     return field(default=default, metadata={"option": told})
 
 
 def declared(*records: type[Options]) -> dict[str, Option]:
     """Return the options that some records declare, by their names."""
-    return {
-        each.name: replace(each.metadata["option"], name=each.name)
-        for record in records
-        for each in fields(record)
-        if "option" in each.metadata
-    }
+    return {name: told for record in records for name, told in record.declared.items()}
 
 
 @dataclass(frozen=True)
 class Options:
     """A record of options, each checked and brought to its type when the record is made."""
 
+    #: The options, by their names.
+    declared: ClassVar[Mapping[str, Option]] = {}
+
     def __post_init__(self) -> None:
-        for each in fields(self):
-            check = each.metadata["option"].check if each.metadata else None
-            if check is not None:
-                object.__setattr__(self, each.name, check(getattr(self, each.name), each.name))
+        for name, told in self.declared.items():
+            object.__setattr__(self, name, told.kept(getattr(self, name)))
 
     @classmethod
     def checked(cls: type[_Record], *given: Any, **named: Any) -> _Record:
@@ -134,57 +138,62 @@ class Options:
 
     @property
     def given(self) -> dict[str, Any]:
-        """The options that differ from their defaults."""
+        """The options that differ from their defaults; arrays always do."""
         found = {}
-        for name, each in declared(type(self)).items():
-            value, default = getattr(self, name), each.default
-            if each.check is not None:
-                default = each.check(default, name)
-            # Arrays are never the default, and have no truth value
-            same = value is default or (type(value) is type(default) and value == default)
-            if not same:
+        for name, told in self.declared.items():
+            value, default = getattr(self, name), told.kept(told.default)
+            if value is not default and not (type(value) is type(default) and value == default):
                 found[name] = value
         return found
 
 
-def check_max_supersegments(value: Any, name: str = "max_supersegments") -> int:
-    """Return the longest list as an int between 1 and :data:`MAX_SUPERSEGMENTS`."""
-    limit = as_whole(value)
+def record(cls: type[_Record]) -> type[_Record]:
+    """Gather the options that a record's fields declare; for classes, above ``@dataclass``."""
+    told = {each.name: each.metadata.get("option") for each in fields(cls)}
+    cls.declared = {name: replace(each, name=name) for name, each in told.items() if each}
+    return cls
+
+
+def check_max_supersegments(max_supersegments: Any) -> int:
+    """Return ``max_supersegments`` as an int between 1 and :data:`MAX_SUPERSEGMENTS`."""
+    limit = as_whole(max_supersegments)
     if not 1 <= limit <= MAX_SUPERSEGMENTS:
         raise InvalidArgumentError(
-            f"{name} must be a whole number from 1 to {MAX_SUPERSEGMENTS}; got {value!r}"
+            f"max_supersegments must be a whole number from 1 to {MAX_SUPERSEGMENTS}; "
+            f"got {max_supersegments!r}"
         )
     return int(limit)
 
 
-def _tolerance(value: Any, name: str) -> float:
-    difference = as_float(value)
+def _tolerance(tolerance: Any) -> float:
+    difference = as_float(tolerance)
     if not 0 <= difference < np.inf:
-        raise InvalidArgumentError(f"{name} must be a number >= 0; got {value!r}")
+        raise InvalidArgumentError(f"tolerance must be a number >= 0; got {tolerance!r}")
     return difference
 
 
-def _view_cone(value: Any, name: str) -> float:
-    angle = as_float(value)
+def _view_cone(view_cone: Any) -> float:
+    angle = as_float(view_cone)
     if not 0 <= angle <= 90:
         raise InvalidArgumentError(
-            f"{name} must be an angle between 0 and 90 degrees; got {value!r}"
+            f"view_cone must be an angle between 0 and 90 degrees; got {view_cone!r}"
         )
     return angle
 
 
-def _between(low: float, high: float, what: str) -> Callable[[Any, str], float | None]:
-    """Return a check of a number between two others, both excluded; ``None`` passes."""
+def _within(name: str, high: float, what: str) -> Callable[[Any], float | None]:
+    """Return a check of a number above 0 and below another; ``None`` passes."""
 
-    def check(value: Any, name: str) -> float | None:
+    def check(value: Any) -> float | None:
         number = as_float(value)
-        if value is not None and (isinstance(value, bool) or not low < number < high):
+        if value is not None and (isinstance(value, bool) or not 0 < number < high):
             raise InvalidArgumentError(f"{name} must be {what}; got {value!r}")
         return None if value is None else number
 
     return check
 
 
+@record
 @dataclass(frozen=True)
 class MediumOptions(Options):
     """How a classified volume is sampled: what generation and volume rendering both need.
@@ -214,17 +223,11 @@ class MediumOptions(Options):
     sample_distance: float | None = option(
         None, "length of a step along a ray, model units", aliases=("step",)
     )
-    lights: Lights = option(
-        None, "what a shaded volume is lit by", lambda value, _: Lights.from_any(value)
-    )
+    lights: Lights = option(None, "what a shaded volume is lit by", Lights.from_any)
     ambient_occlusion: AmbientOcclusion | None = option(
-        None,
-        "darken what is hidden from the light around it",
-        lambda value, _: AmbientOcclusion.from_any(value),
+        None, "darken what is hidden from the light around it", AmbientOcclusion.from_any
     )
-    memory_limit: int | None = option(
-        None, "most memory to take on the device", lambda value, _: memory_limit_bytes(value)
-    )
+    memory_limit: int | None = option(None, "most memory to take on the device", memory_limit_bytes)
 
     def occlusion_bytes(self, volume: Volume) -> int:
         """Return what the grid of the ambient occlusion takes on the device, bytes."""
@@ -233,6 +236,7 @@ class MediumOptions(Options):
         return OcclusionGrid.of(volume, self.ambient_occlusion).nbytes
 
 
+@record
 @dataclass(frozen=True)
 class GenerationOptions(MediumOptions):
     """How a VDI is made.
@@ -292,6 +296,7 @@ class GenerationOptions(MediumOptions):
         return float(1 - np.cos(np.radians(self.view_cone)))
 
 
+@record
 @dataclass(frozen=True)
 class QualityTarget(Options):
     """What is asked of a VDI in place of settings, which are chosen to reach it: docs/dial.md.
@@ -318,24 +323,25 @@ class QualityTarget(Options):
     quality: str | None = option(
         None,
         "choose the settings by how good pictures are to be",
-        lambda value, name: value if value is None else one_of(value, name, tuple(QUALITIES)),
         choices=tuple(QUALITIES),
     )
     target_ssim: float | None = option(
-        None, "the same by a number, 0 to 1", _between(0, 1, "an SSIM between 0 and 1")
+        None, "the same by a number, 0 to 1", _within("target_ssim", 1, "an SSIM between 0 and 1")
     )
     target_fps: float | None = option(
-        None, "least full frames per second", _between(0, math.inf, "frames per second above 0")
+        None,
+        "least full frames per second",
+        _within("target_fps", math.inf, "frames per second above 0"),
     )
     max_bytes: int | None = option(
         None,
         "most bytes of the VDI on the device",
-        _between(0, math.inf, "a number of bytes above 0"),
+        _within("max_bytes", math.inf, "a number of bytes above 0"),
     )
     target_angle: float = option(
         30.0,
         "degrees by which the view is turned from V_O for which the SSIM is predicted",
-        _between(0, 180, "an angle between 0 and 180 degrees"),
+        _within("target_angle", 180, "an angle between 0 and 180 degrees"),
     )
 
     def __post_init__(self) -> None:

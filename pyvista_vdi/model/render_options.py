@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_flag, as_float, as_whole
+from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
-from pyvista_vdi.model.options import Options, option
+from pyvista_vdi.model.options import Options, option, record
 
 #: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
 #: more than that.
@@ -28,7 +28,7 @@ MAX_PREVIEW_SAMPLES = 2**23
 Planes: TypeAlias = tuple[tuple[float, ...], ...]
 
 
-def checked_planes(planes: Any, name: str = "clipping_planes") -> Planes:
+def checked_planes(planes: Any) -> Planes:
     """Return clipping planes as tuples of six floats; none for ``None``.
 
     Raises
@@ -38,7 +38,7 @@ def checked_planes(planes: Any, name: str = "clipping_planes") -> Planes:
     """
     if planes is None:
         return ()
-    wanted = f"{name} must be (k, 6) finite numbers, origin and normal of each plane"
+    wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
     try:
         table = np.asarray(planes, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
@@ -52,14 +52,15 @@ def checked_planes(planes: Any, name: str = "clipping_planes") -> Planes:
     return tuple(map(tuple, table.tolist()))
 
 
-def checked_preview_samples(samples: Any, name: str) -> int | None:
+def checked_preview_samples(samples: Any) -> int | None:
     """Return a number of samples per ray as an int between 1 and :data:`MAX_PREVIEW_SAMPLES`."""
     if samples is None:
         return None
     number = as_whole(samples)
     if not 1 <= number <= MAX_PREVIEW_SAMPLES:
         raise InvalidArgumentError(
-            f"{name} must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; got {samples!r}"
+            f"preview_samples must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; "
+            f"got {samples!r}"
         )
     return int(number)
 
@@ -75,6 +76,7 @@ def checked_transmittance_cutoff(cutoff: Any) -> float:
     return number
 
 
+@record
 @dataclass(frozen=True)
 class RenderOptions(Options):
     """How a VDI, or a volume, is drawn; the public functions' arguments of these names.
@@ -109,24 +111,20 @@ class RenderOptions(Options):
         None, "origin and normal of each plane, world coordinates", checked_planes
     )
     cropping: Any = option(
-        None,
-        "which of 27 regions of the data's own coordinates are drawn",
-        lambda value, _: Cropping.from_any(value),
+        None, "which of 27 regions of the data's own coordinates are drawn", Cropping.from_any
     )
     opacity_multiplier: float = option(
-        1.0,
-        "factor of the extinction, 0 or above",
-        lambda value, _: checked_opacity_multiplier(value),
+        1.0, "factor of the extinction, 0 or above", checked_opacity_multiplier
     )
-    skip_empty: bool = option(True, "pass by what is empty", as_flag)
+    skip_empty: bool = option(True, "pass by what is empty")
     preview_samples: int | None = option(
         None, "look a VDI up at so many points of each ray", checked_preview_samples
     )
     transmittance_cutoff: float = option(
         None,
         "a ray ends where less light than this is left",
-        lambda value, _: checked_transmittance_cutoff(
-            TRANSMITTANCE_CUTOFF if value is None else value
+        lambda cutoff: checked_transmittance_cutoff(
+            TRANSMITTANCE_CUTOFF if cutoff is None else cutoff
         ),
     )
 

@@ -15,14 +15,9 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
-from pyvista_vdi.model.classification import (
-    ArrayChoice,
-    Classification,
-    Look,
-    range_to_classify,
-)
+from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.drawing_options import DrawingOptions
-from pyvista_vdi.model.options import GenerationOptions, Options, QualityTarget, declared, option
+from pyvista_vdi.model.options import GenerationOptions, Options, QualityTarget, option, record
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
@@ -46,21 +41,22 @@ _BELOW_GOAL = 0.02
 _MAPS = ("Reds", "Greens", "Blues", "Greys", "Oranges", "Purples")
 
 
-def _scalar_bar_args(given: Any, name: str) -> Mapping[str, Any]:
+def _scalar_bar_args(given: Any) -> Mapping[str, Any]:
     if not isinstance(given, Mapping | None):
-        raise InvalidArgumentTypeError(f"{name} must be a dictionary; got {given!r}")
+        raise InvalidArgumentTypeError(f"scalar_bar_args must be a dictionary; got {given!r}")
     return given or {}
 
 
-def _culling(given: Any, name: str) -> str | bool:
+def _culling(given: Any) -> str | bool:
     if given and (given.lower() if isinstance(given, str) else given) not in _CULLING:
         raise InvalidArgumentError(
-            f"{name} must be False or one of {_CULLING}; got {given!r} (faces are a mesh's: "
+            f"culling must be False or one of {_CULLING}; got {given!r} (faces are a mesh's: "
             "it changes nothing of a volume)"
         )
     return "backface" if given is True else given
 
 
+@record
 @dataclass(frozen=True, eq=False)
 class Placement(Options):
     """Where an actor is put in a plotter, and what is shown beside it."""
@@ -223,9 +219,9 @@ def _volume_shown(volume: Any, asked: Addition, plotter: Any) -> _Shown:
     scalars, preference = asked.array.scalars, asked.array.preference
     look, place, source = asked.look, asked.place, VDISource()
     image, array_name = as_image(volume, scalars, asked.resolution)
-    given = {name: value for name, value in look.given.items() if name in declared(Look)}
-    classified = Classification(**asked.array.given, **given).require_composite()
-    source.SetMetadata({"classification": classified.describe()})
+    asked.array.require_composite()
+    told = {name: value for name, value in look.describe().items() if name in Look.declared}
+    source.SetMetadata({"classification": {**asked.array.describe(), **told}})
     data = held(image)
     named = None if array_name is None else data.GetPointData().GetArray(array_name)
     if named is not None and preference == "point":

@@ -23,7 +23,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.classification import BLENDINGS, Look
 from pyvista_vdi.model.lighting import Shading
-from pyvista_vdi.model.options import option
+from pyvista_vdi.model.options import option, record
 from pyvista_vdi.model.presets import presets
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -50,11 +50,22 @@ _BLENDING_NAMES = dict(enumerate(BLENDINGS)) | {
 }
 
 
+def _categories(count: Any) -> bool | int:
+    if count and not isinstance(count, int | np.integer):
+        raise InvalidArgumentTypeError(
+            f"categories must be True, False or a whole number; got {count!r}"
+        )
+    return count  # type: ignore[no-any-return]
+
+
+@record
 @dataclass(frozen=True, eq=False)
 class Looks(Look):
     """What a scalar looks like in a plotter, whose ``theme`` has the default colour map."""
 
-    categories: bool | int = option(False, "as many colours as there are different values")
+    categories: bool | int = option(
+        False, "as many colours as there are different values", _categories
+    )
     annotations: dict[float, str] | None = option(None, "texts beside the scalar bar, by value")
     theme: Any = None
 
@@ -82,10 +93,6 @@ class Looks(Look):
         n_colors = self.n_colors
         if self.categories:
             count = self.categories
-            if not isinstance(count, int | np.integer):
-                raise InvalidArgumentTypeError(
-                    f"categories must be True, False or a whole number; got {count!r}"
-                )
             n_colors = len(np.unique(scalars)) if count is True else int(count)
         whole = isinstance(n_colors, int | np.integer)
         if not (whole and 1 <= n_colors <= _MAX_COLORS):
