@@ -79,7 +79,17 @@ _HOMES = {
     **dict.fromkeys(errors.__all__, "errors"),
 }
 
-__all__ = ["__version__", "errors", "examples", *sorted(_HOMES)]
+# Written out, for checkers of types
+# fmt: off
+__all__ = [  # noqa: RUF022
+    "__version__", "errors", "examples", "AmbientOcclusion", "Camera", "Cropping", "Estimate",
+    "Light", "Lights", "Pick", "Plotter", "Report", "SeriesWriter", "Shading", "TransferFunction",
+    "VDI", "VDIActor", "VDIMapper", "VDISeries", "VDISet", "VDISource", "Volume", "compare_images",
+    "describe_devices", "estimate", "generate", "generate_series", "generate_set", "list_devices",
+    "open_volume", "pick", "presets", "read", "render", "render_depth", "render_volume",
+]
+# fmt: on
+__all__ += errors.__all__
 
 
 registration.install()

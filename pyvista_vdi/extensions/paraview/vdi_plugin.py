@@ -37,6 +37,7 @@ from pyvista_vdi.errors import VDIError
 from pyvista_vdi.extensions.large.on_mpi import together
 from pyvista_vdi.extensions.series.reader import is_series_file
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import MAX_SUPERSEGMENTS, GenerationOptions, declared
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce_times, wanted_time, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import (
@@ -122,6 +123,31 @@ _REFLECTION_XML = "".join(
     for name, default in (("Ambient", 0), ("Diffuse", 1), ("Specular", 0), ("SpecularPower", 1))
 )
 
+#: What is declared of the options of ``generate``.
+_DECLARED = declared(GenerationOptions)
+
+
+def _sentence(option: str, more: str = "") -> str:
+    what = _DECLARED[option].what
+    return f"{what[0].upper()}{what[1:]}{more}."
+
+
+def _number(option: str, name: str, bounds: str, more: str = "") -> str:
+    """Return the property of an option that is a number; 0 stands for ``None``."""
+    default = _DECLARED[option].default
+    kind = "Int" if isinstance(default, int) else "Double"
+    panel = "default" if option == "max_supersegments" else "advanced"
+    return f"""
+<{kind}VectorProperty name="{name}" command="Set{_COMMANDS.get(name, name)}" number_of_elements="1"
+                      default_values="{default or 0:g}" panel_visibility="{panel}">
+  <{kind}RangeDomain name="range" {bounds} />
+  <Documentation>{_sentence(option, more)}</Documentation>
+</{kind}VectorProperty>"""
+
+
+#: Setters that take 0 for the default.
+_COMMANDS = {"SampleDistance": "Step"}
+
 _SOURCE_XML = f"""
 <StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5"
                       element_types="0 0 0 0 2" animateable="0">
@@ -165,7 +191,7 @@ _SOURCE_XML = f"""
 <IntVectorProperty name="AmbientOcclusion" command="SetOcclusion" number_of_elements="1"
                    default_values="0">
   <BooleanDomain name="bool" />
-  <Documentation>Darken what is hidden from the light around it.</Documentation>
+  <Documentation>{_sentence("ambient_occlusion")}</Documentation>
 </IntVectorProperty>
 <DoubleVectorProperty name="AmbientOcclusionRadius" command="SetOcclusionRadius"
                       number_of_elements="1" default_values="0" panel_visibility="advanced">
@@ -173,27 +199,10 @@ _SOURCE_XML = f"""
   <Documentation>How far around it that is looked for, in the volume's units. 0: the default
   radius.</Documentation>
 </DoubleVectorProperty>
-<IntVectorProperty name="MaxSupersegments" command="SetMaxSupersegments" number_of_elements="1"
-                   default_values="20">
-  <IntRangeDomain name="range" min="1" max="4096" />
-  <Documentation>Longest list of a pixel.</Documentation>
-</IntVectorProperty>
-<DoubleVectorProperty name="SampleDistance" command="SetStep" number_of_elements="1"
-                      default_values="0" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>Length of a step along a ray, in the volume's units. 0: half the smallest
-  spacing.</Documentation>
-</DoubleVectorProperty>
-<DoubleVectorProperty name="Tolerance" command="SetTolerance" number_of_elements="1"
-                      default_values="0" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>Error that may be traded for shorter lists.</Documentation>
-</DoubleVectorProperty>
-<DoubleVectorProperty name="ViewCone" command="SetViewCone" number_of_elements="1"
-                      default_values="60" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" max="90" />
-  <Documentation>Half angle of the cone of new views that must be served, degrees.</Documentation>
-</DoubleVectorProperty>
+{_number("max_supersegments", "MaxSupersegments", f'min="1" max="{MAX_SUPERSEGMENTS}"')}
+{_number("sample_distance", "SampleDistance", 'min="0"', ". 0: half the smallest spacing")}
+{_number("tolerance", "Tolerance", 'min="0"')}
+{_number("view_cone", "ViewCone", 'min="0" max="90"')}
 <StringVectorProperty name="Coverage" command="SetCoverage" number_of_elements="1"
                       default_values="view">
   <StringListDomain name="list"><String value="view" /><String value="bounds" /></StringListDomain>
