@@ -112,7 +112,7 @@ def _text(node: ast.AST) -> str:
 
 def plugin() -> Iterator[str]:
     """Yield what ParaView's plugin declares: its decorators, and the XML in its strings."""
-    for path in PACKAGE.rglob("vdi_plugin.py"):
+    for path in sorted((PACKAGE / "extensions" / "paraview").rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             for decorator in getattr(node, "decorator_list", ()):
