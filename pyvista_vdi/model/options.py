@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -69,6 +70,8 @@ class Option:
         The texts that are taken, where these are all.
     aliases : tuple of str
         Other names by which users may call it.
+    standard : object
+        The default as it is kept.
     """
 
     name: str
@@ -77,14 +80,17 @@ class Option:
     check: Callable[[Any], Any] | None = None
     choices: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
+    standard: Any = None
 
-    def kept(self, value: Any) -> Any:
-        """Return a value as it is kept; raises InvalidArgumentError if it cannot be used."""
-        if self.check is not None:
-            return self.check(value)
-        if self.choices and not value is self.default is None:
-            return one_of(value, self.name, self.choices)
-        return as_flag(value, self.name) if isinstance(self.default, bool) else value
+    def named(self, name: str) -> Option:
+        """Return it with its name, and with a check that follows from choices and default."""
+        check = self.check
+        if check is None and self.choices:
+            check = partial(one_of, name=name, names=self.choices)
+        elif check is None and isinstance(self.default, bool):
+            check = partial(as_flag, name=name)
+        standard = self.default if check is None else check(self.default)
+        return replace(self, name=name, check=check, standard=standard)
 
 
 def option(
@@ -114,7 +120,10 @@ class Options:
 
     def __post_init__(self) -> None:
         for name, told in self.declared.items():
-            object.__setattr__(self, name, told.kept(getattr(self, name)))
+            value = getattr(self, name)
+            if told.check is not None:  # defaults were checked where they were declared
+                kept = told.standard if value is told.default else told.check(value)
+                object.__setattr__(self, name, kept)
 
     @classmethod
     def checked(cls: type[_Record], *given: Any, **named: Any) -> _Record:
@@ -141,7 +150,7 @@ class Options:
         """The options that differ from their defaults; arrays always do."""
         found = {}
         for name, told in self.declared.items():
-            value, default = getattr(self, name), told.kept(told.default)
+            value, default = getattr(self, name), told.standard
             if value is not default and not (type(value) is type(default) and value == default):
                 found[name] = value
         return found
@@ -150,7 +159,7 @@ class Options:
 def record(cls: type[_Record]) -> type[_Record]:
     """Gather the options that a record's fields declare; for classes, above ``@dataclass``."""
     told = {each.name: each.metadata.get("option") for each in fields(cls)}
-    cls.declared = {name: replace(each, name=name) for name, each in told.items() if each}
+    cls.declared = {name: each.named(name) for name, each in told.items() if each}
     return cls
 
 
@@ -323,6 +332,7 @@ class QualityTarget(Options):
     quality: str | None = option(
         None,
         "choose the settings by how good pictures are to be",
+        lambda name: name if name is None else one_of(name, "quality", tuple(QUALITIES)),
         choices=tuple(QUALITIES),
     )
     target_ssim: float | None = option(

@@ -375,7 +375,7 @@ class SourceSettings(Algorithm):
         max_bytes: float | None = None,
         target_angle: float = 30.0,
     ) -> None:
-        """Have settings chosen by what the VDI is to reach; without arguments, no longer.
+        """Choose settings by what the VDI is to reach; without arguments, no longer.
 
         It chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to
         have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata["dial"]`` says what it
@@ -396,7 +396,7 @@ class SourceSettings(Algorithm):
         )
 
     def SetTarget(self, target: QualityTarget) -> None:
-        """Have settings chosen by what the VDI is to reach, as by :meth:`SetDial`."""
+        """Choose settings by what the VDI is to reach, as by :meth:`SetDial`."""
         self._change("_target", target or None)
 
     def GetDial(self) -> QualityTarget | None:
@@ -427,7 +427,7 @@ class SourceSettings(Algorithm):
             self._given.watch(Algorithm.Modified if self._track else None)
 
     def _observe_property(self) -> None:
-        """Let changes to the property or its functions reach this algorithm's time stamp."""
+        """Modify this algorithm whenever the property or one of its functions is modified."""
         for watched, tag in self._observed:
             watched.get().RemoveObserver(tag)
         self._observed = []
