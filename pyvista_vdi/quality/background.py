@@ -11,7 +11,6 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.options import GenerationRequest, QualityTarget
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.probe import generate_to_target
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.raycast import render_vdi
 
@@ -74,7 +73,12 @@ class BackgroundGeneration:
 
         def make(runtime: Runtime, report: Callable[[float], None]) -> VDI:
             here = request.replace(device=runtime, progress=report)
-            vdi = generate_to_target(here, target) if target else generate_vdi(here)
+            if target:
+                from pyvista_vdi.quality.probe import generate_to_target
+
+                vdi = generate_to_target(here, target)
+            else:
+                vdi = generate_vdi(here)
             trial = FrameRequest(vdi.camera, (TRIAL_SIZE, TRIAL_SIZE), device=runtime)
             render_vdi(vdi, trial)
             return vdi

@@ -25,7 +25,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import warn_missed
-from pyvista_vdi.quality.probe import generate_to_target
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     UPDATE_TIME_STEP,
     announce,
@@ -287,6 +286,8 @@ class VDISource(SourceSettings):
         asked = request.generation.replace(progress=self._advance)
         if request.target is None:
             return generate_vdi(asked)
+        from pyvista_vdi.quality.probe import generate_to_target
+
         return generate_to_target(asked, request.target)
 
     def _make_request(
