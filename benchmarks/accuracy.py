@@ -20,8 +20,8 @@ from pyvista_vdi.measure.harness import Case, accuracy
 from pyvista_vdi.measure.report import number, table
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.metrics import list_edges, list_places
+from pyvista_vdi.model.options import QUALITIES, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
 from pyvista_vdi.quality.probe import turned
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -51,6 +51,9 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
 
 #: Volumes for which one transfer function has to do, because of their size.
 SOFT_ONLY = ("allen_mouse_brain",)
+
+#: Degrees from V_O for which targets are meant.
+_ANGLE = QualityTarget().target_angle
 
 #: Qualities that state an SSIM.
 PRESETS = tuple(name for name, goal in QUALITIES.items() if goal is not None)
@@ -137,7 +140,7 @@ def of_preset(bench: Any, quality: str) -> dict[str, Any]:
         quality=quality,
         device=bench.runtime,
     )
-    view = turned(bench.view, bench.volume.bounds, TARGET_ANGLE)
+    view = turned(bench.view, bench.volume.bounds, _ANGLE)
     near = accuracy(bench.draw(vdi, view), bench.reference(view))
     edges = 0.0
     if vdi.window_size[0] < bench.size[0]:
@@ -193,7 +196,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     yield from table(
         ("view", "true SSIM", "error, mean", "without sign", "worst"), errors(measured)
     )
-    yield from ("", f"Presets at {TARGET_ANGLE:g} degrees, predicted less the truth:", "")
+    yield from ("", f"Presets at {_ANGLE:g} degrees, predicted less the truth:", "")
     rows = []
     for quality in PRESETS:
         found = [row for row in measured if row["case"]["what"] == f"quality {quality}"]

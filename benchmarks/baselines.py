@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         volume = load(options.volume)
         ramp = np.clip((np.linspace(0, 1, 65) - threshold) / (1.01 - threshold), 0, 1)
         looks = {"cmap": "bone", "opacity": ramp.tolist()}
-        table = Classification(looks, "a benchmark").transfer_function(volume)
+        table = Classification.composited(looks, "a benchmark").transfer_function_of(volume)
         return Bench(volume, table, tuple(options.size), device=options.device, vtk=False)
 
     benches = Latest(bench_of)

@@ -24,6 +24,7 @@ from pyvista_vdi.measure.harness import Case, accuracy
 from pyvista_vdi.measure.report import table
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.quality.probe import turned
 
@@ -77,15 +78,10 @@ def in_blocks(bench: Any, n: int) -> dict[str, Any]:
     """Return how near the picture of blocks is to that of one piece, by angle."""
     whole = bench.generate()
     chunks = [-(-p // k) for p, k in zip(bench.volume.array.shape, CUTS[n], strict=True)]
-    vdi = generate_chunked(
-        bench.volume,
-        bench.view,
-        bench.size,
-        bench.table,
-        chunks=chunks,
-        block_bytes=1,
-        device=bench.runtime,
+    request = GenerationRequest(
+        bench.volume, bench.table, bench.view, bench.size, device=bench.runtime
     )
+    vdi = generate_chunked(request, chunks=chunks, block_bytes=1)
     near = {}
     for angle in LEAST_SSIM:
         view = turned(bench.view, bench.volume.bounds, float(angle))
@@ -115,7 +111,7 @@ def on_cluster(options: Any) -> dict[str, Any]:
         volume = stored(options.store or Path(folder) / "large.zarr", name)
         volume.chunks.found_ranges()
         camera = filling_camera(volume.bounds, options.size)
-        function = Classification(LOOKS, "a benchmark").transfer_function(volume)
+        function = Classification.composited(LOOKS, "a benchmark").transfer_function_of(volume)
         given = {"n_workers": 2, "threads_per_worker": 1, "memory_limit": WORKER_BYTES}
         with LocalCluster(dashboard_address=":0", **given) as cluster, Client(cluster) as client:
             workers = list(client.nthreads())
@@ -128,15 +124,8 @@ def on_cluster(options: Any) -> dict[str, Any]:
             for turn in range(options.repeats + 1):
                 for name, some in (("1", workers[:1]), ("2", workers)):
                     start = time.perf_counter()
-                    vdi = generate_on_dask(
-                        volume,
-                        camera,
-                        options.size,
-                        function,
-                        client=client,
-                        workers=some,
-                        block_bytes=2**24,
-                    )
+                    request = GenerationRequest(volume, function, camera, options.size)
+                    vdi = generate_on_dask(request, client=client, workers=some, block_bytes=2**24)
                     if turn:  # the first one compiles
                         seconds[name].append(time.perf_counter() - start)
             after = client.run(peak)

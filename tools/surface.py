@@ -66,7 +66,8 @@ def public() -> Iterator[str]:
     points = {(each.group, each.name) for each in distribution("pyvista-vdi").entry_points}
     yield from sorted(map(": ".join, points))
     for name in ("add_vdi", "add_vdi_clip_plane", "vdi"):
-        yield f"Plotter.{name}{inspect.signature(getattr(pv.Plotter, name))}"
+        found = getattr(pv.Plotter, name)
+        yield f"Plotter.{name}{inspect.signature(vars(found).get('__call__', found))}"
     yield from signatures("ImageData.vdi", pv.ImageData.vdi)
 
 
@@ -111,7 +112,7 @@ def _text(node: ast.AST) -> str:
 
 def plugin() -> Iterator[str]:
     """Yield what ParaView's plugin declares: its decorators, and the XML in its strings."""
-    for path in PACKAGE.rglob("vdi_plugin.py"):
+    for path in sorted((PACKAGE / "extensions" / "paraview").rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             for decorator in getattr(node, "decorator_list", ()):

@@ -37,7 +37,7 @@ def compare(options: argparse.Namespace) -> int:
     if options.tf is None and options.cmap is None and options.opacity is None:
         options.tf = _DEFAULT
     arguments = classification(options)
-    Classification(arguments, "compare")  # refused before anything is read or written
+    Classification.composited(arguments, "compare")  # refused before anything is read or written
     looks = options.tf or "custom"
     if options.tf and any(arguments[n] != v for n, v in TRANSFER_FUNCTIONS[options.tf].items()):
         looks = "custom"

@@ -10,15 +10,26 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.drawing_options import DrawingOptions
+from pyvista_vdi.model.options import QUALITIES, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.quality.dial import QUALITIES, TARGET_ANGLE
 
 #: More than any screen shows.
 MOST_FRAMES_PER_SECOND = 1000
 
 #: Where options go: a verb's parser, or a group of it.
 Options = argparse._ActionsContainer
+
+#: The options of the public functions: defaults, choices and texts are theirs.
+_DECLARED = declared(
+    Classification, DrawingOptions, GenerationOptions, QualityTarget, RenderOptions
+)
+
+#: What the step along a ray is where none is given.
+_HALF = " (default: half the smallest spacing)"
 
 VDI_FILE = (
     "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, a VDI as .vti, or a page, "
@@ -163,6 +174,30 @@ def option(
     options.add_argument(name, help=text, metavar=metavar, type=kind, **more)
 
 
+def known(
+    options: Options,
+    name: str,
+    metavar: Any = None,
+    kind: Any = None,
+    more: str = "",
+    *,
+    default: Any = None,
+    **others: Any,
+) -> None:
+    """Add an option of the public functions, of this name, by what is declared of it.
+
+    ``more`` is put behind its text, and so is ``default``, if it is a number; ``...`` is the one
+    that is declared.
+    """
+    told = _DECLARED[name]
+    default = told.default if default is ... else default
+    text = told.what.replace("``", "") + more
+    if isinstance(default, int | float):
+        text += f" (default: {default:g})"
+    flag = f"--{name.replace('_', '-')}"
+    option(options, flag, text, metavar, kind, default=default, **others)
+
+
 def switch(options: Options, name: str, text: str | None = None, **more: Any) -> None:
     """Add an option that takes none."""
     options.add_argument(name, help=text, action="store_true", **more)
@@ -238,8 +273,8 @@ def grid(options: Options) -> None:
 
 def array(options: Options) -> None:
     """Add which array of the volume is meant."""
-    option(options, "--scalars", "which array", "NAME")
-    option(options, "--preference", None, choices=("point", "cell"))
+    known(options, "scalars", "NAME")
+    known(options, "preference", choices=_DECLARED["preference"].choices)
 
 
 def size(options: Options, default: tuple[int, int] | None) -> None:
@@ -296,18 +331,17 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     )
     standard = "a standard transfer function; --cmap and --opacity change parts of it"
     option(group, "--tf", standard, choices=tuple(TRANSFER_FUNCTIONS))
-    option(group, "--cmap", "colour map", "NAME")
-    option(group, "--opacity", "name, or values from 0 to 1", "NAME|A,B,...", parse_opacity)
-    option(group, "--clim", None, ("LOW", "HIGH"), parse_number, nargs=2)
-    option(group, "--n-colors", None, "N", parse_whole)
-    switch(group, "--flip-scalars", default=None)
-    switch(group, "--log-scale", default=None)
-    option(group, "--opacity-unit-distance", None, "LENGTH", parse_number)
+    known(group, "cmap", "NAME")
+    known(group, "opacity", "NAME|A,B,...", parse_opacity, ", 0 to 1")
+    known(group, "clim", ("LOW", "HIGH"), parse_number, nargs=2)
+    known(group, "n_colors", "N", parse_whole)
+    known(group, "opacity_unit_distance", "LENGTH", parse_number)
+    for name in ("flip_scalars", "log_scale", "shade"):
+        switch(group, f"--{name.replace('_', '-')}", _DECLARED[name].what, default=None)
     array(group)
-    option(group, "--interpolation", None, choices=("nearest", "linear"))
-    switch(group, "--shade", "lit by a headlight", default=None)
-    for name in ("--ambient", "--diffuse", "--specular", "--specular-power"):
-        option(group, name, "of a shaded volume", "X", parse_number)
+    known(group, "interpolation", choices=_DECLARED["interpolation"].choices)
+    for name in ("ambient", "diffuse", "specular", "specular_power"):
+        known(group, name, "X", parse_number)
     if tables:
         text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
         option(group, "--transfer-function", text, "FILE")
@@ -323,66 +357,51 @@ def occlusion(parser: argparse.ArgumentParser) -> None:
     option(group, "--occlusion-strength", strength, "S", parse_number)
 
 
-def longest(options: Options, text: str | None = None, default: int = 20) -> None:
+def longest(options: Options, default: Any = ...) -> None:
     """Add how long lists may be."""
-    option(options, "--max-supersegments", text, "N", parse_whole, default=default)
+    known(options, "max_supersegments", "N", parse_whole, default=default)
 
 
-def step(options: Options, text: str | None = None) -> None:
+def step(options: Options) -> None:
     """Add how finely the volume is sampled."""
-    option(options, "--sample-distance", text, "LENGTH", parse_number)
+    known(options, "sample_distance", "LENGTH", parse_number, _HALF)
 
 
 def limits(parser: argparse.ArgumentParser) -> None:
     """Add how much a VDI may hold, and how finely the volume is sampled."""
     group = parser.add_argument_group("limits")
-    longest(group, "longest list (default: 20)")
-    option(
-        group,
-        "--criterion",
-        "where lists are cut: least-error (default) or homogeneity",
-        "NAME",
-        default="least-error",
-    )
-    step(group, "step along the ray, model units (default: half the smallest spacing)")
-    option(group, "--tolerance", "error traded for length", kind=parse_number, default=0.0)
-    cone = "half angle of the cone of new views to serve (default: 60)"
-    option(group, "--view-cone", cone, "DEGREES", parse_number, default=60.0)
+    longest(group)
+    names = ": {} (default) or {}".format(*_DECLARED["criterion"].choices)
+    known(group, "criterion", "NAME", more=names, default=...)
+    step(group)
+    known(group, "tolerance", kind=parse_number, default=...)
+    known(group, "view_cone", "DEGREES", parse_number, default=...)
     memory_limit(group)
 
 
 def memory_limit(options: Options) -> None:
     """Add how much memory of the device is taken."""
-    option(
-        options,
-        "--memory-limit",
-        "most memory to take on the device, like 2GiB; a volume that does not fit goes there "
-        "brick by brick (default: what the device has)",
-        "SIZE",
-        parse_bytes,
+    more = (
+        ", like 2GiB; a volume that does not fit goes there brick by brick (default: what the "
+        "device has)"
     )
+    known(options, "memory_limit", "SIZE", parse_bytes, more)
 
 
-def dial(parser: argparse.ArgumentParser) -> None:
+def target(parser: argparse.ArgumentParser) -> None:
     """Add goals, from which the limits are chosen."""
     group = parser.add_argument_group(
-        "dial",
+        "quality",
         "Choose lists, their length and precision from a short measurement on this device; --size "
         "is then that of the pictures. Not with --max-supersegments, --tolerance or --precision.",
     )
-    known = ", ".join(f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None)
-    option(
-        group,
-        "--quality",
-        f"SSIM of {known} against volume rendering; reference: what is made without a dial",
-        choices=tuple(QUALITIES),
-    )
-    option(group, "--target-ssim", "the same by a number", "S", parse_number)
-    option(group, "--target-fps", "least full frames per second", "RATE", parse_number)
-    most = "most bytes on the device, like 20MB; files are smaller"
-    option(group, "--max-bytes", most, "SIZE", parse_bytes)
-    turn = f"turn of the view for which the SSIM is predicted (default: {TARGET_ANGLE:g})"
-    option(group, "--target-angle", turn, "DEGREES", parse_number, default=TARGET_ANGLE)
+    goals = [f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None]
+    named = f": an SSIM of {', '.join(goals)} against volume rendering; reference asks for nothing"
+    known(group, "quality", more=named, choices=tuple(QUALITIES))
+    known(group, "target_ssim", "S", parse_number)
+    known(group, "target_fps", "RATE", parse_number)
+    known(group, "max_bytes", "SIZE", parse_bytes, ", like 20MB; files are smaller")
+    known(group, "target_angle", "DEGREES", parse_number, default=...)
 
 
 def file_format(parser: argparse.ArgumentParser) -> None:

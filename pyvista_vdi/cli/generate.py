@@ -23,23 +23,21 @@ from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import QualityTarget, declared
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import Dial, describe
-
-#: Options that are arguments of ``generate`` of the same name: what a VDI is to reach.
-_DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")
+from pyvista_vdi.quality.dial import describe
 
 
 def generate(options: argparse.Namespace) -> int:
     """Generate a VDI and write it."""
-    target = checked_target(options.output)
+    path = checked_target(options.output)
     file_arguments = file_options(options)
     precision = file_arguments.pop("precision", "exact")
-    asked = {n: getattr(options, n) for n in _DIAL}
-    dial = Dial.of(**asked)  # refused before the volume is read, too
+    asked = {name: getattr(options, name) for name in declared(QualityTarget)}
+    target = QualityTarget(**asked)  # refused before the volume is read, too
     arguments = classification(options)
-    looks = Classification(arguments, "generate")  # refused before the volume is read
+    looks = Classification.composited(arguments, "generate")  # refused before the volume is read
     occlusion = ambient_occlusion(options)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
@@ -50,7 +48,7 @@ def generate(options: argparse.Namespace) -> int:
     width, height = options.size
     if volume.chunked:
         needed = f"{width} x {height} lists: block by block"
-    elif dial is not None:
+    elif target:
         needed = f"pictures of {width} x {height}: settings are chosen by a measurement"
     else:
         most = estimate(
@@ -60,7 +58,7 @@ def generate(options: argparse.Namespace) -> int:
             criterion=options.criterion,
             ambient_occlusion=occlusion,
             memory_limit=options.memory_limit,
-            transfer_function=looks.transfer_function(volume),
+            transfer_function=looks.transfer_function_of(volume),
             device=options.device,
         )
         needed = f"{width} x {height} lists: up to {most.total / 2**20:.0f} MiB"
@@ -87,7 +85,7 @@ def generate(options: argparse.Namespace) -> int:
         )
     seconds = time.perf_counter() - start
     with measuring("writing it") as bar:
-        vdi.save(target, progress=bar, **file_arguments)
+        vdi.save(path, progress=bar, **file_arguments)
     say_vdi(options, vdi, f", {seconds:.1f} s")
     chosen = describe(vdi.metadata)
     if chosen is not None:

@@ -21,8 +21,10 @@ from pyvista_vdi.io.stores import StoredVolume, is_store, open_volume
 from pyvista_vdi.io.volumes import read_file
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
+from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -38,10 +40,7 @@ _T = TypeVar("_T")
 _PULSE = 0.5
 
 #: Options that are arguments of the same name, given only if the user gave them.
-CLASSIFICATION = (
-    *("cmap", "opacity", "clim", "n_colors", "flip_scalars", "log_scale", "opacity_unit_distance"),
-    *("interpolation", "shade", "ambient", "diffuse", "specular", "specular_power"),
-)
+CLASSIFICATION = tuple(declared(Look))
 
 #: Options that say how a volume's file is read.
 _OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")

@@ -38,7 +38,7 @@ _DEFAULT_LOOK = "ramp"
 def tradeoff(options: argparse.Namespace) -> int:
     """Measure and write."""
     arguments = classification(options)
-    Classification(arguments, "tradeoff")  # refused before the volume is read
+    Classification.composited(arguments, "tradeoff")  # refused before the volume is read
     settings = _settings(options)
     name = options.name or volume_name(options)
     if Path(name).name != name:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pyvista_vdi._version import __version__
@@ -12,57 +11,20 @@ from pyvista_vdi.generation.list_arrays import growing_lists, require_room
 from pyvista_vdi.generation.march import March
 from pyvista_vdi.generation.records import Records
 from pyvista_vdi.generation.slices import Slices
-from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.options import GenerationRequest
+from pyvista_vdi.model.types import Progress
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays
 
-Progress = Callable[[float], object]
 
-
-def generate_vdi(
-    volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
-    transfer_function: TransferFunction,
-    options: GenerationOptions | None = None,
-    *,
-    device: Any = None,
-    progress: Progress | None = None,
-    metadata: Mapping[str, Any] | None = None,
-    **changes: Any,
-) -> VDI:
+def generate_vdi(request: GenerationRequest) -> VDI:
     """Make a VDI of a classified volume.
 
     Each list's ray is marched once. Neighbouring samples are merged while the medium stays
     homogeneous; what is recorded is then merged at least error, or cut by homogeneity,
     until the budget of supersegments is kept. Lists go on behind what V_O sees, because other
     views may see it.
-
-    Parameters
-    ----------
-    volume : Volume
-        The scalars.
-    camera : Camera
-        The generating view V_O.
-    window_size : (int, int)
-        Width and height of V_O's window in pixels: one list each.
-    transfer_function : TransferFunction
-        Scalar to colour and opacity.
-    options : GenerationOptions, optional
-        How it is made.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    progress : callable, optional
-        Called with the fraction done, 0 to 1, between slices of work; when it returns False the
-        work is given up.
-    metadata : mapping, optional
-        Entries to add to ``vdi.metadata``.
-    **changes
-        Options by name, in place of those in ``options``.
 
     Returns
     -------
@@ -74,19 +36,21 @@ def generate_vdi(
     InvalidArgumentError
         If an argument is out of range.
     Cancelled
-        If ``progress`` returned False.
+        If the request's ``progress`` returned False.
     DeviceMemoryError
         If the device lacks the memory, see :func:`pyvista_vdi.estimate`, or the memory limit is too
         little even for one brick.
     """
-    options = GenerationOptions.of(options, changes)
-    camera = Camera.from_any(camera)
-    width, height = size = check_window_size(window_size)
+    volume, options, progress = request.volume, request.options, request.progress
+    camera, size = request.camera, request.window_size
+    width, height = size
     require_room(0, size)
     report(progress, 0.0)  # first: a bar says that kernels are compiled
-    runtime = get_runtime(device)
+    runtime = get_runtime(request.device)
     slices = Slices(runtime, size, options)
-    medium = DeviceVolume(runtime, volume, transfer_function, options, room=slices.room(volume))
+    medium = DeviceVolume(
+        runtime, volume, request.transfer_function, options, room=slices.room(volume)
+    )
     with (
         medium.giving_bricks_back(),
         Records(runtime, medium.rays, camera, size, slices, options) as records,
@@ -109,7 +73,7 @@ def generate_vdi(
         offsets, front, back, color, optical_depth = lists.finished()
     report(progress, 1.0)
 
-    made_by = made_from(volume, transfer_function, options, medium, runtime.info.name)
+    made_by = made_from(request, medium, runtime.info.name)
     return VDI(
         camera,
         size,
@@ -120,18 +84,16 @@ def generate_vdi(
         optical_depth,
         volume.bounds,
         depth_origin=records.depth_origin,
-        metadata={**made_by, **(metadata or {})},
+        metadata={**made_by, **request.metadata},
     ).with_precision(options.precision)
 
 
 def made_from(
-    volume: Volume,
-    transfer_function: TransferFunction,
-    options: GenerationOptions,
-    medium: DeviceVolume | GridRays,
-    device: str,
+    request: GenerationRequest, medium: DeviceVolume | GridRays, device: str
 ) -> dict[str, Any]:
     """Return what made a VDI, for its metadata."""
+    volume, options = request.volume, request.options
+    transfer_function = request.transfer_function
     made_by = {
         "generator": f"pyvista-vdi {__version__}",
         "criterion": options.criterion,
@@ -162,4 +124,4 @@ def report(progress: Progress | None, fraction: float) -> None:
         raise Cancelled(f"generation was cancelled at {fraction:.0%}")
 
 
-__all__ = ["generate_vdi", "made_from", "report"]
+__all__ = ["Progress", "generate_vdi", "made_from", "report"]

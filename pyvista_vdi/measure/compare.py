@@ -223,11 +223,11 @@ def measure(
     InvalidArgumentError
         If the transfer function leaves nothing to see.
     """
-    classified = Classification(settings.classification, "compare")
+    looks = Classification.composited(settings.classification, "compare")
     done, begun = Pieces(progress, 1 + 2 * len(settings.angles)), now()
     with Bench(
         volume,
-        classified.transfer_function(volume),
+        looks.transfer_function_of(volume),
         settings.window_size,
         device=settings.device,
         vtk=settings.vtk,
@@ -261,7 +261,7 @@ def measure(
             "timing_sample_distance": bench.voxel,
             "repeats": settings.repeats,
             "camera": bench.view.to_dict(),
-            "classification": classified.describe(),
+            "classification": looks.describe(),
         }
         sizes = {
             "volume_bytes": volume.array.nbytes,

@@ -158,7 +158,7 @@ class OurVolume(OffScreenVolume):
         from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
         from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 
-        classified = Classification(look, "a front").transfer_function(volume)
+        classified = Classification.composited(look, "a front").transfer_function_of(volume)
         source, self.mapper, actor = VDISource(), VDIMapper(), VDIActor()
         source.SetInputDataObject(volume_to_image(volume))
         source.SetVolumeProperty(property_from_transfer_function(volume, classified))
@@ -226,7 +226,7 @@ class _Everybody:
         self._voxel = voxel = min(volume.spacing)
         self._view = view = filling_camera(volume.bounds, plan.window_size)
         looks, size = TRANSFER_FUNCTIONS[look], plan.window_size
-        classified = Classification(looks, "a front").transfer_function(volume)
+        classified = Classification.composited(looks, "a front").transfer_function_of(volume)
         prop = property_from_transfer_function(volume, classified)
         with ExitStack() as stack:
 

@@ -26,7 +26,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -314,9 +314,10 @@ class Bench:
         self, window_size: tuple[int, int] | None = None, view: Camera | None = None, **options: Any
     ) -> VDI:
         """Generate a VDI, by default from V_O in the bench's window and step."""
-        options = {"sample_distance": self.step, "device": self.runtime, **options}
+        device = options.pop("device", self.runtime)
+        made = GenerationOptions(**{"sample_distance": self.step, **options})
         place = view or self.view, window_size or self.size
-        return generate_vdi(self.volume, *place, self.table, **options)
+        return generate_vdi(GenerationRequest(self.volume, self.table, *place, made, device))
 
     def timed_generation(
         self,

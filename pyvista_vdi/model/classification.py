@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,32 +19,17 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
     UnsupportedError,
 )
-from pyvista_vdi.model.checks import as_flag, one_of
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
-
-#: Names and defaults of the arguments that say what a scalar looks like: ``add_volume``'s own,
-#: and ``interpolation``, which ``add_volume`` leaves at VTK's default.
-DEFAULTS: MappingProxyType[str, Any] = MappingProxyType(
-    {
-        "scalars": None,
-        "preference": "point",
-        "clim": None,
-        "n_colors": 256,
-        "opacity": "linear",
-        "cmap": None,
-        "flip_scalars": False,
-        "opacity_unit_distance": None,
-        "log_scale": False,
-        "shade": False,
-        "ambient": None,
-        "diffuse": 0.7,
-        "specular": 0.2,
-        "specular_power": 10.0,
-        "blending": "composite",
-        "interpolation": "nearest",
-    }
+from pyvista_vdi.model.options import (
+    GenerationOptions,
+    Options,
+    QualityTarget,
+    declared,
+    option,
+    record,
 )
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import ColorMapLike, OpacityLike, RangeLike, ScalarsLike, VTKObject
+from pyvista_vdi.model.volume import Volume
 
 #: What may become of the scalars along a ray, as ``add_volume`` names it; the first is the default.
 BLENDINGS = ("composite", "maximum", "minimum", "average", "additive")
@@ -51,26 +37,8 @@ BLENDINGS = ("composite", "maximum", "minimum", "average", "additive")
 #: What may be given in place of the arguments above.
 IN_PLACE = ("volume_property", "transfer_function")
 
-#: Arguments that choose the array and not its looks: they go together with IN_PLACE.
-_CHOOSE_THE_ARRAY = ("scalars", "preference")
 
-#: Names that are not ours, and what is meant: ``add_volume``'s aliases and near misses.
-_MEANT = MappingProxyType(
-    {
-        "rng": "clim",
-        "colormap": "cmap",
-        "property": "volume_property",
-        "prop": "volume_property",
-        "unit_distance": "opacity_unit_distance",
-        "interpolation_type": "interpolation",
-        "step": "sample_distance",
-        "n_supersegments": "max_supersegments",
-        "size": "window_size",
-    }
-)
-
-
-def range_to_classify(scalars: Any, clim: Any) -> Any:
+def range_to_classify(scalars: ScalarsLike | None, clim: RangeLike | None) -> RangeLike | None:
     """Return ``clim``, or the range of what a masked array does not mask, as ``add_volume`` does.
 
     What is masked is drawn by its value all the same.
@@ -82,75 +50,141 @@ def range_to_classify(scalars: Any, clim: Any) -> Any:
     return float(np.nanmin(scalars)), float(np.nanmax(scalars))
 
 
-class Classification:
-    """The classification arguments of one call, checked.
+class Described(Options):
+    """Options of which metadata tell those that are given."""
 
-    Parameters
-    ----------
-    given : mapping of str to object
-        The keyword arguments as the user gave them.
-    function : str
-        Name of the function they were given to, for messages.
-    others : tuple of str
-        That function's other keyword arguments, for suggestions.
-    blendings : sequence of str
-        The blend modes that it has.
+    def describe(self) -> dict[str, Any]:
+        """Return what differs from the defaults, in values that JSON can hold."""
+        return {name: _plain(value) for name, value in self.given.items()}
+
+
+@record
+@dataclass(frozen=True, eq=False)
+class ArrayChoice(Described):
+    """``add_volume``'s arguments that say which scalars are seen, and how along a ray."""
+
+    scalars: ScalarsLike | None = option(None, "name of an array, or the values")
+    preference: str = option(
+        "point",
+        "which array, where points and cells both have one of that name",
+        choices=("point", "cell"),
+    )
+    blending: str = option(
+        "composite", "what becomes of the scalars along a ray", choices=BLENDINGS
+    )
+
+    def require_composite(self) -> None:
+        """Refuse blend modes that a VDI does not have."""
+        if self.blending != BLENDINGS[0]:
+            raise UnsupportedError(
+                f"blending={self.blending!r} is not supported: a VDI stores what is composited "
+                "along a ray; pass blending='composite', or draw the volume itself by "
+                "Plotter.add_volume or pyvista_vdi.render_volume"
+            )
+
+
+@record
+@dataclass(frozen=True, eq=False)
+class Look(Described):
+    """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
+
+    ``interpolation``, which ``add_volume`` leaves at VTK's default, is one of them. What is not
+    checked here is refused where a table is built of it.
+    """
+
+    clim: RangeLike | None = option(
+        None, "range of the colour map; that of all values by default", aliases=("rng",)
+    )
+    n_colors: int = option(256, "entries of the colour map")
+    opacity: OpacityLike = option("linear", "name, one opacity, or opacities")
+    cmap: ColorMapLike | None = option(
+        None, "colour map; the theme's by default", aliases=("colormap",)
+    )
+    flip_scalars: bool = option(False, "reverse the colour map")
+    opacity_unit_distance: float | None = option(
+        None,
+        "length over which opacities are reached, model units; the volume's diagonal over its mean "
+        "number of cells by default",
+        aliases=("unit_distance",),
+    )
+    log_scale: bool = option(False, "map values to colours by their logarithm")
+    shade: bool = option(False, "light the volume")
+    ambient: float | None = option(None, "ambient light that is reflected, where shaded")
+    diffuse: float | None = option(0.7, "diffuse light that is reflected, where shaded")
+    specular: float | None = option(0.2, "specular light that is reflected, where shaded")
+    specular_power: float | None = option(10.0, "how narrow highlights are, where shaded")
+    interpolation: str = option(
+        "nearest",
+        'between voxels; ``add_volume`` draws ``"nearest"``',
+        choices=("nearest", "linear"),
+        aliases=("interpolation_type",),
+    )
+
+
+@record
+@dataclass(frozen=True, eq=False)
+class Classification(Look, ArrayChoice):
+    """The classification arguments of one call, checked.
 
     Raises
     ------
-    TypeError
-        If a name is unknown; the message suggests the nearest one.
     InvalidArgumentError
-        If ``transfer_function`` or ``volume_property`` is mixed with arguments that it replaces.
-    UnsupportedError
-        If another blending mode or anything else is asked for that is not honoured.
+        If ``transfer_function`` or ``volume_property`` is mixed with arguments that it replaces,
+        or a value cannot be used.
     """
 
-    def __init__(
-        self,
-        given: Mapping[str, Any],
-        function: str,
-        others: tuple[str, ...] = (),
-        blendings: Sequence[str] = BLENDINGS[:1],
-    ) -> None:
-        refuse_unknown(given, function, (*DEFAULTS, *IN_PLACE, *others))
-        self._function = function
-        self._in_place = {n: given[n] for n in IN_PLACE if given.get(n) is not None}
-        self._given = {n: v for n, v in given.items() if n in DEFAULTS}
-        self._refuse_mixtures()
-        self._refuse_unsupported(blendings)
+    volume_property: VTKObject | None = option(
+        None, "in place of the others, as it is", aliases=("property", "prop")
+    )
+    transfer_function: TransferFunction | None = option(
+        None, "in place of the others; it needs no PyVista"
+    )
 
-    @property
-    def given(self) -> Mapping[str, Any]:
-        """The arguments as they were given."""
-        return {**self._given, **self._in_place}
+    def __post_init__(self) -> None:
+        in_place = [name for name in IN_PLACE if getattr(self, name) is not None]
+        if len(in_place) > 1:
+            raise InvalidArgumentError(
+                "volume_property and transfer_function were both given: pass one of them"
+            )
+        replaced = sorted({*self.given} & {*Look.declared}) if in_place else ()
+        if replaced:
+            raise InvalidArgumentError(
+                f"{in_place[0]} stands in place of {', '.join(replaced)}: leave out either "
+                f"{in_place[0]} or the {'others' if len(replaced) > 1 else 'other'}"
+            )
+        super().__post_init__()
+
+    @classmethod
+    def composited(
+        cls, given: Mapping[str, Any], function: str, others: Sequence[str] = ()
+    ) -> Classification:
+        """Return the classification of a VDI by arguments that a function was given.
+
+        ``others`` are the function's other keyword arguments, for suggestions.
+
+        Raises
+        ------
+        TypeError
+            If a name is unknown; the message suggests the nearest one.
+        InvalidArgumentError, UnsupportedError
+            If a value cannot be used.
+        """
+        refuse_unknown(given, function, (*declared(Classification), *others))
+        made = cls(**given)
+        made.require_composite()
+        return made
 
     @property
     def in_place(self) -> bool:
         """Whether a transfer function or a property stands in place of ``add_volume``'s."""
-        return bool(self._in_place)
+        return any(getattr(self, name) is not None for name in IN_PLACE)
 
     def changed(self, changes: Mapping[str, Any]) -> Classification:
         """Return these arguments with some of them changed."""
-        return Classification({**self.given, **changes}, self._function)
+        return replace(self, **changes)
 
-    @property
-    def blending(self) -> str:
-        """What becomes of the scalars along a ray: one of :data:`BLENDINGS`."""
-        return str(self._given.get("blending", DEFAULTS["blending"]))
-
-    @property
-    def scalars(self) -> Any:
-        """Name of the array or its values, ``None`` for the active one."""
-        return self._given.get("scalars")
-
-    @property
-    def preference(self) -> str:
-        """``"point"`` or ``"cell"``: which array where both kinds have one of that name."""
-        return str(self._given.get("preference", DEFAULTS["preference"]))
-
-    def transfer_function(self, volume: Volume) -> TransferFunction:
-        """Return the transfer function that the arguments describe for this volume.
+    def transfer_function_of(self, volume: Volume) -> TransferFunction:
+        """Return the transfer function that the arguments describe for a volume.
 
         Raises
         ------
@@ -159,12 +193,12 @@ class Classification:
         MissingDependencyError
             If PyVista is needed to build it and not installed.
         """
-        if "transfer_function" in self._in_place:
-            return self._checked_transfer_function()
-        if "volume_property" in self._in_place:
+        if self.transfer_function is not None:
+            return _checked_transfer_function(self.transfer_function)
+        if self.volume_property is not None:
             from_property = registry.method("TransferFunction.from_property")
             return from_property(  # type: ignore[no-any-return]
-                self._in_place["volume_property"], volume, rgba=volume.rgba
+                self.volume_property, volume, rgba=volume.rgba
             )
         if find_spec("pyvista") is None:
             raise MissingDependencyError(
@@ -172,57 +206,52 @@ class Classification:
                 'install it by pip install "pyvista-vdi[plot]", or pass '
                 "transfer_function=pyvista_vdi.TransferFunction(colors, opacities, scalar_range)"
             )
-        left_out = (*_CHOOSE_THE_ARRAY, "blending")
-        arguments = {n: v for n, v in {**DEFAULTS, **self._given}.items() if n not in left_out}
-        arguments["clim"] = range_to_classify(self.scalars, arguments["clim"])
+        arguments = {each.name: getattr(self, each.name) for each in fields(Look)}
+        arguments["clim"] = range_to_classify(self.scalars, self.clim)
         from_arguments = registry.method("TransferFunction.from_arguments")
         return from_arguments(  # type: ignore[no-any-return]
             volume.array, rgba=volume.rgba, **arguments
         )
 
-    def describe(self) -> dict[str, Any]:
-        """Return the arguments as given, in values that JSON can hold."""
-        return {name: _plain(value) for name, value in self.given.items()}
 
-    def _refuse_mixtures(self) -> None:
-        if len(self._in_place) > 1:
-            raise InvalidArgumentError(
-                "volume_property and transfer_function were both given: pass one of them"
-            )
-        replaced = sorted(set(self._given) - {*_CHOOSE_THE_ARRAY, "blending"})
-        if self._in_place and replaced:
-            (name,) = self._in_place
-            raise InvalidArgumentError(
-                f"{name} stands in place of {', '.join(replaced)}: "
-                f"leave out either {name} or the {'others' if len(replaced) > 1 else 'other'}"
-            )
-
-    def _refuse_unsupported(self, blendings: Sequence[str]) -> None:
-        one_of(self.blending, "blending", BLENDINGS)
-        if self.blending not in blendings:
-            raise UnsupportedError(
-                f"blending={self.blending!r} is not supported: a VDI stores what is composited "
-                "along a ray; pass blending='composite', or draw the volume itself by "
-                "Plotter.add_volume or pyvista_vdi.render_volume"
-            )
-        one_of(self._given.get("interpolation", "nearest"), "interpolation", ("nearest", "linear"))
-        one_of(self.preference, "preference", ("point", "cell"))
-        for name in ("flip_scalars", "log_scale", "shade"):
-            as_flag(self._given.get(name), name)
-
-    def _checked_transfer_function(self) -> TransferFunction:
-        table = self._in_place["transfer_function"]
-        if not isinstance(table, TransferFunction):
-            hint = (
-                ": pass a vtkVolumeProperty as volume_property="
-                if hasattr(table, "GetScalarOpacity")
-                else ""
-            )
-            raise InvalidArgumentError(
-                f"transfer_function must be a pyvista_vdi.TransferFunction; "
-                f"got {type(table).__name__}{hint}"
-            )
+def _checked_transfer_function(table: object) -> TransferFunction:
+    if isinstance(table, TransferFunction):
         return table
+    hint = (
+        ": pass a vtkVolumeProperty as volume_property="
+        if hasattr(table, "GetScalarOpacity")
+        else ""
+    )
+    raise InvalidArgumentError(
+        "transfer_function must be a pyvista_vdi.TransferFunction; "
+        f"got {type(table).__name__}{hint}"
+    )
+
+
+#: Names that are not ours, and what is meant: ``add_volume``'s aliases and near misses.
+_MEANT = {
+    "size": "window_size",
+    **{
+        alias: each.name
+        for each in declared(Classification, GenerationOptions, QualityTarget).values()
+        for alias in each.aliases
+    },
+}
+
+
+def refuse_keywords(
+    given: Mapping[str, Any],
+    function: Callable[..., object],
+    called: str | None = None,
+    aliases: Sequence[str] = (),
+) -> None:
+    """Raise TypeError for the first keyword that a function was given and does not know."""
+    if not given:
+        return
+    parameters = inspect.signature(function).parameters.values()
+    named = [each.name for each in parameters if each.kind is not each.VAR_KEYWORD]
+    known = (*aliases, *(name for name in named if name != "self"))
+    refuse_unknown(given, called or function.__name__, known)
 
 
 def refuse_unknown(given: Mapping[str, Any], function: str, known: tuple[str, ...]) -> None:

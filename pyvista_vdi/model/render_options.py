@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_flag, as_float, as_whole
+from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
+from pyvista_vdi.model.options import Options, option, record
 
 #: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
 #: more than that.
@@ -27,8 +28,57 @@ MAX_PREVIEW_SAMPLES = 2**23
 Planes: TypeAlias = tuple[tuple[float, ...], ...]
 
 
+def checked_planes(planes: Any) -> Planes:
+    """Return clipping planes as tuples of six floats; none for ``None``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If the shape is another, a value is not finite or a normal is zero.
+    """
+    if planes is None:
+        return ()
+    wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
+    try:
+        table = np.asarray(planes, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidArgumentError(f"{wanted}; got {planes!r}") from error
+    if table.size == 0:
+        return ()
+    if table.ndim != 2 or table.shape[1] != 6 or not np.isfinite(table).all():
+        raise InvalidArgumentError(f"{wanted}; got shape {table.shape}")
+    if not table[:, 3:].any(axis=1).all():
+        raise InvalidArgumentError("a clipping plane's normal is zero: give its direction")
+    return tuple(map(tuple, table.tolist()))
+
+
+def checked_preview_samples(samples: Any) -> int | None:
+    """Return a number of samples per ray as an int between 1 and :data:`MAX_PREVIEW_SAMPLES`."""
+    if samples is None:
+        return None
+    number = as_whole(samples)
+    if not 1 <= number <= MAX_PREVIEW_SAMPLES:
+        raise InvalidArgumentError(
+            f"preview_samples must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; "
+            f"got {samples!r}"
+        )
+    return int(number)
+
+
+def checked_transmittance_cutoff(cutoff: Any) -> float:
+    """Return a transmittance at which rays end, as a float from 0 to below 1."""
+    number = as_float(cutoff)
+    if not 0 <= number < 1:
+        raise InvalidArgumentError(
+            "transmittance_cutoff must be a number from 0 to below 1, such as 0.004 for a "
+            f"difference of 1/255 at most; got {cutoff!r}"
+        )
+    return number
+
+
+@record
 @dataclass(frozen=True)
-class RenderOptions:
+class RenderOptions(Options):
     """How a VDI, or a volume, is drawn; the public functions' arguments of these names.
 
     Options that compare equal give the same picture of the same view.
@@ -57,22 +107,26 @@ class RenderOptions:
         If one of them cannot be used.
     """
 
-    clipping_planes: Any = ()
-    cropping: Any = None
-    opacity_multiplier: float = 1.0
-    skip_empty: bool = True
-    preview_samples: int | None = None
-    transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
-
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "clipping_planes", checked_planes(self.clipping_planes))
-        put(self, "cropping", Cropping.from_any(self.cropping))
-        put(self, "opacity_multiplier", checked_opacity_multiplier(self.opacity_multiplier))
-        put(self, "skip_empty", as_flag(self.skip_empty, "skip_empty"))
-        if self.preview_samples is not None:
-            put(self, "preview_samples", checked_preview_samples(self.preview_samples))
-        put(self, "transmittance_cutoff", checked_transmittance_cutoff(self.transmittance_cutoff))
+    clipping_planes: Any = option(
+        None, "origin and normal of each plane, world coordinates", checked_planes
+    )
+    cropping: Any = option(
+        None, "which of 27 regions of the data's own coordinates are drawn", Cropping.from_any
+    )
+    opacity_multiplier: float = option(
+        1.0, "factor of the extinction, 0 or above", checked_opacity_multiplier
+    )
+    skip_empty: bool = option(True, "pass by what is empty")
+    preview_samples: int | None = option(
+        None, "look a VDI up at so many points of each ray", checked_preview_samples
+    )
+    transmittance_cutoff: float = option(
+        None,
+        "a ray ends where less light than this is left",
+        lambda cutoff: checked_transmittance_cutoff(
+            TRANSMITTANCE_CUTOFF if cutoff is None else cutoff
+        ),
+    )
 
     def replace(self, **changes: Any) -> RenderOptions:
         """Return the same options but for some of them."""
@@ -127,49 +181,3 @@ class FrameRequest:
     def replace(self, **changes: Any) -> FrameRequest:
         """Return the same request but for some of its fields."""
         return replace(self, **changes)
-
-
-def checked_planes(planes: Any) -> Planes:
-    """Return clipping planes as tuples of six floats; none for ``None``.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the shape is another, a value is not finite or a normal is zero.
-    """
-    if planes is None:
-        return ()
-    wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
-    try:
-        table = np.asarray(planes, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidArgumentError(f"{wanted}; got {planes!r}") from error
-    if table.size == 0:
-        return ()
-    if table.ndim != 2 or table.shape[1] != 6 or not np.isfinite(table).all():
-        raise InvalidArgumentError(f"{wanted}; got shape {table.shape}")
-    if not table[:, 3:].any(axis=1).all():
-        raise InvalidArgumentError("a clipping plane's normal is zero: give its direction")
-    return tuple(map(tuple, table.tolist()))
-
-
-def checked_preview_samples(samples: int) -> int:
-    """Return a number of samples per ray as an int between 1 and :data:`MAX_PREVIEW_SAMPLES`."""
-    number = as_whole(samples)
-    if not 1 <= number <= MAX_PREVIEW_SAMPLES:
-        raise InvalidArgumentError(
-            f"preview_samples must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; "
-            f"got {samples!r}"
-        )
-    return int(number)
-
-
-def checked_transmittance_cutoff(cutoff: float) -> float:
-    """Return a transmittance at which rays end, as a float from 0 to below 1."""
-    number = as_float(cutoff)
-    if not 0 <= number < 1:
-        raise InvalidArgumentError(
-            "transmittance_cutoff must be a number from 0 to below 1, such as 0.004 for a "
-            f"difference of 1/255 at most; got {cutoff!r}"
-        )
-    return number

@@ -21,8 +21,9 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.model.checks import as_float, not_taken
-from pyvista_vdi.model.classification import BLENDINGS
+from pyvista_vdi.model.classification import BLENDINGS, Look
 from pyvista_vdi.model.lighting import Shading
+from pyvista_vdi.model.options import option, record
 from pyvista_vdi.model.presets import presets
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -49,30 +50,24 @@ _BLENDING_NAMES = dict(enumerate(BLENDINGS)) | {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Looks:
-    """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
+def _categories(count: Any) -> bool | int:
+    if count and not isinstance(count, int | np.integer):
+        raise InvalidArgumentTypeError(
+            f"categories must be True, False or a whole number; got {count!r}"
+        )
+    return count  # type: ignore[no-any-return]
 
-    :meth:`AddVDI.__call__` says what each means. What cannot be used is refused where it is used.
-    ``theme`` is PyVista's, whose default colour map is used, the global one by default.
-    """
 
-    clim: float | ArrayLike | None = None
-    n_colors: int = 256
-    opacity: Any = "linear"
-    cmap: Any = None
-    flip_scalars: bool = False
-    log_scale: bool = False
-    categories: bool | int = False
-    annotations: dict[float, str] | None = None
+@record
+@dataclass(frozen=True, eq=False)
+class Looks(Look):
+    """What a scalar looks like in a plotter, whose ``theme`` has the default colour map."""
+
+    categories: bool | int = option(
+        False, "as many colours as there are different values", _categories
+    )
+    annotations: dict[float, str] | None = option(None, "texts beside the scalar bar, by value")
     theme: Any = None
-    opacity_unit_distance: float | None = None
-    interpolation: str = "nearest"
-    shade: bool = False
-    ambient: float | None = None
-    diffuse: float | None = 0.7
-    specular: float | None = 0.2
-    specular_power: float | None = 10.0
 
     def of_rgba(self) -> Looks:
         """Return those of RGBA scalars: opacity is linear over ``clim``, as in ``add_volume``."""
@@ -98,10 +93,6 @@ class Looks:
         n_colors = self.n_colors
         if self.categories:
             count = self.categories
-            if not isinstance(count, int | np.integer):
-                raise InvalidArgumentTypeError(
-                    f"categories must be True, False or a whole number; got {count!r}"
-                )
             n_colors = len(np.unique(scalars)) if count is True else int(count)
         whole = isinstance(n_colors, int | np.integer)
         if not (whole and 1 <= n_colors <= _MAX_COLORS):
@@ -139,10 +130,6 @@ class Looks:
         leaves VTK's unit distance of an RGBA volume's fourth component, 1, whatever is asked for;
         an explicit one is honoured here.
         """
-        if self.interpolation not in ("nearest", "linear"):
-            raise InvalidArgumentError(
-                f"interpolation must be 'nearest' or 'linear'; got {self.interpolation!r}"
-            )
         given = self.opacity_unit_distance
         if given is not None and not 0 < as_float(given) < np.inf:
             raise not_taken(given)(
@@ -191,7 +178,7 @@ def transfer_function_from_arguments(
 
 
 def note_mapper(mapper: str) -> None:
-    """Say that a name of VTK's mappers means nothing here, and refuse another."""
+    """Warn that a name of VTK's mappers means nothing here, and refuse another."""
     if mapper not in _MAPPERS:
         raise InvalidArgumentTypeError(
             f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "

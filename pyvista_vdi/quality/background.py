@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-import inspect
 import weakref
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable
 from typing import Any
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.options import GenerationRequest, QualityTarget
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import Dial
-from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Pixels along each edge of the frame that a new VDI is tried with: what the first real frame
 #: would have to compile and upload is there then.
 TRIAL_SIZE = 8
-
-_SIGNATURE = inspect.signature(GenerationOptions)
 
 
 class BackgroundGeneration:
@@ -55,52 +48,37 @@ class BackgroundGeneration:
 
     def start(
         self,
-        volume: Volume,
-        camera: Camera,
-        window_size: Sequence[int],
-        transfer_function: TransferFunction,
-        options: GenerationOptions | None = None,
+        request: GenerationRequest,
         *,
         key: Hashable = None,
-        dial: Dial | None = None,
-        metadata: Mapping[str, Any] | None = None,
-        **changes: Any,
+        target: QualityTarget | None = None,
     ) -> None:
         """Make a VDI, in place of whatever is being made or was not taken yet.
 
         Parameters
         ----------
-        volume, camera, window_size, transfer_function
-            As for :func:`~pyvista_vdi.generation.generate.generate_vdi`. The volume's values
-            must stay until the VDI is finished or cancelled with ``wait=True``.
-        options : GenerationOptions, optional
-            How it is made.
+        request : GenerationRequest
+            What is asked for; device and progress are this object's. The volume's values must stay
+            until the VDI is finished or cancelled with ``wait=True``.
         key : hashable
             What the VDI is for; see :attr:`key`.
-        dial : Dial, optional
+        target : QualityTarget, optional
             Chooses the window, max_supersegments and precision.
-        metadata : mapping, optional
-            Entries to add to ``vdi.metadata``.
-        **changes
-            Options by name, in place of those in ``options``. :meth:`take` raises what is wrong
-            with their values.
 
         Raises
         ------
-        TypeError
-            If there is no such option.
         RuntimeError
             After :meth:`close`.
         """
-        if "device" in changes or "progress" in changes:
-            raise TypeError("device is given to BackgroundGeneration, and progress is an attribute")
-        _SIGNATURE.bind(**changes)
-        arguments = (volume, Camera.from_any(camera), window_size, transfer_function, dial, options)
 
         def make(runtime: Runtime, report: Callable[[float], None]) -> VDI:
-            vdi = generate_by_dial(
-                *arguments, metadata=metadata, device=runtime, progress=report, **changes
-            )
+            here = request.replace(device=runtime, progress=report)
+            if target:
+                from pyvista_vdi.quality.probe import generate_to_target
+
+                vdi = generate_to_target(here, target)
+            else:
+                vdi = generate_vdi(here)
             trial = FrameRequest(vdi.camera, (TRIAL_SIZE, TRIAL_SIZE), device=runtime)
             render_vdi(vdi, trial)
             return vdi

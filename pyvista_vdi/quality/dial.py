@@ -1,9 +1,8 @@
-"""One dial for speed against accuracy: how a VDI is to be made, from a short measurement.
+"""Chooses the settings of a VDI for a quality target, from a short measurement.
 
-What is asked for is a quality, an SSIM, frames per second or bytes. What may be chosen is a ladder
-of settings (:data:`LADDER`). Three small measurements tell what each rung gives: a few tiles of one
-new view are rendered by the volume and by VDIs with few or short lists, and the rest is inferred.
-docs/dial.md says how, and how well that predicts.
+What may be chosen is a ladder of settings (:data:`LADDER`). Three small measurements tell what each
+rung gives: a few tiles of one new view are rendered by the volume and by VDIs with few or short
+lists, and the rest is inferred. docs/dial.md says how, and how well that predicts.
 """
 
 from __future__ import annotations
@@ -11,33 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, warn_external
-from pyvista_vdi.model.checks import as_float, one_of
-from pyvista_vdi.model.options import GenerationOptions
-
-if TYPE_CHECKING:
-    from pyvista_vdi.model.vdi import VDI
-
-#: The SSIM that a name asks for. "reference" asks for nothing: it is what is made without a dial.
-QUALITIES: dict[str, float | None] = {
-    "reference": None,
-    "high": 0.98,
-    "balanced": 0.96,
-    "fast": 0.93,
-}
+from pyvista_vdi.model.options import GenerationOptions, QualityTarget
+from pyvista_vdi.model.vdi import VDI
 
 #: Edges along lists, see :func:`~pyvista_vdi.model.metrics.list_edges`, that a picture from V_O may
 #: have at most, and the goals for which that is held: below, squares are the price of speed.
 MAX_LIST_EDGES = 1.25
 SSIM_WITHOUT_SQUARES = 0.96
-
-#: Degrees from V_O at which a target is to be reached unless another angle is asked for.
-TARGET_ANGLE = 30.0
 
 #: How fast the loss across lists falls beyond half a list per pixel: its exponent is the first
 #: number plus the second times the exponent between a fifth and a half. Fitted to the cases of
@@ -54,7 +39,7 @@ _UNAVOIDABLE = (
     "with the camera: another generating view helps, other settings do not"
 )
 
-#: Options that a dial chooses, or leaves no room for.
+#: Options that are chosen, or left no room for.
 _CHOSEN = ("max_supersegments", "tolerance", "precision")
 
 #: Share of a limit in bytes that is left free: lists are counted on a sample of the rays.
@@ -113,109 +98,17 @@ LADDER = (
 )
 
 
-@dataclass(frozen=True)
-class Dial:
-    """What is asked of a VDI; :meth:`of` checks what a user gives.
-
-    Attributes
-    ----------
-    quality : str, optional
-        The name that ``ssim`` stands for.
-    ssim : float, optional
-        Goal: SSIM of a picture at ``angle`` against volume rendering.
-    fps : float, optional
-        Limit: frames per second of full frames, at least.
-    max_bytes : int, optional
-        Limit: bytes of the VDI on the device.
-    angle : float
-        Degrees from V_O.
-    """
-
-    quality: str | None = None
-    ssim: float | None = None
-    fps: float | None = None
-    max_bytes: int | None = None
-    angle: float = TARGET_ANGLE
-
-    @property
-    def list_edges(self) -> float:
-        """Goal: edges along lists in the picture from V_O, at most."""
-        held = self.ssim is not None and self.ssim >= SSIM_WITHOUT_SQUARES
-        return MAX_LIST_EDGES if held else math.inf
-
-    @classmethod
-    def of(
-        cls,
-        quality: str | None = None,
-        target_ssim: float | None = None,
-        target_fps: float | None = None,
-        max_bytes: int | None = None,
-        target_angle: float = TARGET_ANGLE,
-    ) -> Dial | None:
-        """Return the dial of arguments of ``generate``; ``None`` where nothing is to be chosen.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If one is out of range, or they contradict each other.
-        """
-        if quality is not None:
-            one_of(quality, "quality", tuple(QUALITIES))
-        if quality is not None and target_ssim is not None:
-            raise InvalidArgumentError(
-                f"quality={quality!r} and target_ssim={target_ssim!r} both say how good pictures "
-                "are to be: give one of them"
-            )
-        goal = _within("target_ssim", target_ssim, 0, 1, "an SSIM between 0 and 1")
-        fps = _within("target_fps", target_fps, 0, math.inf, "frames per second above 0")
-        limit = _within("max_bytes", max_bytes, 0, math.inf, "a number of bytes above 0")
-        angle = _within("target_angle", target_angle, 0, 180, "an angle between 0 and 180 degrees")
-        if quality == "reference" and (fps, limit) != (None, None):
-            raise InvalidArgumentError(
-                "quality='reference' is what is made without a dial, so that target_fps and "
-                "max_bytes have nothing to choose: leave them out, or ask for 'high'"
-            )
-        if quality is not None:
-            goal = QUALITIES[quality]
-        if goal is None and fps is None and limit is None:
-            return None
-        assert angle is not None
-        return cls(quality, goal, fps, None if limit is None else int(limit), angle)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what was asked for, by the names of the arguments."""
-        asked = {
-            "quality": self.quality,
-            "target_ssim": None if self.quality else self.ssim,
-            "target_fps": self.fps,
-            "max_bytes": self.max_bytes,
-        }
-        return {name: value for name, value in asked.items() if value is not None}
-
-
-def _within(name: str, value: Any, above: float, below: float, what: str) -> float | None:
-    if value is None:
-        return None
-    number = as_float(value)
-    if isinstance(value, bool) or not above < number < below:
-        raise InvalidArgumentError(f"{name} must be {what}; got {value!r}")
-    return number
-
-
-def refuse_settings(dial: Dial | None, options: GenerationOptions) -> None:
-    """Refuse options that a dial chooses where they do not have their defaults.
+def refuse_settings(target: QualityTarget, options: GenerationOptions) -> None:
+    """Refuse options that are chosen for a target where they do not have their defaults.
 
     Raises
     ------
     InvalidArgumentError
-        If there is a dial, and one differs from its default.
+        If one differs from its default.
     """
-    if dial is None:
-        return
-    given = {name: getattr(options, name) for name in _CHOSEN}
-    fixed = [f"{n}={v!r}" for n, v in given.items() if v != getattr(GenerationOptions, n)]
+    fixed = [f"{name}={value!r}" for name, value in options.given.items() if name in _CHOSEN]
     if fixed:
-        asked = ", ".join(f"{name}={value!r}" for name, value in dial.to_dict().items())
+        asked = ", ".join(f"{name}={value!r}" for name, value in target.to_dict().items())
         raise InvalidArgumentError(
             f"{asked} chooses the settings of the VDI, among them {', '.join(fixed)}: leave out "
             "one or the other"
@@ -233,7 +126,7 @@ class Prediction:
     window_size : (int, int)
         Lists along each edge of the VDI's window.
     ssim : float
-        SSIM, at the dial's angle, of a picture of the window asked for against volume rendering.
+        SSIM, at the target's angle, of a picture of the window asked for against volume rendering.
     nbytes : int
         Bytes of the VDI on the device.
     fps : float
@@ -252,11 +145,11 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Choice:
-    """What a dial chose.
+    """What was chosen for a target.
 
     Attributes
     ----------
-    dial : Dial
+    target : QualityTarget
         What was asked.
     prediction : Prediction
         The rung that was chosen, and what it is predicted to give.
@@ -266,7 +159,7 @@ class Choice:
         The window asked for.
     """
 
-    dial: Dial
+    target: QualityTarget
     prediction: Prediction
     missed: tuple[str, ...]
     window_size: tuple[int, int]
@@ -275,8 +168,8 @@ class Choice:
         """Return it for a VDI's metadata: see docs/dial.md."""
         chosen = self.prediction
         return {
-            "asked": self.dial.to_dict(),
-            "angle": self.dial.angle,
+            "asked": self.target.to_dict(),
+            "angle": self.target.target_angle,
             "window_size": list(self.window_size),
             "chosen": {
                 "window_size": list(chosen.window_size),
@@ -294,7 +187,7 @@ class Choice:
 
 
 def describe(metadata: dict[str, Any]) -> str | None:
-    """Say in one line what the dial chose for a VDI with such metadata; ``None`` without one."""
+    """Return in one line what was chosen for a VDI with such metadata; ``None`` if nothing was."""
     dial: Any = metadata.get("dial")
     try:
         chosen, predicted = dial["chosen"], dial["predicted"]
@@ -311,7 +204,7 @@ def describe(metadata: dict[str, Any]) -> str | None:
 
 
 def warn_missed(vdi: VDI) -> None:
-    """Give a VDIWarning for what the dial of a VDI could not reach."""
+    """Warn of each target that a VDI could not be made to reach."""
     for missed in vdi.metadata.get("dial", {}).get("missed", ()):
         warn_external(missed)
 
@@ -324,7 +217,10 @@ def bytes_of(vdi: VDI) -> int:
 
 
 def chosen(
-    dial: Dial, ladder: Sequence[Prediction], window_size: tuple[int, int], least: float = 0.0
+    target: QualityTarget,
+    ladder: Sequence[Prediction],
+    window_size: tuple[int, int],
+    least: float = 0.0,
 ) -> Choice:
     """Choose from what the rungs are predicted to give.
 
@@ -333,54 +229,51 @@ def chosen(
     """
     missed = []
     within = len(ladder)
-    if dial.max_bytes is not None:
-        free = (1 - _BYTES_MARGIN) * dial.max_bytes
+    if target.max_bytes is not None:
+        free = (1 - _BYTES_MARGIN) * target.max_bytes
         within = max(1, sum(rung.nbytes <= free for rung in ladder))
-        if ladder[0].nbytes > dial.max_bytes:
+        if ladder[0].nbytes > target.max_bytes:
             missed.append(
-                f"max_bytes={dial.max_bytes} cannot be kept: the smallest VDI that a dial makes "
+                f"max_bytes={target.max_bytes} cannot be kept: the smallest VDI that a dial makes "
                 f"is predicted to have {ladder[0].nbytes} bytes; allow more, or ask for a smaller "
                 "window"
             )
-    if dial.fps is not None:
-        fast = sum(rung.fps >= dial.fps for rung in ladder[:within])
+    if target.target_fps is not None:
+        fast = sum(rung.fps >= target.target_fps for rung in ladder[:within])
         if fast == 0:
             missed.append(
-                f"{dial.fps:g} full frames per second cannot be reached on this device: for "
-                f"{window_size[0]} x {window_size[1]} pixels {ladder[0].fps:.3g} are predicted at "
-                "most; ask for fewer, or for a smaller window (a plotter keeps target_fps while "
+                f"{target.target_fps:g} full frames per second cannot be reached on this device: "
+                f"for {window_size[0]} x {window_size[1]} pixels {ladder[0].fps:.3g} are predicted "
+                "at most; ask for fewer, or for a smaller window (a plotter keeps target_fps while "
                 "the view moves by drawing fewer pixels)"
             )
         within = max(1, fast)
-    if dial.ssim is None:
-        return Choice(dial, ladder[within - 1], tuple(missed), window_size)
-    reaching = [
-        i
-        for i, rung in enumerate(ladder)
-        if rung.ssim >= dial.ssim and rung.list_edges <= dial.list_edges
-    ]
-    wanted = reaching[0] if reaching else len(ladder) - 1
+    if target.ssim is None:
+        return Choice(target, ladder[within - 1], tuple(missed), window_size)
+    most_edges = MAX_LIST_EDGES if target.ssim >= SSIM_WITHOUT_SQUARES else math.inf
+    reaching = (rung.ssim >= target.ssim and rung.list_edges <= most_edges for rung in ladder)
+    wanted = next((i for i, reached in enumerate(reaching) if reached), len(ladder) - 1)
     rung = ladder[min(wanted, within - 1)]
-    name = f"quality={dial.quality!r}" if dial.quality else "target_ssim"
-    limits = [f"{n}={v}" for n, v in dial.to_dict().items() if n in ("max_bytes", "target_fps")]
-    if rung.ssim < dial.ssim:
+    name = f"quality={target.quality!r}" if target.quality else "target_ssim"
+    limits = [f"{n}={v}" for n, v in target.to_dict().items() if n in ("max_bytes", "target_fps")]
+    if rung.ssim < target.ssim:
         held = within <= wanted
         missed.append(
-            f"{name} asks for an SSIM of {dial.ssim:g} at {dial.angle:g} degrees; "
+            f"{name} asks for an SSIM of {target.ssim:g} at {target.target_angle:g} degrees; "
             f"{rung.ssim:.3f} is predicted for "
             + (f"what is within {' and '.join(limits)}" if held else "the best settings")
             + ("; allow more, or ask for less" if held else "; ask for less, or a smaller angle")
             + (_UNAVOIDABLE.format(least) if least > (1 - rung.ssim) / 2 else "")
         )
-    elif rung.list_edges > dial.list_edges:
+    elif rung.list_edges > most_edges:
         lists = " x ".join(str(n) for n in rung.window_size)
         missed.append(
             f"{name} asks for pictures without squares: {lists} lists, which are what is within "
             f"{' and '.join(limits)}, are predicted to show edges of {rung.list_edges:.2g} times "
-            f"the steps between them, above {dial.list_edges:g}; allow more, or ask for a smaller "
+            f"the steps between them, above {most_edges:g}; allow more, or ask for a smaller "
             "window"
         )
-    return Choice(dial, rung, tuple(missed), window_size)
+    return Choice(target, rung, tuple(missed), window_size)
 
 
 @dataclass(frozen=True)

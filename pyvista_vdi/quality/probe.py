@@ -1,4 +1,4 @@
-"""The short measurement of a scene that a dial chooses by."""
+"""The short measurement of a scene by which settings are chosen for a quality target."""
 
 from __future__ import annotations
 
@@ -7,33 +7,30 @@ import math
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import SSIM_WINDOW, ListEdges, list_edges, list_places
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GenerationRequest, QualityTarget
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
-from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import Progress
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import (
     DENSE,
     LADDER,
     ROUGH,
     SPARSE,
     Choice,
-    Dial,
     Measurement,
     Setting,
     bytes_of,
@@ -58,67 +55,29 @@ _MEASURING, _PARTS = 0.5, 4
 #: Scenes that are remembered.
 _REMEMBERED = 32
 
-Progress = Callable[[float], object]
-
 _measurements: OrderedDict[Any, Measurement] = OrderedDict()
 _lock = threading.Lock()
 
 
-def generate_by_dial(
-    volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
-    transfer_function: TransferFunction,
-    dial: Dial | None,
-    options: GenerationOptions | None = None,
-    *,
-    device: Any = None,
-    progress: Progress | None = None,
-    metadata: Mapping[str, Any] | None = None,
-    **changes: Any,
-) -> VDI:
-    """Make a VDI by the settings that a dial chooses, or, without a dial, by the options alone.
+def generate_to_target(request: GenerationRequest, target: QualityTarget) -> VDI:
+    """Make a VDI by the settings that are chosen for a target.
 
-    With a dial, the window is that of the pictures, and the VDI's metadata say what was chosen;
-    where it has more bytes than the dial allows, by how much more is known then, and another is
-    made. Arguments and errors are those of
-    :func:`~pyvista_vdi.generation.generate.generate_vdi` and of :func:`choose`.
+    The window of the request is that of the pictures, and the VDI's metadata say what was chosen;
+    where it has more bytes than the target allows, by how much more is known then, and another is
+    made. Errors are those of :func:`~pyvista_vdi.generation.generate.generate_vdi` and of
+    :func:`choose`.
     """
-    options = GenerationOptions.of(options, changes)
-    if dial is None:
-        return generate_vdi(
-            volume,
-            camera,
-            window_size,
-            transfer_function,
-            options,
-            device=device,
-            progress=progress,
-            metadata=metadata,
-        )
-    limit, overrun = dial.max_bytes or math.inf, 1.0
+    progress, limit, overrun = request.progress, target.max_bytes or math.inf, 1.0
     while True:
-        choice = choose(
-            volume,
-            camera,
-            window_size,
-            transfer_function,
-            dial,
-            options,
-            overrun=overrun,
-            device=device,
-            progress=_counted(progress),
-        )
+        choice = choose(request.replace(progress=_counted(progress)), target, overrun)
         expected = choice.prediction.nbytes
         vdi = generate_vdi(
-            volume,
-            camera,
-            choice.prediction.window_size,
-            transfer_function,
-            choice.prediction.setting.applied_to(options),
-            device=device,
-            progress=_rest(progress),
-            metadata={**(metadata or {}), "dial": choice.to_dict()},
+            request.replace(
+                window_size=choice.prediction.window_size,
+                options=choice.prediction.setting.applied_to(request.options),
+                progress=_rest(progress),
+                metadata={**request.metadata, "dial": choice.to_dict()},
+            )
         )
         if bytes_of(vdi) <= limit or expected > limit:  # that is said
             return vdi
@@ -140,40 +99,19 @@ def _rest(progress: Progress | None) -> Progress | None:
     return lambda fraction: progress(_MEASURING + (1 - _MEASURING) * fraction)
 
 
-def choose(
-    volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
-    transfer_function: TransferFunction,
-    dial: Dial,
-    options: GenerationOptions | None = None,
-    *,
-    overrun: float = 1.0,
-    device: Any = None,
-    progress: Progress | None = None,
-    **changes: Any,
-) -> Choice:
+def choose(request: GenerationRequest, target: QualityTarget, overrun: float = 1.0) -> Choice:
     """Choose how a VDI is to be made.
 
     Parameters
     ----------
-    volume, camera, window_size, transfer_function
-        As for :func:`~pyvista_vdi.generation.generate.generate_vdi`; the window is that of the
-        pictures.
-    dial : Dial
-        What is asked for.
-    options : GenerationOptions, optional
-        How the VDI will be made; max_supersegments, tolerance and precision, which the dial
-        chooses, must have their defaults.
+    request : GenerationRequest
+        What is asked for. Its window is that of the pictures, and max_supersegments, tolerance and
+        precision, which are chosen, must have their defaults. Its ``progress`` is called with 0
+        between the parts of the measurement.
+    target : QualityTarget
+        What is to be reached.
     overrun : float
         Bytes that a VDI of this scene has been seen to take, over those predicted.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    progress : callable, optional
-        Called with 0 between the parts of the measurement; when it returns False it is given up.
-    **changes
-        Options by name, in place of those in ``options``: criterion, sample_distance, view_cone,
-        lights, ambient_occlusion, memory_limit.
 
     Returns
     -------
@@ -188,21 +126,19 @@ def choose(
     Cancelled
         If ``progress`` returned False.
     """
-    options = GenerationOptions.of(options, changes)
-    refuse_settings(dial, options)
-    camera, size = Camera.from_any(camera), check_window_size(window_size)
+    refuse_settings(target, request.options)
+    size = request.window_size
     if min(size) < SSIM_WINDOW:
         raise InvalidArgumentError(
             f"a window of {size[0]} x {size[1]} pixels has no SSIM to choose settings by: it "
             f"takes {SSIM_WINDOW} along each edge; choose max_supersegments and window yourself"
         )
-    scene = Scene(volume, camera, size, transfer_function, dial.angle, device, options, progress)
-    measured = _measurement(scene)
+    measured = _measurement(Probe(request, target.target_angle))
     ladder = [
         replace(rung, nbytes=math.ceil(overrun * rung.nbytes))
         for rung in predictions(measured, size)
     ]
-    return chosen(dial, ladder, size, measured.least)
+    return chosen(target, ladder, size, measured.least)
 
 
 def forget() -> None:
@@ -211,15 +147,15 @@ def forget() -> None:
         _measurements.clear()
 
 
-def _measurement(scene: Scene) -> Measurement:
+def _measurement(probe: Probe) -> Measurement:
     """Return what was measured of a scene before, or measure it."""
-    key = scene.key
+    key = probe.key
     with _lock:
         known = _measurements.get(key)
         if known is not None:
             _measurements.move_to_end(key)
             return known
-    measured = scene.measure()
+    measured = probe.measure()
     with _lock:
         _measurements[key] = measured
         while len(_measurements) > _REMEMBERED:
@@ -227,61 +163,48 @@ def _measurement(scene: Scene) -> Measurement:
     return measured
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """One volume, look, generating view, window and device, and the view that is judged."""
+class Probe:
+    """A short measurement: of what is asked for, seen from a view that is turned by an angle."""
 
-    volume: Volume
-    camera: Camera
-    window_size: tuple[int, int]
-    transfer_function: TransferFunction
-    angle: float
-    device: Any
-    options: GenerationOptions
-    progress: Progress | None = None
-
-    @cached_property
-    def view(self) -> Camera:
-        """The view that is judged."""
-        return turned(self.camera, self.volume.bounds, self.angle)
-
-    @cached_property
-    def runtime(self) -> Runtime:
-        """The device."""
-        return get_runtime(self.device)
+    def __init__(self, request: GenerationRequest, angle: float) -> None:
+        self._request = request.replace(device=get_runtime(request.device))
+        self._angle = angle
+        self._volume, self._camera = request.volume, request.camera
+        self._size, self._runtime = request.window_size, get_runtime(request.device)
+        self._view = turned(request.camera, request.volume.bounds, angle)
 
     @property
     def key(self) -> Any:
         """Equal where a measurement would be equal, but for times."""
-        volume = self.volume
+        volume, request = self._volume, self._request
         return (
             hashlib.blake2b(np.ascontiguousarray(volume.array).data, digest_size=16).digest(),
             (volume.array.shape, volume.array.dtype.str),
             (volume.spacing, volume.origin, np.asarray(volume.direction).tobytes()),
-            (self.camera, self.window_size, self.transfer_function, self.angle),
-            self.options,
-            self.runtime.info.index,
+            (self._camera, self._size, request.transfer_function, self._angle),
+            request.options,
+            self._runtime.info.index,
         )
 
     def measure(self) -> Measurement:
         """Measure losses, lengths of lists and the time of a frame."""
         self._go_on()
         estimator = ViewErrorEstimator(
-            self.volume,
-            self.transfer_function,
-            self.options,
+            self._volume,
+            self._request.transfer_function,
+            self._request.options,
             tiles=TILES,
             tile_size=TILE_SIZE,
-            device=self.runtime,
+            device=self._runtime,
         )
         rough = self._whole(ROUGH)
         counts = np.bincount(rough.counts.reshape(-1), minlength=2)
-        tiles = estimator.sample(rough, self.view, self.window_size)
+        tiles = estimator.sample(rough, self._view, self._size)
         seconds = self._frame_seconds(rough)
         edges = self._list_edges(estimator, rough)
         if tiles is None:
             return Measurement(0.0, 0.0, 0.0, counts, seconds, list_edges=edges)
-        truth = self._volume_tiles(estimator, self.view, tiles)
+        truth = self._volume_tiles(estimator, self._view, tiles)
         losses = []
         for setting in (ROUGH, SPARSE, DENSE):
             self._go_on()
@@ -297,10 +220,10 @@ class Scene:
         A list shows what its centre ray meets, exactly, wherever it is cut: at V_O the volume's
         picture of as many pixels as there are lists is what they show.
         """
-        tiles = estimator.sample(rough, self.camera, self.window_size)
+        tiles = estimator.sample(rough, self._camera, self._size)
         if tiles is None:
             return {}
-        pictures = self._volume_tiles(estimator, self.camera, tiles)
+        pictures = self._volume_tiles(estimator, self._camera, tiles)
         found = {}
         for setting in LADDER:
             if setting.lists >= 1 or setting.lists in found:
@@ -322,16 +245,16 @@ class Scene:
         setting: Setting,
     ) -> tuple[float, float]:
         """Return the mean steps across and within lists of a tile at V_O, its margin left out."""
-        window = setting.window_size(self.window_size)
+        window = setting.window_size(self._size)
         inner = tuple(slice(REACH, edge - REACH) for edge in picture.shape[:2])
-        places = list_places(self.camera, self.window_size, window)
+        places = list_places(self._camera, self._size, window)
         columns, rows = (
             np.floor(place[first:][part]).astype(int)
             for place, first, part in zip(places, corner, inner[::-1], strict=True)
         )
         first = (int(columns[0]), int(rows[0]))
         size = (int(columns[-1]) - first[0] + 1, int(rows[-1]) - first[1] + 1)
-        lists = estimator.volume_tile(self.camera.tile(window, first, size), size)
+        lists = estimator.volume_tile(self._camera.tile(window, first, size), size)
         squares = lists[np.ix_(rows - first[1], columns - first[0])]
         edges = list_edges(squares, picture[inner], columns, rows)
         return edges.across, edges.within
@@ -340,27 +263,28 @@ class Scene:
         self, estimator: ViewErrorEstimator, tiles: TileSample, truth: list[NDArray[np.float32]]
     ) -> float:
         """Return the loss of the volume itself where V_O covers it, lit as V_O has it."""
-        sides = viewport_planes(self.camera, self.window_size)
-        world = self.camera.model_transform
-        corners = rays.corners(self.volume.bounds) @ world[:3, :3].T + world[:3, 3]
+        sides = viewport_planes(self._camera, self._size)
+        world = self._camera.model_transform
+        corners = rays.corners(self._volume.bounds) @ world[:3, :3].T + world[:3, 3]
         covered = all(((corners - side[:3]) @ side[3:]).min() >= 0 for side in sides)
-        if covered and self.transfer_function.shading is None:
+        if covered and self._request.transfer_function.shading is None:
             return 0.0
         shown = RenderOptions(clipping_planes=None if covered else sides)
         pictures = [
-            estimator.volume_tile(lens, tiles.size, shown, lit_from=self.camera)
-            for lens in self._lenses(self.view, tiles)
+            estimator.volume_tile(lens, tiles.size, shown, lit_from=self._camera)
+            for lens in self._lenses(self._view, tiles)
         ]
         return _loss(tiles, pictures, truth)
 
     def _go_on(self) -> None:
-        if self.progress is not None and self.progress(0.0) is False:
+        progress = self._request.progress
+        if progress is not None and progress(0.0) is False:
             raise Cancelled("choosing the settings of a VDI was cancelled")
 
     def _lenses(self, view: Camera, tiles: TileSample) -> list[Camera]:
         """Return the view that each tile of a view has."""
         corners = tiles.corners.tolist()
-        return [view.tile(self.window_size, corner, tiles.size) for corner in corners]
+        return [view.tile(self._size, corner, tiles.size) for corner in corners]
 
     def _volume_tiles(
         self, estimator: ViewErrorEstimator, view: Camera, tiles: TileSample
@@ -368,28 +292,24 @@ class Scene:
         return [estimator.volume_tile(lens, tiles.size) for lens in self._lenses(view, tiles)]
 
     def _whole(self, setting: Setting) -> VDI:
-        return self._generated(self.camera, setting.window_size(self.window_size), setting)
+        return self._generated(self._camera, setting.window_size(self._size), setting)
 
     def _generated(self, camera: Camera, size: tuple[int, int], setting: Setting) -> VDI:
-        return generate_vdi(
-            self.volume,
-            camera,
-            size,
-            self.transfer_function,
-            setting.applied_to(self.options),
-            device=self.runtime,
-        )
+        options = setting.applied_to(self._request.options)
+        changes = {"camera": camera, "window_size": size, "options": options}
+        return generate_vdi(self._request.replace(**changes, progress=None, metadata={}))
 
     def _pictures(
         self, tiles: TileSample, setting: Setting, whole: VDI | None
     ) -> list[NDArray[np.float32]]:
         """Return the tiles' pictures, by the whole VDI if there is one, or else as is cheaper."""
-        window = setting.window_size(self.window_size)
-        lenses = self._lenses(self.view, tiles)
+        window = setting.window_size(self._size)
+        lenses = self._lenses(self._view, tiles)
         if whole is not None:
             return [render_vdi(whole, self._frame(lens, tiles.size)) for lens in lenses]
         met = [
-            lists_met(lens, tiles.size, self.volume.bounds, self.camera, window) for lens in lenses
+            lists_met(lens, tiles.size, self._volume.bounds, self._camera, window)
+            for lens in lenses
         ]
         parts = [math.prod(part[1]) + _PART_OVERHEAD for part in met if part is not None]
         # Where the parts together cost more than the whole, the whole is made
@@ -401,19 +321,19 @@ class Scene:
                 pictures.append(np.zeros((*tiles.size[::-1], 4), np.float32))
                 continue
             corner, size = part
-            vdi = self._generated(self.camera.tile(window, corner, size), size, setting)
+            vdi = self._generated(self._camera.tile(window, corner, size), size, setting)
             pictures.append(render_vdi(vdi, self._frame(lens, tiles.size)))
         return pictures
 
     def _frame(self, camera: Camera, size: tuple[int, int]) -> FrameRequest:
-        return FrameRequest(camera, size, device=self.runtime)
+        return FrameRequest(camera, size, device=self._runtime)
 
     def _frame_seconds(self, vdi: VDI) -> float:
         """Return the shortest time of a few full frames, seconds."""
         seconds = []
         for _ in range(_FRAMES):
             start = time.perf_counter()
-            render_vdi(vdi, self._frame(self.view, self.window_size))
+            render_vdi(vdi, self._frame(self._view, self._size))
             seconds.append(time.perf_counter() - start)
         return max(min(seconds), 1e-9)
 

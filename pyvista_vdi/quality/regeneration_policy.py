@@ -6,11 +6,6 @@ for a volume that fills the picture.
 
 from __future__ import annotations
 
-from typing import Any
-
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.checks import as_float
-
 #: Estimated SSIM below which a view at rest gets a VDI of its own. Over the measured views a VDI
 #: of 20 supersegments keeps .96 to .99 when it is only turned; zooming in by two, or looking past
 #: what V_O's window covered, falls below (docs/regeneration.md).
@@ -25,16 +20,6 @@ _PATIENCE_IN_MOTION = 2.0
 #: Farther than this from the last estimate's view, another is made: at rest, and in motion.
 _ANOTHER_ESTIMATE = 0.005
 _ANOTHER_ESTIMATE_IN_MOTION = 0.3
-
-
-def checked_bound(ssim: Any) -> float:
-    """Return an SSIM between 0 and 1."""
-    bound = as_float(ssim)
-    if isinstance(ssim, bool) or not 0 <= bound <= 1:
-        raise InvalidArgumentError(
-            f"regenerate_below must be an SSIM between 0 and 1; got {ssim!r}"
-        )
-    return bound
 
 
 def estimate_is_old(apart: float, *, moving: bool) -> bool:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-
-from pyvista_vdi.errors import InvalidArgumentError
 
 #: What a frame is raycast from.
 RenderMode = Literal["vdi", "volume"]
@@ -32,13 +30,6 @@ _GAIN, _SAVING = 0.004, 0.25
 #: SSIM lost by a VDI away from V_O where nothing was estimated: the median at 30 degrees of
 #: docs/performance.md.
 _UNKNOWN_LOSS = 0.012
-
-
-def checked_draw(draw: Any) -> Literal["auto", "vdi", "volume"]:
-    """Return what is drawn, ``"auto"``, ``"vdi"`` or ``"volume"``; refuse anything else."""
-    if draw in ("auto", "vdi", "volume"):
-        return draw  # type: ignore[no-any-return]
-    raise InvalidArgumentError(f"draw must be 'auto', 'vdi' or 'volume'; got {draw!r}")
 
 
 class RenderModeChooser:

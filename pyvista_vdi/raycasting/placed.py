@@ -41,10 +41,9 @@ class PlacedVDI:
 def placed_vdis(
     vdis: Sequence[VDI],
     camera: Camera,
-    *,
     model_transforms: Sequence[ArrayLike] | None = None,
     clipping_planes: Any = None,
-    cropping: Sequence[Any] | None = None,
+    cropping: Any = None,
     opacity_multiplier: float | Sequence[float] = 1.0,
     skip_empty: bool = True,
 ) -> list[PlacedVDI]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import subprocess
 import sys
 
@@ -21,6 +20,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.model import classification
+from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (24, 16)
@@ -96,8 +96,8 @@ def test_vtk_objects_give_the_same_as_ours(volume, camera, default_runtime):
 
 
 def test_scalars_by_value_and_by_name(volume):
-    assert api.as_volume(volume, "values") is volume
-    other = api.as_volume(volume, np.arange(volume.array.size))
+    assert as_volume(volume, "values") is volume
+    other = as_volume(volume, np.arange(volume.array.size))
     assert other.array[0, 0, 1] == 1
     assert other.spacing == volume.spacing
 
@@ -123,17 +123,6 @@ def test_estimate_says_bytes(volume):
         api.estimate(volume, (64, 48), color_map="bone")
 
 
-def test_help_shows_every_classification_argument_with_add_volumes_defaults():
-    for function in (api.generate, api.render_volume, api.estimate):
-        parameters = inspect.signature(function).parameters
-        assert {*classification.DEFAULTS, *classification.IN_PLACE} <= set(parameters)
-        assert parameters["diffuse"].default == 0.7
-        assert "classification" not in parameters
-    theirs = inspect.signature(pytest.importorskip("pyvista").Plotter.add_volume).parameters
-    for name, default in classification.DEFAULTS.items():
-        assert name == "interpolation" or theirs[name].default == default, name
-
-
 def test_the_engine_works_without_vtk_and_pyvista(default_runtime):
     code = """
 import sys
@@ -155,7 +144,7 @@ assert pvdi.render(vdi, camera).max() > 0
         ("rng", "did you mean 'clim'"),
         ("opcity", "did you mean 'opacity'"),
         ("max_supersegment", "did you mean 'max_supersegments'"),
-        ("qqqq", "known are scalars, preference"),
+        ("qqqq", "known are volume, camera"),
     ],
 )
 def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
@@ -176,7 +165,7 @@ def test_an_unknown_keyword_is_a_type_error(name, suggestion, volume, camera):
         ({"volume_property": 3, "transfer_function": 4}, InvalidArgumentError, "both given"),
         ({"volume_property": 3, "cmap": "bone"}, InvalidArgumentError, "in place of cmap: leave"),
         (
-            {"transfer_function": 4, "clim": (0, 1), "opacity": "linear"},
+            {"transfer_function": 4, "clim": (0, 1), "opacity": "geom"},
             InvalidArgumentError,
             "transfer_function stands in place of clim, opacity: leave out either",
         ),

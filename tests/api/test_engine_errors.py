@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 from runtimes import fresh_runtime
 
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
@@ -21,7 +21,6 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
 )
 from pyvista_vdi.generation.estimate import estimate
-from pyvista_vdi.generation.generate import generate_vdi
 
 WINDOW = (12, 9)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))

@@ -22,8 +22,9 @@ from extension_marks import cases
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.model.classification import DEFAULTS
+from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.grid import Grid
+from pyvista_vdi.model.options import declared
 
 PACKAGE = Path(pvdi.__file__).parent
 ARRAY = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)
@@ -86,13 +87,20 @@ def series_of(vdi):
 
 MADE = {"volume": VOLUME, "camera": CAMERA, "window_size": SIZE}
 TABLED = {**MADE, "transfer_function": TABLE}
+LOOK = tuple(declared(Classification))
 OF_GENERATE = [
-    name for name in inspect.signature(pvdi.generate).parameters if name not in (*MADE, *DEFAULTS)
+    each.name
+    for each in inspect.signature(pvdi.generate).parameters.values()
+    if each.name not in (*MADE, *LOOK) and each.kind is not each.VAR_KEYWORD
 ]
 #: For each entry: the function, what is right, and further arguments.
 ENTRIES = {
     "generate": lambda vdi: (pvdi.generate, TABLED, OF_GENERATE),
-    "looks": lambda vdi: (pvdi.generate, MADE, [*DEFAULTS, "volume_property"]),
+    "looks": lambda vdi: (
+        pvdi.generate,
+        MADE,
+        LOOK[:-1],
+    ),
     "estimate": lambda vdi: (
         pvdi.estimate,
         {"volume": VOLUME, "window_size": SIZE, "transfer_function": TABLE},
@@ -303,7 +311,8 @@ def public_names():
             names.add(each)
             if callable(value) and not each.startswith("__"):
                 try:
-                    names.update(inspect.signature(value).parameters)
+                    call = vars(value).get("__call__", value) if inspect.isclass(value) else value
+                    names.update(inspect.signature(call).parameters)
                 except (TypeError, ValueError):  # VTK's own
                     continue
     return names

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawing import render_vdi
+from drawing import generate_vdi, render_vdi
 from extreme_scenes import transfer, turned, view
 
 from pyvista_vdi import Volume
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.volume.render import raycast_volume
 

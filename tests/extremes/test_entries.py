@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     BOUND,
     WINDOW,
@@ -22,7 +22,6 @@ from extreme_scenes import (
 from oracle import assert_explained
 
 from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume, reference
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model import float32_limits as numerics
 from pyvista_vdi.model.cropping import PRESETS
 from pyvista_vdi.model.options import CRITERIA

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawing import render_vdi
+from drawing import generate_vdi, render_vdi
 from extreme_scenes import WINDOW, field_volume, transfer, view
-
-from pyvista_vdi.generation.generate import generate_vdi
 
 pytestmark = pytest.mark.extremes
 

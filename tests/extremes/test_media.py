@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi, render_vdis
+from drawing import generate_vdi, raycast_volume, render_vdi, render_vdis
 from extreme_scenes import (
     BOUND,
     WINDOW,
@@ -16,7 +16,6 @@ from extreme_scenes import (
 )
 
 from pyvista_vdi import Camera, InvalidArgumentError, TransferFunction, Volume, reference
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     FIELD,
     WINDOW,
@@ -32,7 +32,6 @@ from pyvista_vdi import (
     Volume,
     reference,
 )
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.float32_limits import scalars_suit_float32
 from pyvista_vdi.volume.light_tables import GRADIENT_SHARE
 

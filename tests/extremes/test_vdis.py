@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawing import render_vdi
+from drawing import generate_vdi, render_vdi
 from extreme_scenes import (
     WINDOW,
     assert_within,
@@ -17,7 +17,6 @@ from extreme_scenes import (
 )
 
 from pyvista_vdi import VDI, Camera, Volume, reference
-from pyvista_vdi.generation.generate import generate_vdi
 
 pytestmark = pytest.mark.extremes
 

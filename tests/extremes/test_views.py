@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from drawing import generate_vdi
 from extreme_scenes import (
     WINDOW,
     check_scene,
@@ -20,7 +21,6 @@ from extreme_scenes import (
 
 from pyvista_vdi import Camera
 from pyvista_vdi.device.constants import STACK
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 pytestmark = pytest.mark.extremes

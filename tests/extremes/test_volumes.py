@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     BOUND,
     FIELD,
@@ -20,7 +20,6 @@ from extreme_scenes import (
 
 from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume, reference
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.volume import upload
 
 pytestmark = pytest.mark.extremes

@@ -8,6 +8,7 @@ import signal
 import sys
 
 import pytest
+from drawing import generate_vdi
 from faulty_driver import (
     ALLOCATIONS,
     CAMERA,
@@ -23,7 +24,6 @@ from faulty_driver import (
 
 from pyvista_vdi.device import devices, get_runtime, programs
 from pyvista_vdi.errors import Cancelled, DeviceError, DeviceMemoryError, KernelBuildError
-from pyvista_vdi.generation.generate import generate_vdi
 
 #: Buffers of a volume and of a VDI that are on the device, and those that are always small.
 VOLUME = {"volume 'values'", "ranges of macrocells"}

@@ -12,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume, state_of
 from fresh_python import run_python
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.generation.generate import generate_vdi
 
 #: Seconds after which a process counts as one that hangs.
 PATIENCE = 600
@@ -35,7 +34,7 @@ import numpy as np
 import pyvista_vdi as pvdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.generation.generate import generate_vdi
+from drawing import generate_vdi
 fork = multiprocessing.get_context("fork")
 """
 

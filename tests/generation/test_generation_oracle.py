@@ -14,11 +14,10 @@ import itertools
 import numpy as np
 import pytest
 import strategies
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import Camera, Cancelled, reference
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume

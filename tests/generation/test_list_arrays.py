@@ -6,11 +6,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from drawing import generate_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
 from pyvista_vdi import Camera
 from pyvista_vdi.device import GrowingArray, Runtime
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.generation.list_arrays import growing_lists
 from pyvista_vdi.generation.march import March
 from pyvista_vdi.generation.slices import Slices

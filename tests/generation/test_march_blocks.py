@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drawing import generate_vdi
 from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
 from pyvista_vdi import Volume
-from pyvista_vdi.generation.generate import generate_vdi
 
 
 @pytest.fixture

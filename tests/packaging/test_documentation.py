@@ -267,9 +267,8 @@ def test_formats_on_the_page_of_files_are_written_and_read(tmp_path):
 
 
 def test_properties_on_the_page_of_paraview_are_the_plugin_s():
-    plugin = (CHECKOUT / "pyvista_vdi/extensions/paraview/plugin/vdi_plugin.py").read_text(
-        encoding="utf-8"
-    )
+    folder = CHECKOUT / "pyvista_vdi/extensions/paraview"
+    plugin = "".join(path.read_text(encoding="utf-8") for path in folder.rglob("*.py"))
     text = (DOCS / "guide_paraview.md").read_text(encoding="utf-8")
     table = text.partition("| property | meaning |")[2].partition("\n\n")[0]
     named = [n for row in table.splitlines()[2:] for n in _named(row) if n.isidentifier()]

@@ -37,7 +37,7 @@ def calls(monkeypatch):
 
         monkeypatch.setattr(module, function, call)
 
-    count("generate", source_module, "generate_by_dial")
+    count("generate", source_module, "generate_vdi")
     count("render", painter_module, "render_vdi")
     return counted
 

@@ -9,9 +9,10 @@ from watched_windows import finish, small_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.model.options import QualityTarget
 from pyvista_vdi.quality import probe as dial_measurement
 from pyvista_vdi.quality.background import BackgroundGeneration
-from pyvista_vdi.quality.dial import LADDER, Dial
+from pyvista_vdi.quality.dial import LADDER
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
@@ -97,7 +98,7 @@ def test_a_source_makes_what_generate_makes():
     source = ready_source()
     asked = {"max_bytes": 10**6, "target_angle": 20}
     source.SetDial("high", **asked)
-    assert source.GetDial() == Dial.of("high", **asked)
+    assert source.GetDial() == QualityTarget("high", **asked)
     looks = {"volume_property": some_property()}
     expected = pvdi.generate(
         soft_ball(12), source.GetCamera(), SIZE, quality="high", **asked, **looks
@@ -148,7 +149,7 @@ def test_what_is_made_in_the_background_is_chosen_there():
     request = source.MakeRequest()
     dial_measurement.forget()
     with BackgroundGeneration() as background:
-        background.start(*request.arguments, request.options, dial=request.dial)
+        background.start(request.generation, target=request.target)
         finish()
         made = background.take()
     assert made.equals(source.GetVDI())

@@ -13,17 +13,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi, request
 from fresh_python import run_python
 from runtimes import let_lack
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.generation import generate
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.background import BackgroundGeneration
-from pyvista_vdi.quality.probe import generate_by_dial
 from pyvista_vdi.raycasting import raycast
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.volume.upload import uploads_of
@@ -55,7 +54,8 @@ def make(runtime, camera=CAMERA, **options):
 
 
 def start(generator, camera=CAMERA, key=None, **options):
-    generator.start(VOLUME, camera, WINDOW, TRANSFER, key=key, **IN_SLICES, **options)
+    asked = request(VOLUME, camera, WINDOW, TRANSFER, **IN_SLICES, **options)
+    generator.start(asked, key=key)
 
 
 def finish(generator):
@@ -100,17 +100,17 @@ class Gate:
     def __init__(self, monkeypatch):
         self.reached, self._open = threading.Event(), threading.Event()
         self.cancelled = []
-        monkeypatch.setattr(background, "generate_by_dial", self._gated)
+        monkeypatch.setattr(background, "generate_vdi", self._gated)
 
-    def _gated(self, *arguments, progress, **options):
+    def _gated(self, asked):
         def report(fraction):
-            progress(fraction)
+            asked.progress(fraction)
             if fraction >= 0.4 and not self.reached.is_set():
                 self.reached.set()
                 self._open.wait(PATIENCE)
 
         try:
-            return generate_by_dial(*arguments, progress=report, **options)
+            return generate.generate_vdi(asked.replace(progress=report))
         except Cancelled as reason:
             self.cancelled.append(str(reason))
             raise
@@ -137,7 +137,7 @@ def test_the_same_bytes(runtime, generator, dtype, parallel):
     """As generate_vdi, which does not work in pieces; of a volume that is not there yet, too."""
     volume, camera = scene(dtype)
     camera = camera.replace(parallel_projection=parallel, parallel_scale=15.0)
-    generator.start(volume, camera, WINDOW, TRANSFER, **IN_SLICES, metadata={"a": 1})
+    generator.start(request(volume, camera, WINDOW, TRANSFER, **IN_SLICES, metadata={"a": 1}))
     made = taken(generator)
     expected = generate_vdi(
         scene(dtype)[0], camera, WINDOW, TRANSFER, device=runtime, **OPTIONS, metadata={"a": 1}
@@ -189,7 +189,7 @@ def test_on_finished_is_called_when_there_is_something_to_take(runtime):
         called.set()
 
     with BackgroundGeneration(runtime, on_finished=finished) as generator:
-        for options in ({}, {"tolerance": -1}):
+        for options in ({}, {"sample_distance": -1}):
             start(generator, **options)
             assert called.wait(PATIENCE)
             called.clear()
@@ -328,12 +328,14 @@ def test_the_interpreter_ends_in_the_middle(runtime):
     code = f"""
 import numpy as np
 from pyvista_vdi import Camera, TransferFunction, Volume
+from pyvista_vdi.generation import generate
+from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.quality.background import BackgroundGeneration
 generator = BackgroundGeneration({runtime.info.selector!r}, on_finished=lambda: print("made"))
 volume = Volume(np.random.default_rng(0).random((100, 100, 100)).astype("f4"))
 transfer = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 1))
 camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))
-generator.start(volume, camera, (1280, 720), transfer)
+generator.start(GenerationRequest(volume, transfer, camera, (1280, 720)))
 while generator.running and not generator.progress:
     pass
 assert generator.running
@@ -343,8 +345,8 @@ assert generator.running
 
 
 def test_an_error_is_raised_once(runtime, generator, before):
-    start(generator, key="wrong", tolerance=-1)
-    with pytest.raises(InvalidArgumentError, match="tolerance must be"):
+    start(generator, key="wrong", sample_distance=-1)
+    with pytest.raises(InvalidArgumentError, match="sample_distance must be"):
         taken(generator)
     assert generator.take() is None
     assert (generator.running, generator.key) == (False, None)
@@ -361,21 +363,12 @@ def test_a_lack_of_memory(runtime, generator, before, monkeypatch, where):
             patched.setattr(runtime, "info", replace(runtime.info, max_allocation=1000))
         else:
             let_lack(patched, runtime, where)
-        generator.start(VOLUME, CAMERA, WINDOW, TRANSFER, **OPTIONS)
+        generator.start(request(VOLUME, CAMERA, WINDOW, TRANSFER, **OPTIONS))
         finish(generator)
         assert memory_in_use(runtime) == before
         with pytest.raises(DeviceMemoryError):
             generator.take()
     assert memory_in_use(runtime) == before
-
-
-def test_arguments_are_refused_at_once(runtime, generator):
-    with pytest.raises(TypeError, match="tolerence"):
-        start(generator, tolerence=0)
-    for name in ("device", "progress"):
-        with pytest.raises(TypeError, match="device is given to BackgroundGeneration"):
-            start(generator, **{name: None})
-    assert not threads()
 
 
 def test_frames_meanwhile_are_the_same_to_the_last_bit(runtime, generator):
@@ -404,7 +397,7 @@ def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):
         volume = Volume(np.random.default_rng(seed).random((100, 100, 100)))
         transfer = TRANSFER.replace(scalar_range=(0, 1))
         camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))
-        generator.start(volume, camera, WINDOW, transfer)
+        generator.start(request(volume, camera, WINDOW, transfer))
         while generator.running and not uploads_of(volume).lock.locked():
             pass  # the worker comes first, or not at all
         image = None
@@ -439,7 +432,7 @@ def test_many_regenerations_leave_nothing(runtime, generator):
 
     def regenerate(vdi, k):
         view = CAMERA.azimuth(k % 60)
-        generator.start(VOLUME, view, window, TRANSFER)
+        generator.start(request(VOLUME, view, window, TRANSFER))
         frames = 0
         while generator.running or frames == 0:
             with runtime.foreground():

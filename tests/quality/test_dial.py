@@ -11,35 +11,34 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi, request
 from real_data import require_data
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import compare_images, list_edges, list_places
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import QUALITIES, GenerationOptions, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 from pyvista_vdi.quality import probe
 from pyvista_vdi.quality.dial import (
     DENSE,
     LADDER,
     MAX_LIST_EDGES,
-    QUALITIES,
-    TARGET_ANGLE,
-    Dial,
     Measurement,
     Prediction,
     chosen,
     describe,
     predictions,
 )
-from pyvista_vdi.quality.probe import Scene, lists_met, turned, viewport_planes
+from pyvista_vdi.quality.probe import Probe, lists_met, turned, viewport_planes
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 WINDOW = (160, 120)
+
+#: Degrees from V_O for which a target is meant by default.
+ANGLE = QualityTarget().target_angle
 
 #: Predicted less true SSIM of small pictures of the shipped volumes: what is seen below is within
 #: 0.013, and 0.006 too hopeful.
@@ -115,7 +114,7 @@ RUNGS = ladder((0.90, 0.93, 0.96, 0.98), sizes=(100, 200, 400, 800), rates=(80, 
     ],
 )
 def test_the_cheapest_rung_that_reaches_the_goal_within_the_limits(asked, rung):
-    choice = chosen(Dial.of(**asked), RUNGS, WINDOW)
+    choice = chosen(QualityTarget(**asked), RUNGS, WINDOW)
     assert choice.prediction is RUNGS[rung]
     assert choice.missed == ()
 
@@ -136,12 +135,12 @@ def test_goals_hold_squares_below_their_bound(asked, rung):
     rungs = [
         replace(one, ssim=0.99, list_edges=edge) for one, edge in zip(RUNGS, edges, strict=True)
     ]
-    choice = chosen(Dial.of(**asked), rungs, WINDOW)
+    choice = chosen(QualityTarget(**asked), rungs, WINDOW)
     assert choice.prediction is rungs[rung]
     assert choice.missed == ()
     # A limit goes before it, and the squares are told
     if rung == 2:
-        choice = chosen(Dial.of(**asked, max_bytes=120), rungs, WINDOW)
+        choice = chosen(QualityTarget(**asked, max_bytes=120), rungs, WINDOW)
         assert choice.prediction is rungs[0]
         assert len(choice.missed) == 1
         assert re.search(r"without squares: 10 x 10 lists, .* max_bytes=120", choice.missed[0])
@@ -164,7 +163,7 @@ def test_goals_hold_squares_below_their_bound(asked, rung):
     ],
 )
 def test_what_cannot_be_reached_is_said_with_the_nearest(asked, rung, said):
-    choice = chosen(Dial.of(**asked), RUNGS, WINDOW)
+    choice = chosen(QualityTarget(**asked), RUNGS, WINDOW)
     assert choice.prediction is RUNGS[rung]
     assert len(choice.missed) == 1
     assert re.search(said, choice.missed[0])
@@ -184,7 +183,9 @@ def test_asking_for_more_never_gives_less():
         measured = a_measurement(*np.sort(rng.uniform(0.001, 0.3, 3))[::-1])
         rungs = predictions(measured, (640, 360))
         for row in asked:
-            places = [rungs.index(chosen(Dial.of(**a), rungs, WINDOW).prediction) for a in row]
+            places = [
+                rungs.index(chosen(QualityTarget(**a), rungs, WINDOW).prediction) for a in row
+            ]
             assert places == sorted(places)
 
 
@@ -268,8 +269,7 @@ def test_what_was_measured_is_predicted_as_it_was():
 
 
 def measured(runtime, volume, camera, window, table=TRANSFER):
-    options = GenerationOptions()
-    return Scene(volume, camera, window, table, TARGET_ANGLE, runtime, options).measure()
+    return Probe(request(volume, camera, window, table, device=runtime), ANGLE).measure()
 
 
 @pytest.fixture(scope="module")
@@ -280,11 +280,11 @@ def shipped(default_runtime):
     for name in ("brain", "rayleigh_taylor"):
         volume = pvdi.examples.load_data(name, as_volume=True)
         camera = filling_camera(volume.bounds, window)
-        view = turned(camera, volume.bounds, TARGET_ANGLE)
+        view = turned(camera, volume.bounds, ANGLE)
         # The other volume is there for its voxels; each look has been predicted for the brain
         for look in list(TRANSFER_FUNCTIONS) if name == "brain" else ["steep"]:
             looks = dict(TRANSFER_FUNCTIONS[look])
-            table = Classification(looks, "test").transfer_function(volume)
+            table = Classification.composited(looks, "test").transfer_function_of(volume)
             picture = raycast_volume(volume, view, window, table)
             found = measured(default_runtime, volume, camera, window, table)
             for rung in predictions(found, window)[::4]:
@@ -319,7 +319,7 @@ def test_no_squares_are_seen_in_a_smooth_field(default_runtime):
         assert (true > MAX_LIST_EDGES) == (rung.setting.lists < 0.5)
         # Nine tiles' steps against all, which differ as the field's slope does
         assert rung.list_edges == pytest.approx(true, rel=0.25)
-    assert chosen(Dial.of("high"), rungs, window).prediction is rungs[2]
+    assert chosen(QualityTarget("high"), rungs, window).prediction is rungs[2]
     assert {rung.list_edges for rung in rungs if rung.setting.lists >= 1} == {0.0}
 
 
@@ -385,10 +385,10 @@ def test_parts_predict_what_the_whole_predicts(default_runtime, monkeypatch):
     window, sizes = (800, 600), []  # the parts for nine tiles cost less than the whole
     real = probe.generate_vdi
 
-    def noted(volume, camera, size, table, options, **more):
-        if options.max_supersegments == DENSE.max_supersegments:
-            sizes.append(size)
-        return real(volume, camera, size, table, options, **more)
+    def noted(asked):
+        if asked.options.max_supersegments == DENSE.max_supersegments:
+            sizes.append(asked.window_size)
+        return real(asked)
 
     monkeypatch.setattr(probe, "generate_vdi", noted)
     by_parts = measured(default_runtime, VOLUME, VIEW, window)
@@ -405,15 +405,16 @@ def test_parts_predict_what_the_whole_predicts(default_runtime, monkeypatch):
         assert getattr(by_parts, name) == pytest.approx(getattr(by_whole, name), abs=1e-4)
 
 
-def choose(runtime, volume=VOLUME, camera=VIEW, angle=TARGET_ANGLE, **options):
-    dial = Dial.of("balanced", target_angle=angle)
-    return probe.choose(volume, camera, WINDOW, TRANSFER, dial, device=runtime, **options)
+def choose(runtime, volume=VOLUME, camera=VIEW, angle=ANGLE, **options):
+    target = QualityTarget("balanced", target_angle=angle)
+    asked = request(volume, camera, WINDOW, TRANSFER, device=runtime, **options)
+    return probe.choose(asked, target)
 
 
 def test_a_scene_is_measured_once(default_runtime, monkeypatch):
     count = []
-    real = Scene.measure
-    monkeypatch.setattr(Scene, "measure", lambda scene: count.append(1) or real(scene))
+    real = Probe.measure
+    monkeypatch.setattr(Probe, "measure", lambda found: count.append(1) or real(found))
     first = generated(default_runtime, quality="balanced")
     again = generated(default_runtime, volume=ball(), quality="balanced")  # equal, another object
     assert again.equals(first)
@@ -433,7 +434,7 @@ def test_a_scene_is_measured_once(default_runtime, monkeypatch):
 
 def test_the_last_scenes_are_remembered(default_runtime, monkeypatch):
     seen = []
-    monkeypatch.setattr(Scene, "measure", lambda scene: seen.append(1) or a_measurement())
+    monkeypatch.setattr(Probe, "measure", lambda found: seen.append(1) or a_measurement())
 
     def is_known(turn):
         before = len(seen)
@@ -500,7 +501,7 @@ def test_what_no_vdi_of_the_view_can_show_is_predicted_as_lost(default_runtime, 
     else:
         looks["shade"] = True
     vdi = pvdi.generate(volume, camera, WINDOW, target_ssim=0.99, **looks)
-    view = turned(camera, volume.bounds, TARGET_ANGLE)
+    view = turned(camera, volume.bounds, ANGLE)
     picture = pvdi.render_volume(volume, view, WINDOW, **looks)
     found = vdi.metadata["dial"]
     true = compare_images(pvdi.render(vdi, view, WINDOW), picture).ssim

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.quality.render_mode import RenderModeChooser, checked_draw
+from pyvista_vdi.model.drawing_options import checked_draw
+from pyvista_vdi.quality.render_mode import RenderModeChooser
 
 pytestmark = pytest.mark.fast
 

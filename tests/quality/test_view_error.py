@@ -7,11 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 
 from pyvista_vdi import VDI, Camera, Light, Lights, Shading, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.metrics import compare_images, over_background
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.quality.tiles import COARSE, REACH, Cells, Region, TileSample, seen_region

@@ -10,13 +10,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
-from drawing import pick_vdi, raycast_volume, render_first_hits, render_vdi
+from drawing import generate_vdi, pick_vdi, raycast_volume, render_first_hits, render_vdi
 from oracle import assert_explained, total
 from ray_scenes import random_cropping, random_ends, random_planes
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.cropping import PRESETS, Cropping
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.reference.raycast import kept_parts

@@ -1,8 +1,9 @@
-"""The engine's pictures, depths and picks, with options by name as for the public functions."""
+"""The engine's VDIs, pictures, depths and picks, with options by name as in public functions."""
 
 from __future__ import annotations
 
-from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.generation import generate
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.raycasting import multi_vdi, picking, placed, raycast
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
@@ -10,6 +11,38 @@ from pyvista_vdi.volume import render
 
 #: What frames take beside options.
 _OF_FRAMES = ("opaque_depth", "device", "out")
+
+
+def request(
+    volume, camera, size, transfer_function, options=None, *, device=None, progress=None,
+    metadata=None, **changes
+):  # fmt: skip
+    """The request of a VDI."""
+    made = GenerationOptions.of(options, changes)
+    return GenerationRequest(
+        volume, transfer_function, camera, size, made, device, progress, metadata or {}
+    )
+
+
+def generate_vdi(*arguments, **options):
+    """A VDI of a volume in memory."""
+    return generate.generate_vdi(request(*arguments, **options))
+
+
+def generate_chunked(*arguments, chunks=None, block_bytes=None, **options):
+    """A VDI of a volume in blocks, on this device."""
+    from pyvista_vdi.extensions.large.generate import generate_chunked
+
+    asked = request(*arguments, **options)
+    return generate_chunked(asked, chunks=chunks, block_bytes=block_bytes)
+
+
+def generate_on_dask(*arguments, client, workers=None, chunks=None, block_bytes=None, **options):
+    """A VDI of a volume in blocks, on the workers of a cluster."""
+    from pyvista_vdi.extensions.large.on_dask import generate_on_dask
+
+    cuts = {"chunks": chunks, "block_bytes": block_bytes}
+    return generate_on_dask(request(*arguments, **options), client=client, workers=workers, **cuts)
 
 
 def frame(vdi, camera, size=None, **options):

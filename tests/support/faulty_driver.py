@@ -5,11 +5,10 @@ from __future__ import annotations
 import gc
 
 import numpy as np
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import DeviceBuffer, devices
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 #: The driver's functions that the runtime calls, by what they are for.

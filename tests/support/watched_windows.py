@@ -37,16 +37,16 @@ def gate(monkeypatch):
     """Holds up what is generated in the background, until it is set; ``begun`` counts it."""
     gate = threading.Event()
     gate.begun = 0
-    generate_by_dial = background.generate_by_dial
+    generate_vdi = background.generate_vdi
 
-    def gated(*arguments, device, **keywords):
+    def gated(request):
         gate.begun += 1
         while not gate.is_set():
-            device.give_way()
+            request.device.give_way()
             time.sleep(0.001)
-        return generate_by_dial(*arguments, device=device, **keywords)
+        return generate_vdi(request)
 
-    monkeypatch.setattr(background, "generate_by_dial", gated)
+    monkeypatch.setattr(background, "generate_vdi", gated)
     yield gate
     gate.set()
 

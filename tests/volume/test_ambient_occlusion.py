@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 from runtimes import let_lack
 from scipy.interpolate import RegularGridInterpolator
 
@@ -17,7 +17,6 @@ from pyvista_vdi import (
     Volume,
     reference,
 )
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.reference.generate import node_occlusion

@@ -8,7 +8,7 @@ import march_ways
 import numpy as np
 import pytest
 import strategies
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 
 from pyvista_vdi import (
     Light,
@@ -18,7 +18,6 @@ from pyvista_vdi import (
     Volume,
     reference,
 )
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.reference.generate import medium_at
 from pyvista_vdi.volume.classified_volume import DeviceVolume

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import strategies
-from drawing import raycast_volume, render_vdi
+from drawing import generate_vdi, raycast_volume, render_vdi
 
 from pyvista_vdi import InvalidVolumeError, Shading, TransferFunction, Volume, reference
-from pyvista_vdi.generation.generate import generate_vdi
 
 WINDOW = (7, 6)
 

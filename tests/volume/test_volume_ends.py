@@ -6,11 +6,10 @@ import functools
 
 import numpy as np
 import pytest
-from drawing import raycast_volume
+from drawing import generate_vdi, raycast_volume
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.generation import generate as generation
-from pyvista_vdi.generation.generate import generate_vdi
 
 SIZE = 9.0  # model units along each edge
 OPACITY = 0.3

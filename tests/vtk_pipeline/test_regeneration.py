@@ -334,7 +334,7 @@ def test_what_fails_is_said_once_and_not_repeated(plotter, monkeypatch):
         tries.append(1)
         raise DeviceError("no more")
 
-    monkeypatch.setattr(background, "generate_by_dial", failing)
+    monkeypatch.setattr(background, "generate_vdi", failing)
     plotter.camera.Azimuth(40)
     before = actor.vdi
     with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more") as said:

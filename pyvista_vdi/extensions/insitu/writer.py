@@ -151,7 +151,7 @@ class InSitu:
             raise InvalidArgumentError(
                 "clim=(low, high) is missing: no step knows the range of the others"
             )
-        self._looks = Classification(looks, "InSitu", GENERATION_NAMES)
+        self._looks = Classification.composited(looks, "InSitu", GENERATION_NAMES)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
         points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
@@ -215,7 +215,7 @@ class InSitu:
             at = self._checked_time(at)
             if self._function is None:
                 own = Volume(values, self._grid.spacing, self._grid.origin).load()
-                self._function = self._looks.transfer_function(own)
+                self._function = self._looks.transfer_function_of(own)
         assert self._function is not None
         vdi = generate_on_mpi(
             values,

@@ -13,10 +13,12 @@ from pyvista_vdi.errors import (
     with_article,
 )
 from pyvista_vdi.extensions.large.generate import generate_chunked
+from pyvista_vdi.model.options import GenerationRequest
+from pyvista_vdi.model.types import ClientLike
 from pyvista_vdi.model.vdi import VDI
 
 
-def generate_in_blocks(*arguments: Any, client: Any = None, **options: Any) -> VDI:
+def generate_in_blocks(request: GenerationRequest, client: ClientLike | None = None) -> VDI:
     """Make a VDI block by block on the local device, or on the workers of a cluster.
 
     Raises
@@ -29,10 +31,10 @@ def generate_in_blocks(*arguments: Any, client: Any = None, **options: Any) -> V
         If ``client`` is neither a client nor an address.
     """
     if client is None:
-        return generate_chunked(*arguments, **options)
+        return generate_chunked(request)
     if isinstance(client, str):
         with connected(client) as found:
-            return generate_in_blocks(*arguments, client=found, **options)
+            return generate_in_blocks(request, found)
     try:
         from distributed import Client
 
@@ -44,7 +46,7 @@ def generate_in_blocks(*arguments: Any, client: Any = None, **options: Any) -> V
             f"client must be a distributed.Client or the address of a scheduler; got "
             f"{with_article(type(client).__name__)}: give distributed.Client(cluster) for a cluster"
         )
-    return generate_on_dask(*arguments, client=client, **options)
+    return generate_on_dask(request, client=client)
 
 
 @contextmanager

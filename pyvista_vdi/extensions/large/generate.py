@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,12 +12,10 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, Indices
 from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task, light_entering
 from pyvista_vdi.extensions.large.reading import Plan
-from pyvista_vdi.generation.generate import Progress, made_from, report
+from pyvista_vdi.generation.generate import made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
-from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.chunked import ChunkedArray, Ranges
-from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 
@@ -29,16 +26,11 @@ NOWHERE = Rectangle(0, 0, 0, 0)
 
 
 def task_of(
-    volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
-    transfer_function: TransferFunction,
-    options: GenerationOptions,
-    chunks: Sequence[int],
-    block_bytes: int | None = None,
+    request: GenerationRequest, chunks: Sequence[int], block_bytes: int | None = None
 ) -> Task:
     """Return a VDI's task."""
-    width, height = check_window_size(window_size)
+    volume, options = request.volume, request.options
+    width, height = request.window_size
     require_room(0, (width, height))
     if volume.blanked is not None:
         raise UnsupportedError(
@@ -50,19 +42,17 @@ def task_of(
     if options.memory_limit is not None:
         most = min(most, options.memory_limit // _BLOCKS_IN_LIMIT)
     blocks = Blocks.of(volume, chunks, point_bytes, most)
-    gradients = transfer_function.gradient_opacities is not None
+    gradients = request.transfer_function.gradient_opacities is not None
     scalars = volume.finite_range() if gradients else (np.nan, np.nan)  # nothing else asks
-    camera = Camera.from_any(camera)
-    return Task.of(blocks, camera, (width, height), transfer_function, options, scalars)
+    return Task.of(blocks, request, scalars)
 
 
 def vdi_of(
     task: Task,
-    volume: Volume,
+    request: GenerationRequest,
     rows: Sequence[Rows],
     device_name: str,
     counted: Mapping[str, int],
-    metadata: Mapping[str, Any] | None,
 ) -> VDI:
     """Return the VDI of finished rows, from the lowest to the highest.
 
@@ -76,7 +66,11 @@ def vdi_of(
     )
     rays = task.rays()
     depth_origin = rays.forms(task.camera, task.size).rays.reference_depth
-    made_by = made_from(volume, task.transfer_function, task.options, rays, device_name)
+    made_by = made_from(
+        request.replace(transfer_function=task.transfer_function, options=task.options),
+        rays,
+        device_name,
+    )
     return VDI(
         task.camera,
         task.size,
@@ -91,7 +85,7 @@ def vdi_of(
             **made_by,
             "blocks": list(task.blocks.counts),
             **counted,
-            **(metadata or {}),
+            **request.metadata,
         },
     ).with_precision(task.options.precision)
 
@@ -126,31 +120,24 @@ def _with_ranges(volume: Volume, task: Task) -> ChunkedArray | None:
 
 
 def generate_chunked(
-    volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
-    transfer_function: TransferFunction,
-    options: GenerationOptions | None = None,
+    request: GenerationRequest,
     *,
-    device: Any = None,
-    progress: Progress | None = None,
-    metadata: Mapping[str, Any] | None = None,
     chunks: Sequence[int] | None = None,
     block_bytes: int | None = None,
-    **changes: Any,
 ) -> VDI:
     """Make a VDI of a volume block by block, each of which is read twice.
 
-    Parameters are those of :func:`~pyvista_vdi.generation.generate.generate_vdi`, and:
-
+    Parameters
+    ----------
+    request : GenerationRequest
+        As for :func:`~pyvista_vdi.generation.generate.generate_vdi`.
     chunks : (int, int, int), optional
         Where blocks may be cut: points along z, y and x; the array's own by default.
     block_bytes : int, optional
         Most bytes of a block's points, unless a chunk has more.
     """
-    options = GenerationOptions.of(options, changes)
-    chunks = chunks_of(volume, chunks)
-    task = task_of(volume, camera, window_size, transfer_function, options, chunks, block_bytes)
+    volume, device, progress = request.volume, request.device, request.progress
+    task = task_of(request, chunks_of(volume, chunks), block_bytes)
     blocks, halo = task.blocks, task.halo
     windows = blocks.windows(task.camera, task.size)
     report(progress, 0.0)
@@ -183,4 +170,4 @@ def generate_chunked(
         "points_read": sum(reading.read(block).points for block in [*order, *entering]),
         "runs_merged": sum(len(piece.runs) for piece in pieces),
     }
-    return vdi_of(task, volume, [rows], get_runtime(device).info.name, counted, metadata)
+    return vdi_of(task, request, [rows], get_runtime(device).info.name, counted)

@@ -46,10 +46,8 @@ from pyvista_vdi.extensions.large.passes import Rows, Seen, Task, light_entering
 from pyvista_vdi.extensions.large.reading import Plan, Read
 from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.generation.generate import Progress, report
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.store_identity import StoreIdentity
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 
@@ -67,20 +65,12 @@ _SHARES = (0.4, 0.4, 0.2)
 
 
 def generate_on_dask(
-    volume: Volume,
-    camera: Camera,
-    window_size: Sequence[int],
-    transfer_function: TransferFunction,
-    options: GenerationOptions | None = None,
+    request: GenerationRequest,
     *,
     client: Client,
     workers: Sequence[str] | None = None,
-    device: Any = None,
-    progress: Progress | None = None,
-    metadata: Mapping[str, Any] | None = None,
     chunks: Sequence[int] | None = None,
     block_bytes: int | None = None,
-    **changes: Any,
 ) -> VDI:
     """Make a VDI of a chunked volume on the workers of a cluster.
 
@@ -108,18 +98,17 @@ def generate_on_dask(
     VDIWarning
         If some workers have no device: they do nothing.
     """
-    options = GenerationOptions.of(options, changes)
+    volume, device = request.volume, request.device
     able = _workers_with_device(client, device, workers)
-    chunks = chunks_of(volume, chunks)
-    task = task_of(volume, camera, window_size, transfer_function, options, chunks, block_bytes)
-    run = _Run(client, task, volume, list(able), device, progress)
+    task = task_of(request, chunks_of(volume, chunks), block_bytes)
+    run = _Run(client, task, volume, list(able), device, request.progress)
     try:
         rows = run.rows()
     except BaseException:
         run.cancel()
         raise
     names = sorted(set(able.values()))
-    return vdi_of(task, volume, rows, ", ".join(names), run.counted, metadata)
+    return vdi_of(task, request, rows, ", ".join(names), run.counted)
 
 
 class _Run:

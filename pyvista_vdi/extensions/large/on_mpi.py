@@ -33,11 +33,11 @@ from pyvista_vdi.extensions.large.blocks import Blocks, Indices, Offset, Values
 from pyvista_vdi.extensions.large.generate import NOWHERE, vdi_of
 from pyvista_vdi.extensions.large.passes import Piece, Task, light_entering
 from pyvista_vdi.extensions.large.rows import balanced
-from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import three_wholes
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -152,16 +152,26 @@ def generate_on_mpi(
                 raise InvalidArgumentTypeError(
                     f"expected a {wanted.__name__}, got {type(thing).__name__}"
                 )
-        options = GenerationOptions.of(options, changes)
         own = Volume(values, name=name).load()
-        size, camera = check_window_size(window_size), Camera.from_any(camera)
+        options = GenerationOptions.of(options, changes)
+        whole: Any = SimpleNamespace(
+            name=name,
+            dimensions=grid.dimensions,
+            spacing=grid.spacing,
+            length=grid.length,
+            array=own.array,
+        )
+        size: Any = window_size
+        request = GenerationRequest(
+            whole, transfer_function, camera, size, options, device, metadata=metadata or {}
+        )
         first = three_wholes(first, _FIRST, 0)
         get_runtime(device)
         own_ends = own.finite_range() if np.isfinite(own.array).any() else (np.nan, np.nan)
     require_same(
         comm,
-        camera=camera.to_dict(),
-        window_size=size,
+        camera=request.camera.to_dict(),
+        window_size=request.window_size,
         grid=(grid.dimensions, grid.spacing, grid.origin, grid.direction.tolist()),
         transfer_function=transfer_function.to_dict(),
         # What devices may take differs, and lights are those of the first rank
@@ -171,7 +181,7 @@ def generate_on_mpi(
     blocks, ranks = _blocks(comm, grid, own.dimensions, first)
     low, high = zip(*comm.allgather(own_ends), strict=True)
     scalars = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
-    task = Task.of(blocks, camera, size, transfer_function, options, scalars)
+    task = Task.of(blocks, request, scalars)
     places = {rank: at for at, rank in ranks.items()}
     block = places[comm.rank]
     windows = blocks.windows(task.camera, task.size)
@@ -213,16 +223,9 @@ def generate_on_mpi(
     gathered, vdi = comm.gather(rows), None
     with together(comm, "putting the lists together"):
         if comm.rank == 0:
-            described: Any = SimpleNamespace(
-                name=name,
-                dimensions=grid.dimensions,
-                spacing=grid.spacing,
-                length=grid.length,
-                array=own.array,
-            )
             finished = [part for part in gathered if part is not None]
             device_name = get_runtime(device).info.name
-            vdi = vdi_of(task, described, finished, device_name, counted, metadata)
+            vdi = vdi_of(task, request, finished, device_name, counted)
     return vdi
 
 

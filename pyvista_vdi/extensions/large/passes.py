@@ -35,7 +35,7 @@ from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.float32_limits import held_unit_distance
-from pyvista_vdi.model.options import GenerationOptions, MediumOptions
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
@@ -147,13 +147,7 @@ class Task:
 
     @classmethod
     def of(
-        cls,
-        blocks: Blocks,
-        camera: Camera,
-        size: tuple[int, int],
-        transfer_function: TransferFunction,
-        options: GenerationOptions,
-        scalar_range: tuple[float, float],
+        cls, blocks: Blocks, request: GenerationRequest, scalar_range: tuple[float, float]
     ) -> Task:
         """Make defaults that follow from the whole grid explicit.
 
@@ -162,7 +156,7 @@ class Task:
         DeviceMemoryError
             If ambient occlusion is asked for, and its grid is too large to be made in one piece.
         """
-        grid = blocks.grid
+        grid, options = blocks.grid, request.options
         if options.ambient_occlusion is not None:
             asked = options.ambient_occlusion
             occlusion = OcclusionGrid.of(grid, asked)
@@ -174,12 +168,12 @@ class Task:
                     "a larger radius takes a coarser grid"
                 )
         step = checked_sample_distance(grid, options.sample_distance)
-        unit = transfer_function.unit_distance or grid.default_unit_distance
+        unit = request.transfer_function.unit_distance or grid.default_unit_distance
         return cls(
             blocks,
-            camera,
-            size,
-            transfer_function.replace(unit_distance=unit),
+            request.camera,
+            request.window_size,
+            request.transfer_function.replace(unit_distance=unit),
             GenerationOptions.of(options, {"sample_distance": step}),
             scalar_range,
         )

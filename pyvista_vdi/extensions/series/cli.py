@@ -65,7 +65,7 @@ def series(options: argparse.Namespace) -> int:
     if kinds[0] != "series":
         steps = _timed(steps, options.times)
     looks = classification(options)
-    Classification(looks, "series")  # refused before a volume is read
+    Classification.composited(looks, "series")  # refused before a volume is read
     target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
     # A writer's file grows step by step: it gets its name when it is whole, and all have been read
     with (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Iterable, Sequence, Sized
+from collections.abc import Iterable, Sequence, Sized
 from typing import Any
 
 import numpy as np
@@ -22,17 +22,22 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import check_callback
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
+from pyvista_vdi.model.options import (
+    GENERATION_NAMES,
+    GenerationOptions,
+    GenerationRequest,
+    QualityTarget,
+    declared,
+)
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import Progress
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, bytes_of, warn_missed
+from pyvista_vdi.quality.dial import bytes_of, warn_missed
 from pyvista_vdi.quality.generate_anywhere import generate_anywhere
 
-_DIAL = ("quality", "target_ssim", "target_fps", "max_bytes", "target_angle")
+_DIAL = tuple(declared(QualityTarget))
 _GRID = ("spacing", "origin")
-
-Progress = Callable[[float], object]
 
 
 def generate_series(
@@ -164,20 +169,18 @@ class StepMaker:
         self._size = check_window_size(window_size)
         self._device, self._client = device, client
         looks = {n: v for n, v in given.items() if n not in (*GENERATION_NAMES, *_DIAL, *_GRID)}
-        self._looks = Classification(looks, function, (*GENERATION_NAMES, *_DIAL, *_GRID))
-        dial: dict[str, Any] = {
-            "target_angle": TARGET_ANGLE,
-            **{n: given[n] for n in _DIAL if n in given},
-        }
-        self._dial = Dial.of(*[dial.get(name) for name in _DIAL])  # type: ignore[arg-type]
+        self._looks = Classification.composited(
+            looks, function, (*GENERATION_NAMES, *_DIAL, *_GRID)
+        )
+        self._target = QualityTarget(**{n: given[n] for n in _DIAL if n in given})
         options = {n: given[n] for n in GENERATION_NAMES if n in given}
-        if self._dial is None:
+        if not self._target:
             options.setdefault("precision", default_precision)
         self._options = GenerationOptions(**options)
         self._grid = {n: given[n] for n in _GRID if given.get(n) is not None}
         self._table: TransferFunction | None = None
         self._chosen: dict[str, Any] = {}
-        self._max_bytes = None if self._dial is None else self._dial.max_bytes
+        self._max_bytes = self._target.max_bytes
 
     def __call__(
         self,
@@ -201,24 +204,19 @@ class StepMaker:
         volume = self.volume(volume)
         # The first step's range is all steps', while a property's functions have theirs in each
         if self._table is None or self._looks.in_place:
-            self._table = self._looks.transfer_function(volume)
-        vdi = generate_anywhere(
+            self._table = self._looks.transfer_function_of(volume)
+        request = GenerationRequest(
             volume,
+            self._table,
             self._camera if camera is None else Camera.from_any(camera),
             self._size if window_size is None else check_window_size(window_size),
-            self._table,
-            self._dial,
             self._options,
-            client=self._client,
-            device=self._device,
-            progress=progress,
-            metadata={
-                "classification": self._looks.describe(),
-                "scalars": volume.name,
-                **self._chosen,
-            },
+            self._device,
+            progress,
+            {"classification": self._looks.describe(), "scalars": volume.name, **self._chosen},
         )
-        if self._dial is not None:
+        vdi = generate_anywhere(request, self._target, self._client)
+        if self._target:
             self._keep_the_choice(vdi)
         elif self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
             warn_external(
@@ -238,7 +236,7 @@ class StepMaker:
 
     def _keep_the_choice(self, vdi: VDI) -> None:
         """Take what the dial chose for the first step as the settings of all others."""
-        self._dial = None
+        self._target = QualityTarget()
         self._size = vdi.window_size
         # Missed targets are told once
         self._chosen = {"dial": {**vdi.metadata["dial"], "missed": []}}

@@ -34,7 +34,7 @@ def generate(options: argparse.Namespace) -> int:
     """Generate a set of VDIs and write it."""
     target = check_writable(with_suffix(Path(options.output), (files.SUFFIX,), "a set"))
     looks = classification(options)
-    Classification(looks, "set")  # refused before the volume is read
+    Classification.composited(looks, "set")  # refused before the volume is read
     occlusion = ambient_occlusion(options)
     volume = read_volume(options)
     start = time.perf_counter()

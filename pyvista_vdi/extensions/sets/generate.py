@@ -141,13 +141,13 @@ def generate_set(
             f"a window of {size[0]} x {size[1]} pixels has no SSIM to place views by: it takes "
             f"{SSIM_WINDOW} along each edge"
         )
-    looks = Classification(
+    looks = Classification.composited(
         {n: v for n, v in options.items() if n not in _OPTIONS}, "generate_set", _OPTIONS
     )
     read = as_volume(volume, looks.scalars, looks.preference)
     maker = ViewMaker(
         read,
-        looks.transfer_function(read),
+        looks.transfer_function_of(read),
         size,
         GenerationOptions(
             **{

@@ -6,7 +6,7 @@ import dataclasses
 import io
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.metrics import SSIM_WINDOW, compare_images
-from pyvista_vdi.model.options import (
-    GenerationOptions,
-)
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -105,18 +103,11 @@ class ViewMaker:
         corners = bounds_corners(self.volume.bounds)
         covering = covering_view(view, (width, height), corners)
         camera, size = covering or (view, (width, height))
-        return _lean(
-            generate_vdi(
-                self.volume,
-                camera,
-                size,
-                self._table,
-                self._options,
-                max_supersegments=max_supersegments,
-                device=self._device,
-                metadata=self._metadata,
-            )
+        options = replace(self._options, max_supersegments=max_supersegments)
+        request = GenerationRequest(
+            self.volume, self._table, camera, size, options, self._device, metadata=self._metadata
         )
+        return _lean(generate_vdi(request))
 
     def of(self, settings: SetSettings) -> Callable[[Camera], VDI]:
         """Return what makes the VDI of a view by these settings."""

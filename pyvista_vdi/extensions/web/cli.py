@@ -36,7 +36,7 @@ def serve(options: argparse.Namespace) -> int:
     from pyvista_vdi.extensions.web.server import serve as serve_volumes  # needs aiohttp
 
     arguments = classification(options)
-    Classification(arguments, "serve")  # refused before the volume is read
+    Classification.composited(arguments, "serve")  # refused before the volume is read
     serve_volumes(
         _Steps(options),
         host=options.host,

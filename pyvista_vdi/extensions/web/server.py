@@ -29,9 +29,10 @@ from pyvista_vdi.extensions.web.served_page import served_page
 from pyvista_vdi.extensions.web.session import Client
 from pyvista_vdi.extensions.web.source import Made, Source
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.drawing_options import checked_bound
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW, checked_bound
+from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web
@@ -432,7 +433,7 @@ def serve(
     MissingDependencyError
         If aiohttp is not installed.
     """
-    looks = Classification(classification, "serve", _NAMES)
+    looks = Classification.composited(classification, "serve", _NAMES)
     options = GenerationOptions(
         max_supersegments=max_supersegments,
         sample_distance=sample_distance,

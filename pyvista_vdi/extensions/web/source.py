@@ -21,7 +21,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.coverage import bounds_corners, view_in_sight
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -170,7 +170,7 @@ class Source:
 
         def build() -> TransferFunction:
             changes = {n: v for n, v in vars(wish.look).items() if v is not None}
-            return self._looks.changed(changes).transfer_function(volume)
+            return self._looks.changed(changes).transfer_function_of(volume)
 
         return self._contents.get(wish.content, build)
 
@@ -204,7 +204,7 @@ class Source:
         # Before the device is held: these wait for each other
         volume, look = self.volume(wish.step), self.transfer_function(wish)
         with self.runtime.background(cancelled):
-            vdi = generate_vdi(volume, camera, size, look, options, device=self.runtime)
+            vdi = generate_vdi(GenerationRequest(volume, look, camera, size, options, self.runtime))
         made = Made(wish, wish.view, level, vdi.window_size)
         self._keep(made, vdi)
         return made, vdi

@@ -176,8 +176,8 @@ def measure_tradeoff(
     >>> found = measure_tradeoff(brain, cmap="bone")  # doctest: +SKIP
     >>> found.front("frame")  # doctest: +SKIP
     """
-    classified = Classification(classification, "measure_tradeoff", _KEYWORDS)
-    volume = as_volume(volume, classified.scalars, classified.preference)
+    looks = Classification.composited(classification, "measure_tradeoff", _KEYWORDS)
+    volume = as_volume(volume, looks.scalars, looks.preference)
     size = check_window_size(window_size)
     view = filling_camera(volume.bounds, size) if camera is None else Camera.from_any(camera)
     check_count("repeats", repeats)
@@ -191,10 +191,10 @@ def measure_tradeoff(
     settings = sweep() if settings is None else tuple(dict.fromkeys(settings))
     if not settings:
         raise InvalidArgumentError("there are no settings to compare: give one or more")
-    table = classified.transfer_function(volume)
+    table = looks.transfer_function_of(volume)
     # What tells two transfer functions apart: the start of their JSON's SHA-256
     digest = hashlib.sha256(json.dumps(table.to_dict(), sort_keys=True).encode()).hexdigest()
-    described = classified.describe()
+    described = looks.describe()
     plan: dict[str, Any] = {
         "volume": {
             "name": name,

@@ -14,10 +14,14 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
+from pyvista_vdi.model.drawing_options import (
+    checked_bound,
+    checked_draw,
+    checked_policy,
+    checked_rate,
+)
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.regeneration_policy import checked_bound
-from pyvista_vdi.quality.render_mode import checked_draw
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
 from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
@@ -25,11 +29,7 @@ from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.interaction.regeneration import checked_policy
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import (
-    checked_image_distance,
-    checked_rate,
-)
+from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_image_distance
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, vtkWeakReference
 
 #: Painters, with their mappers held weakly. VTK's garbage collector deletes a mapper under a lock;

@@ -15,15 +15,15 @@ from pyvista_vdi.errors import (
     VDIError,
     warn_external,
 )
+from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, QualityTarget
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import Dial, warn_missed
-from pyvista_vdi.quality.probe import generate_by_dial
+from pyvista_vdi.quality.dial import warn_missed
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     UPDATE_TIME_STEP,
     announce,
@@ -53,7 +53,7 @@ class Request:
     screen: View
     generating: tuple[Camera, tuple[int, int]]  # V_O and its window, after coverage
     options: GenerationOptions
-    dial: Dial | None
+    target: QualityTarget | None
     device: Any
     metadata: dict[str, Any]  # what is added to the VDI's
     content: Any = field(repr=False)  # equal where what is generated from is, the view apart
@@ -64,9 +64,16 @@ class Request:
         return (self.content, self.generating)
 
     @property
-    def arguments(self) -> tuple[Volume, Camera, tuple[int, int], TransferFunction]:
-        """The first arguments of whatever generates."""
-        return (self.volume, *self.generating, self.transfer_function)
+    def generation(self) -> GenerationRequest:
+        """What is asked of whatever generates."""
+        return GenerationRequest(
+            self.volume,
+            self.transfer_function,
+            *self.generating,
+            self.options,
+            self.device,
+            metadata=self.metadata,
+        )
 
 
 class VDISource(SourceSettings):
@@ -267,21 +274,20 @@ class VDISource(SourceSettings):
         if self._vdi is None or self._request is None or request.key != self._request.key:
             self._vdi = self._generate(request)
             self._request = request
-            warn_missed(self._vdi)
+            if request.target is not None:
+                warn_missed(self._vdi)
         vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
         # A dial has chosen it only now, and a volume's bounds may change with time
         announce(outputs, self._vdi.window_size)
         ask_for_all([outputs])
 
     def _generate(self, request: Request) -> VDI:
-        return generate_by_dial(
-            *request.arguments,
-            request.dial,
-            request.options,
-            device=request.device,
-            progress=self._advance,
-            metadata=request.metadata,
-        )
+        asked = request.generation.replace(progress=self._advance)
+        if request.target is None:
+            return generate_vdi(asked)
+        from pyvista_vdi.quality.probe import generate_to_target
+
+        return generate_to_target(asked, request.target)
 
     def _make_request(
         self,
@@ -315,10 +321,10 @@ class VDISource(SourceSettings):
             View(camera, window_size),
             self._view(image, camera, window_size, warn=warn),
             options,
-            self._dial,
+            self._target,
             self._device,
             {"scalars": volume.name, **self._metadata},
-            (self._volume_key, table, options, self._dial, self._device, self._metadata),
+            (self._volume_key, table, options, self._target, self._device, self._metadata),
         )
 
     def _read(self, image: Any) -> Volume:

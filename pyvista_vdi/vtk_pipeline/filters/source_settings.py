@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial
-from pyvista_vdi.vtk_pipeline.filters.algorithm import (
-    DEVICE,
-    Algorithm,
-    Held,
-    accessors,
-    pair,
-    watch,
+from pyvista_vdi.model.options import GenerationOptions, QualityTarget
+from pyvista_vdi.model.types import (
+    CameraLike,
+    DeviceLike,
+    LightsLike,
+    MemoryLike,
+    OcclusionLike,
+    Progress,
 )
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, Held, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, require_image_port
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     check_property,
@@ -40,8 +39,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
 #: What a VDI's window covers.
 COVERAGES = ("bounds", "view")
 
-Progress = Callable[[float], object]
-
 #: Attributes of a source that are settings as they are.
 _PLAIN = (
     "_window_size",
@@ -49,30 +46,12 @@ _PLAIN = (
     "_scalars",
     "_preference",
     "_options",
-    "_dial",
+    "_target",
     "_device",
     "_lights",
     "_progress",
     "_metadata",
 )
-
-
-def _option(name: str, argument: str, meaning: str, more: str = "") -> tuple[Any, Any]:
-    """Return the setter and the getter of one of the :class:`GenerationOptions`, which check."""
-
-    def set_option(self: Any, value: Any) -> None:
-        self.SetOptions(replace(self.GetOptions(), **{name: value}))
-
-    sets = f"Set {meaning}.\n\n{more}As ``{name}`` of :func:`pyvista_vdi.generate`."
-    gets = f"Return {meaning}."
-    as_vtk = "".join(word.capitalize() for word in name.split("_"))
-    return pair(as_vtk, argument, (set_option, sets), (attrgetter(f"_options.{name}"), gets))
-
-
-def _checked_coverage(coverage: Any) -> str:
-    if coverage not in COVERAGES:
-        raise InvalidArgumentError(f"coverage must be 'bounds' or 'view'; got {coverage!r}")
-    return str(coverage)
 
 
 class SourceSettings(Algorithm):
@@ -95,7 +74,7 @@ class SourceSettings(Algorithm):
         self._scalars: str | None = None
         self._preference = "point"
         self._options = GenerationOptions()
-        self._dial: Dial | None = None
+        self._target: QualityTarget | None = None
         self._device: Any = None
         self._lights: Lights | None = None
         self._lit_by = vtkWeakReference()
@@ -154,7 +133,9 @@ class SourceSettings(Algorithm):
         """Return which array is taken where points and cells have one of that name."""
         return self._preference
 
-    def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
+    def SetCamera(
+        self, camera: CameraLike | None, model_transform: ArrayLike | None = None
+    ) -> None:
         """Set the generating view V_O.
 
         Parameters
@@ -222,10 +203,7 @@ class SourceSettings(Algorithm):
         """Return the screen's width and height in pixels."""
         return self._window_size
 
-    SetCoverage, GetCoverage = accessors(
-        "Coverage",
-        "_coverage",
-        "coverage",
+    def SetCoverage(self, coverage: str) -> None:
         """Choose what the VDI's window covers.
 
         Parameters
@@ -234,10 +212,14 @@ class SourceSettings(Algorithm):
             ``"view"``: the window as it is. ``"bounds"``: the smallest rectangle of the screen's
             pixel grid that contains the whole volume; where the eye is inside the volume's
             bounds, or they reach behind it, a ``VDIWarning`` is given and the window is used.
-        """,
-        "Return what the VDI's window covers.",
-        _checked_coverage,
-    )
+        """
+        if coverage not in COVERAGES:
+            raise InvalidArgumentError(f"coverage must be 'bounds' or 'view'; got {coverage!r}")
+        self._change("_coverage", str(coverage))
+
+    def GetCoverage(self) -> str:
+        """Return what the VDI's window covers."""
+        return self._coverage
 
     def SetVolumeProperty(self, prop: vtkVolumeProperty | None) -> None:
         """Set the volume property; later changes to it make the VDI out of date.
@@ -259,7 +241,7 @@ class SourceSettings(Algorithm):
         """Return the volume property."""
         return None if self._property is None else self._property.get()
 
-    def SetLights(self, lights: Any) -> None:
+    def SetLights(self, lights: LightsLike | None) -> None:
         """Set what a shaded volume is lit by.
 
         Parameters
@@ -295,46 +277,94 @@ class SourceSettings(Algorithm):
         """Return how the VDI is made."""
         return self._options
 
-    SetMaxSupersegments, GetMaxSupersegments = _option(
-        "max_supersegments", "limit", "the longest list, 1 to 4096"
-    )
-    SetCriterion, GetCriterion = _option(
-        "criterion", "criterion", "what decides where a list that must be shortened is cut"
-    )
-    SetSampleDistance, GetSampleDistance = _option(
-        "sample_distance",
-        "distance",
-        "the length of a step, model units; ``None`` is half the smallest spacing",
-    )
-    SetTolerance, GetTolerance = _option(
-        "tolerance",
-        "tolerance",
-        "the error that may be traded for shorter lists; 0 merges only what is homogeneous",
-    )
-    SetViewCone, GetViewCone = _option(
-        "view_cone",
-        "degrees",
-        "the half angle of the cone of views that must be served, 0 to 90 degrees",
-    )
-    SetPrecision, GetPrecision = _option(
-        "precision",
-        "precision",
-        'what a supersegment takes, where no dial chooses it: "exact", "16-byte" or "8-byte"',
-    )
-    SetAmbientOcclusion, GetAmbientOcclusion = _option(
-        "ambient_occlusion",
-        "occlusion",
-        "whether what is hidden from the light around it is darkened; ``None`` where it is not",
-        "``None`` or ``False``: no, which is the default; ``True``: with the default radius; a\n"
-        "number: with this radius, model units; or an ``AmbientOcclusion``.\n\n",
-    )
-    SetMemoryLimit, GetMemoryLimit = _option(
-        "memory_limit",
-        "limit",
-        "the most bytes that generating may take on the device, if they are limited",
-        'Bytes, or a text such as ``"2 GiB"``; ``None``, the default, is what the device has. The\n'
-        "estimate whether a view needs a VDI of its own keeps to the limit by itself.\n\n",
-    )
+    def _set(self, **option: Any) -> None:
+        self.SetOptions(replace(self._options, **option))
+
+    def SetMaxSupersegments(self, limit: int) -> None:
+        """Set the longest list, 1 to 4096; ``max_supersegments`` of ``generate``."""
+        self._set(max_supersegments=limit)
+
+    def GetMaxSupersegments(self) -> int:
+        """Return the longest list, 1 to 4096."""
+        return self._options.max_supersegments
+
+    def SetCriterion(self, criterion: str) -> None:
+        """Set what decides where a list that must be shortened is cut.
+
+        As ``criterion`` of :func:`pyvista_vdi.generate`.
+        """
+        self._set(criterion=criterion)
+
+    def GetCriterion(self) -> str:
+        """Return what decides where a list that must be shortened is cut."""
+        return self._options.criterion
+
+    def SetSampleDistance(self, distance: float | None) -> None:
+        """Set the length of a step, model units; ``None`` is half the smallest spacing.
+
+        As ``sample_distance`` of :func:`pyvista_vdi.generate`.
+        """
+        self._set(sample_distance=distance)
+
+    def GetSampleDistance(self) -> float | None:
+        """Return the length of a step, model units; ``None`` is half the smallest spacing."""
+        return self._options.sample_distance
+
+    def SetTolerance(self, tolerance: float) -> None:
+        """Set the error that may be traded for shorter lists; ``tolerance`` of ``generate``."""
+        self._set(tolerance=tolerance)
+
+    def GetTolerance(self) -> float:
+        """Return the error that may be traded for shorter lists."""
+        return self._options.tolerance
+
+    def SetViewCone(self, degrees: float) -> None:
+        """Set the half angle of the cone of views that must be served, 0 to 90 degrees.
+
+        As ``view_cone`` of :func:`pyvista_vdi.generate`.
+        """
+        self._set(view_cone=degrees)
+
+    def GetViewCone(self) -> float:
+        """Return the half angle of the cone of views that must be served, 0 to 90 degrees."""
+        return self._options.view_cone
+
+    def SetPrecision(self, precision: str) -> None:
+        """Set what a supersegment takes, where no target chooses it.
+
+        As ``precision`` of :func:`pyvista_vdi.generate`.
+        """
+        self._set(precision=precision)
+
+    def GetPrecision(self) -> str:
+        """Return what a supersegment takes, where no target chooses it."""
+        return self._options.precision
+
+    def SetAmbientOcclusion(self, occlusion: OcclusionLike | None) -> None:
+        """Set whether what is hidden from the light around it is darkened.
+
+        ``None`` or ``False``: no, which is the default; ``True``: with the default radius; a
+        number: with this radius, model units; or an ``AmbientOcclusion``.
+        As ``ambient_occlusion`` of :func:`pyvista_vdi.generate`.
+        """
+        self._set(ambient_occlusion=occlusion)
+
+    def GetAmbientOcclusion(self) -> AmbientOcclusion | None:
+        """Return whether what is hidden from the light around it is darkened."""
+        return self._options.ambient_occlusion
+
+    def SetMemoryLimit(self, limit: MemoryLike | None) -> None:
+        """Set the most bytes that generating may take on the device, if they are limited.
+
+        Bytes, or a text such as ``"2 GiB"``; ``None``, the default, is what the device has. The
+        estimate whether a view needs a VDI of its own keeps to the limit by itself.
+        As ``memory_limit`` of :func:`pyvista_vdi.generate`.
+        """
+        self._set(memory_limit=limit)
+
+    def GetMemoryLimit(self) -> int | None:
+        """Return the most bytes that generating may take on the device, if they are limited."""
+        return self._options.memory_limit
 
     def SetDial(
         self,
@@ -342,10 +372,10 @@ class SourceSettings(Algorithm):
         *,
         target_ssim: float | None = None,
         target_fps: float | None = None,
-        max_bytes: int | None = None,
-        target_angle: float = TARGET_ANGLE,
+        max_bytes: float | None = None,
+        target_angle: float = 30.0,
     ) -> None:
-        """Have settings chosen by what the VDI is to reach; without arguments, no longer.
+        """Choose settings by what the VDI is to reach; without arguments, no longer.
 
         It chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to
         have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata["dial"]`` says what it
@@ -361,14 +391,25 @@ class SourceSettings(Algorithm):
         InvalidArgumentError
             If one is out of range, or they contradict each other.
         """
-        dial = Dial.of(quality, target_ssim, target_fps, max_bytes, target_angle)
-        self._change("_dial", dial)
+        self.SetTarget(
+            QualityTarget.checked(quality, target_ssim, target_fps, max_bytes, target_angle)
+        )
 
-    def GetDial(self) -> Dial | None:
+    def SetTarget(self, target: QualityTarget) -> None:
+        """Choose settings by what the VDI is to reach, as by :meth:`SetDial`."""
+        self._change("_target", target or None)
+
+    def GetDial(self) -> QualityTarget | None:
         """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
-        return self._dial
+        return self._target
 
-    SetDevice, GetDevice = accessors("Device", "_device", "device", *DEVICE)
+    def SetDevice(self, device: DeviceLike | None) -> None:
+        """Choose the OpenCL device; ``None`` is the default one."""
+        self._change("_device", device)
+
+    def GetDevice(self) -> Any:
+        """Return the device as it was set."""
+        return self._device
 
     def SetProgressCallback(self, progress: Progress | None) -> None:
         """Set a callable that gets the fraction done; if it returns ``False`` the work stops.
@@ -386,7 +427,7 @@ class SourceSettings(Algorithm):
             self._given.watch(Algorithm.Modified if self._track else None)
 
     def _observe_property(self) -> None:
-        """Let changes to the property or its functions reach this algorithm's time stamp."""
+        """Modify this algorithm whenever the property or one of its functions is modified."""
         for watched, tag in self._observed:
             watched.get().RemoveObserver(tag)
         self._observed = []

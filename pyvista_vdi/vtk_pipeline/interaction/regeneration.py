@@ -6,9 +6,9 @@ import math
 import time
 import weakref
 from collections.abc import Callable
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.drawing_options import Policy
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundGeneration
@@ -24,22 +24,10 @@ from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimate, Estimation
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 
-Policy: TypeAlias = "Literal['auto', 'never'] | Callable[[VDIStatus], object]"
-
 #: Seconds between two estimates while the view moves: each takes time from the frames.
 _ESTIMATE_PERIOD_IN_MOTION = 0.5
 #: Seconds without another view after which the view is at rest.
 _SETTLED = 0.15
-
-
-def checked_policy(policy: Any) -> Policy:
-    """Return ``"auto"``, ``"never"`` or a callable; refuse anything else."""
-    if policy in ("auto", "never") or callable(policy):
-        return policy  # type: ignore[no-any-return]
-    raise InvalidArgumentError(
-        "regenerate must be 'auto', 'never' or a callable that takes a VDIStatus and says whether "
-        f"to regenerate; got {policy!r}"
-    )
 
 
 class Regeneration:
@@ -246,13 +234,7 @@ class Regeneration:
             self._background, self._device = BackgroundGeneration(device), device
         self._estimation.cancel()
         self._target = request
-        self._background.start(
-            *request.arguments,
-            request.options,
-            key=request.key,
-            dial=request.dial,
-            metadata=request.metadata,
-        )
+        self._background.start(request.generation, key=request.key, target=request.target)
 
     def _drop_if_outdated(self) -> None:
         """Cancel a VDI that is made for a view which the hand has left behind."""

@@ -51,16 +51,6 @@ _KNOWN_CAMERAS = 16
 _clocks: dict[str, weakref.ref[WindowClock]] = {}
 
 
-def checked_rate(name: str, value: Any) -> float:
-    """Return a rate in frames per second; 0 or above, finite."""
-    rate = as_float(value)
-    if isinstance(value, bool) or not 0 <= rate < math.inf:
-        raise InvalidArgumentError(
-            f"{name} must be a number of frames per second, 0 or above; got {value!r}"
-        )
-    return rate
-
-
 def checked_image_distance(value: Any) -> float:
     """Return for how many pixels along each edge a ray is cast; 1 to 100, as far as VTK goes."""
     distance = as_float(value)

@@ -11,14 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawing import generate_chunked, generate_vdi
 from PIL import Image
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.insitu import InSitu
-from pyvista_vdi.extensions.large.generate import generate_chunked
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.quality.probe import turned
 

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from drawing import generate_chunked, generate_vdi, request
 from runtimes import fresh_runtime
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
@@ -14,11 +15,10 @@ from pyvista_vdi import Shading, TransferFunction, Volume
 from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError
 from pyvista_vdi.extensions.large.blocks import Blocks, Halo
-from pyvista_vdi.extensions.large.generate import generate_chunked, task_of
+from pyvista_vdi.extensions.large.generate import task_of
 from pyvista_vdi.extensions.large.passes import Piece, light_entering
-from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import CRITERIA, GenerationOptions
+from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.quality.probe import turned
 
 HALOS = [Halo(0, 1), Halo(1, 3)]
@@ -235,7 +235,7 @@ def first_passes(task, volume, blocks=None):
 
 def first_depths(volume, camera, function, chunks):
     """Return the sums of the optical depths that the first pass finds in all blocks."""
-    task = task_of(volume, camera, WINDOW, function, GenerationOptions(), chunks, 1)
+    task = task_of(request(volume, camera, WINDOW, function), chunks, 1)
     total = np.zeros(WINDOW[::-1])
     windows, seen = first_passes(task, volume)
     for block, window in windows.items():
@@ -287,8 +287,8 @@ def test_runs_are_joined_at_faces_where_they_are_alike(interpolation, behind, ex
 def test_rows_do_not_depend_on_where_they_are_cut():
     volume = volume_of("uint8")
     camera = VIEWS["all of it"](volume)
-    options = GenerationOptions(max_supersegments=5)
-    task = task_of(volume, camera, WINDOW, transfer_for(volume), options, (8, 8, 8), 1)
+    asked = request(volume, camera, WINDOW, transfer_for(volume), max_supersegments=5)
+    task = task_of(asked, (8, 8, 8), 1)
     blocks, halo = task.blocks, task.halo
     windows, seen = first_passes(task, volume)
     pieces = []
@@ -322,7 +322,7 @@ def test_rows_of_a_piece():
 def test_known_ranges_leave_blocks_unread():
     volume = volume_of("uint8")
     camera = VIEWS["all of it"](volume)
-    task = task_of(volume, camera, WINDOW, transfer_for(volume), GenerationOptions(), (8, 8, 8), 1)
+    task = task_of(request(volume, camera, WINDOW, transfer_for(volume)), (8, 8, 8), 1)
     blocks = task.blocks
     windows, seen = first_passes(task, volume)
     ranges = blocks.to_chunks(

@@ -14,6 +14,7 @@ pytest.importorskip("distributed", reason="dask.distributed is not installed (ex
 import dask
 import dask.array as da
 from distributed import Client, LocalCluster
+from drawing import generate_chunked, generate_on_dask
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 from pyvista_vdi import Volume, generate, open_volume
@@ -26,8 +27,6 @@ from pyvista_vdi.errors import (
     NoDeviceError,
     VDIWarning,
 )
-from pyvista_vdi.extensions.large.generate import generate_chunked
-from pyvista_vdi.extensions.large.on_dask import generate_on_dask
 from pyvista_vdi.extensions.large.rows import balanced
 
 #: Seconds within which a worker starts on the busiest machine; more is a worker that never does.

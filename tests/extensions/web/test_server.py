@@ -61,7 +61,7 @@ def own_server(default_runtime):
     with contextlib.ExitStack() as stack:
 
         def make(**options):
-            looks = Classification(LOOK, "serve")
+            looks = Classification.composited(LOOK, "serve")
             source = Source([HIGH], looks, GenerationOptions(precision="8-byte"), lists=10**6)
             return stack.enter_context(Server(source, port=0, **options).start())
 

@@ -8,12 +8,11 @@ ParaView's properties over VTK algorithms that know nothing of ParaView.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
-from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkWeakReference
+from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import (
     vtkDataObject,
     vtkImageData,
@@ -36,8 +35,15 @@ except ImportError as error:
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.extensions.large.on_mpi import together
 from pyvista_vdi.extensions.large.vtk_ranks import RanksVDISource, communicator, is_first_rank
+from pyvista_vdi.extensions.paraview.parts.client import Client, say
+from pyvista_vdi.extensions.paraview.parts.looking import Looking
+from pyvista_vdi.extensions.paraview.parts.properties import (
+    DEVICE_XML,
+    SOURCE_XML,
+    TIMES_XML,
+    VIEW_XML,
+)
 from pyvista_vdi.io.files import holds
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce_times, wanted_time, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import (
@@ -51,175 +57,6 @@ from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 paraview_plugin_name = "VDI"
 paraview_plugin_version = __version__
 
-#: Value of the property View that means the camera properties.
-_CAMERA = 1
-
-#: Camera properties of our filters and of ParaView's render views alike: kind, default, domain.
-_CAMERA_PROPERTIES = {
-    "CameraPosition": ("Double", "0 0 1", ""),
-    "CameraFocalPoint": ("Double", "0 0 0", ""),
-    "CameraViewUp": ("Double", "0 1 0", ""),
-    "CameraViewAngle": ("Double", "30", ""),
-    "CameraParallelProjection": ("Int", "0", '<BooleanDomain name="bool" />'),
-    "CameraParallelScale": ("Double", "1", ""),
-}
-
-_WITH_CAMERA = """<Hints><PropertyWidgetDecorator type="GenericDecorator" mode="visibility"
-                         property="View" value="1" /></Hints>"""
-
-_CAMERA_XML = "".join(
-    f"""
-<{kind}VectorProperty name="{name}" command="Set{name}" number_of_elements="{len(default.split())}"
-                      default_values="{default}">{domain}{_WITH_CAMERA}</{kind}VectorProperty>"""
-    for name, (kind, default, domain) in _CAMERA_PROPERTIES.items()
-)
-
-#: What decides a view: our two filters have it in common. {default} is what View = 0 means, {size}
-#: the default window.
-_VIEW_XML = f"""
-<IntVectorProperty name="WindowSize" command="SetSize" number_of_elements="2"
-                   default_values="{{size}}">
-  <IntRangeDomain name="range" min="{{least}} {{least}}" />
-  <Documentation>Width and height in pixels. {{note}}</Documentation>
-</IntVectorProperty>
-<IntVectorProperty name="View" command="SetView" number_of_elements="1" default_values="0">
-  <EnumerationDomain name="enum">
-    <Entry value="0" text="{{default}}" /><Entry value="{_CAMERA}" text="Camera" />
-  </EnumerationDomain>
-  <Documentation>Where the eye is before it is turned.</Documentation>
-</IntVectorProperty>
-{_CAMERA_XML}
-<DoubleVectorProperty name="Azimuth" command="SetAzimuth" number_of_elements="1"
-                      default_values="0">
-  <DoubleRangeDomain name="range" min="-180" max="180" />
-  <Documentation>Turns the view about its up direction through the focal point,
-  degrees.</Documentation>
-</DoubleVectorProperty>
-<DoubleVectorProperty name="Elevation" command="SetElevation" number_of_elements="1"
-                      default_values="0">
-  <DoubleRangeDomain name="range" min="-90" max="90" />
-  <Documentation>Lifts the view after turning it, degrees.</Documentation>
-</DoubleVectorProperty>
-<Property name="TakeActiveView" label="Take the active view" command="TakeActiveView"
-          panel_widget="command_button">
-  <Documentation>Copy the active render view's camera and size into these properties. Client and
-  server must be one process.</Documentation>
-</Property>
-"""
-
-_DEVICE_XML = """
-<StringVectorProperty name="Device" command="SetDeviceName" number_of_elements="1"
-                      default_values="" panel_visibility="advanced">
-  <Documentation>OpenCL device; empty: the best one. `pyvista-vdi devices` lists
-  them.</Documentation>
-</StringVectorProperty>
-"""
-
-_REFLECTION_XML = "".join(
-    f"""
-<DoubleVectorProperty name="{name}" command="Set{name}" number_of_elements="1"
-                      default_values="{default}" panel_visibility="advanced" />"""
-    for name, default in (("Ambient", 0), ("Diffuse", 1), ("Specular", 0), ("SpecularPower", 1))
-)
-
-_SOURCE_XML = f"""
-<StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5"
-                      element_types="0 0 0 0 2" animateable="0">
-  <ArrayListDomain name="array_list" attribute_type="Scalars">
-    <RequiredProperties><Property name="Input" function="Input" /></RequiredProperties>
-  </ArrayListDomain>
-  <Documentation>The array that is classified.</Documentation>
-</StringVectorProperty>
-<ProxyProperty name="ColorFunction" command="SetColorFunction">
-  <ProxyGroupDomain name="groups"><Group name="lookup_tables" /></ProxyGroupDomain>
-  <Documentation>A colour transfer function; by default black to white over the scalars'
-  range.</Documentation>
-</ProxyProperty>
-<ProxyProperty name="OpacityFunction" command="SetOpacityFunction">
-  <ProxyGroupDomain name="groups"><Group name="piecewise_functions" /></ProxyGroupDomain>
-  <Documentation>An opacity transfer function; by default 0 to 1 over the scalars'
-  range.</Documentation>
-</ProxyProperty>
-<Property name="TakeTransferFunctions" label="Take the array's colours and opacities"
-          command="TakeTransferFunctions" panel_widget="command_button">
-  <Documentation>Use the transfer functions that ParaView has for this array, and follow their
-  changes. Client and server must be one process.</Documentation>
-</Property>
-<DoubleVectorProperty name="ScalarOpacityUnitDistance" command="SetUnitDistance"
-                      number_of_elements="1" default_values="0">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>Length over which the opacity function's opacities are reached, in the volume's
-  units. 0: the diagonal over the mean number of points along an edge.</Documentation>
-</DoubleVectorProperty>
-<IntVectorProperty name="InterpolationType" command="SetInterpolation" number_of_elements="1"
-                   default_values="1">
-  <EnumerationDomain name="enum">
-    <Entry value="0" text="Nearest" /><Entry value="1" text="Linear" />
-  </EnumerationDomain>
-</IntVectorProperty>
-<IntVectorProperty name="Shade" command="SetShade" number_of_elements="1" default_values="0">
-  <BooleanDomain name="bool" />
-  <Documentation>Light the volume by one headlight at the generating view.</Documentation>
-</IntVectorProperty>
-{_REFLECTION_XML}
-<IntVectorProperty name="AmbientOcclusion" command="SetOcclusion" number_of_elements="1"
-                   default_values="0">
-  <BooleanDomain name="bool" />
-  <Documentation>Darken what is hidden from the light around it.</Documentation>
-</IntVectorProperty>
-<DoubleVectorProperty name="AmbientOcclusionRadius" command="SetOcclusionRadius"
-                      number_of_elements="1" default_values="0" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>How far around it that is looked for, in the volume's units. 0: the default
-  radius.</Documentation>
-</DoubleVectorProperty>
-<IntVectorProperty name="MaxSupersegments" command="SetMaxSupersegments" number_of_elements="1"
-                   default_values="20">
-  <IntRangeDomain name="range" min="1" max="4096" />
-  <Documentation>Longest list of a pixel.</Documentation>
-</IntVectorProperty>
-<DoubleVectorProperty name="SampleDistance" command="SetStep" number_of_elements="1"
-                      default_values="0" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>Length of a step along a ray, in the volume's units. 0: half the smallest
-  spacing.</Documentation>
-</DoubleVectorProperty>
-<DoubleVectorProperty name="Tolerance" command="SetTolerance" number_of_elements="1"
-                      default_values="0" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>Error that may be traded for shorter lists.</Documentation>
-</DoubleVectorProperty>
-<DoubleVectorProperty name="ViewCone" command="SetViewCone" number_of_elements="1"
-                      default_values="60" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" max="90" />
-  <Documentation>Half angle of the cone of new views that must be served, degrees.</Documentation>
-</DoubleVectorProperty>
-<StringVectorProperty name="Coverage" command="SetCoverage" number_of_elements="1"
-                      default_values="view">
-  <StringListDomain name="list"><String value="view" /><String value="bounds" /></StringListDomain>
-  <Documentation>view: the VDI covers the window. bounds: the whole volume, whatever part of it the
-  window shows.</Documentation>
-</StringVectorProperty>
-"""
-
-
-#: The times that an algorithm announces, for ParaView's animation.
-_TIMES_XML = """
-<DoubleVectorProperty name="TimestepValues" repeatable="1" information_only="1"
-                      si_class="vtkSITimeStepsProperty">
-  <TimeStepsInformationHelper />
-</DoubleVectorProperty>
-"""
-
-
-def _of_lens(name: str, kind: Callable[[Any], Any] = lambda value: value) -> Any:
-    """Return a method that sets one of the camera's arguments, a number or three."""
-
-    def set_it(self: Any, *value: Any) -> None:
-        self._change("_lens", {**self._lens, name: value if len(value) > 1 else kind(value[0])})
-
-    return set_it
-
 
 def _of_looks(setter: str) -> Any:
     """Return a method that sets what a setter of the source's volume property sets."""
@@ -231,70 +68,16 @@ def _of_looks(setter: str) -> Any:
     return set_it
 
 
-class _Looking(Algorithm):
-    """The properties of a view: an algorithm with ``SetCamera`` gets them as a camera."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._camera_chosen = False
-        self._lens: dict[str, Any] = {
-            "position": (0.0, 0.0, 1.0),
-            "focal_point": (0.0, 0.0, 0.0),
-            "view_up": (0.0, 1.0, 0.0),
-        }
-
-    def SetView(self, which: int) -> None:
-        """Choose between the default view and the camera properties."""
-        self._change("_camera_chosen", which == _CAMERA)
-
-    SetCameraPosition = _of_lens("position")
-    SetCameraFocalPoint = _of_lens("focal_point")
-    SetCameraViewUp = _of_lens("view_up")
-    SetCameraViewAngle = _of_lens("view_angle")
-    SetCameraParallelProjection = _of_lens("parallel_projection", bool)
-    SetCameraParallelScale = _of_lens("parallel_scale")
-
-    def SetSize(self, width: int, height: int) -> None:
-        """Set the window; 0 is the default one."""
-        self.SetWindowSize((width, height) if width and height else None)
-
-    def SetDeviceName(self, name: str | None) -> None:
-        """Choose the OpenCL device; empty is the default one."""
-        self.SetDevice(name or None)
-
-    def TakeActiveView(self) -> None:
-        """Copy the active view's camera and size into the properties."""
-        client = _Client.of(self)
-        if client is None:
-            return
-        view = client.manager.GetSelectionModel("ActiveView").GetCurrentProxy()
-        if view is None or view.GetProperty("CameraPosition") is None:
-            _say(self, "the active view is no render view: click into one, or type its camera in")
-            return
-        view.SynchronizeCameraProperties()
-        client.set("View", [_CAMERA])
-        for name in _CAMERA_PROPERTIES:
-            client.set(name, client.values(name, view))
-        client.set("WindowSize", client.values("ViewSize", view))
-        client.set("Azimuth", [0.0])
-        client.set("Elevation", [0.0])
-        client.proxy.UpdateVTKObjects()
-
-    def _given_camera(self) -> Any:
-        # Made as late as this: set one at a time, the properties may pass through no camera at all
-        return Camera(**self._lens) if self._camera_chosen else None
-
-
 @smproxy.filter(name="VDISource", label="VDI Source", support_reload=False)
 @smhint.xml('<ShowInMenu category="VDI" />')
 @smproperty.xml(
-    _SOURCE_XML
-    + _VIEW_XML.format(default="The volume fills the window", size="1280 720", least=1, note="")
-    + _DEVICE_XML
+    SOURCE_XML
+    + VIEW_XML.format(default="The volume fills the window", size="1280 720", least=1, note="")
+    + DEVICE_XML
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
-class VDISource(_Looking, RanksVDISource):
+class VDISource(Looking, RanksVDISource):
     """A volume's VDI: :class:`pyvista_vdi.VDISource`, and a view and a ramp by default."""
 
     def __init__(self) -> None:
@@ -363,7 +146,7 @@ class VDISource(_Looking, RanksVDISource):
             vtkSMTransferFunctionProxy,
         )
 
-        client = _Client.of(self)
+        client = Client.of(self)
         name = client.values("Scalars")[4] if client else None
         if client is None or not name:
             return
@@ -433,14 +216,14 @@ class VDISource(_Looking, RanksVDISource):
 @smproxy.filter(name="VDIToImage", label="VDI To Image", support_reload=False)
 @smhint.xml('<ShowInMenu category="VDI" /><RepresentationType view="RenderView" type="Slice" />')
 @smproperty.xml(
-    _VIEW_XML.format(
+    VIEW_XML.format(
         default="The VDI's own", size="0 0", least=0, note="0: that of the VDI's pictures."
     )
-    + _DEVICE_XML
+    + DEVICE_XML
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
-class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
+class VDIToImage(Looking, vtk_pipeline.VDIToImage):
     """A picture of a VDI: :class:`pyvista_vdi.vtk_pipeline.VDIToImage`."""
 
     def __init__(self) -> None:
@@ -455,11 +238,11 @@ class VDIToImage(_Looking, vtk_pipeline.VDIToImage):
         self.SetCamera(self._given_camera())
         super()._execute(inputs, outputs)
         if not self._watching:
-            self._watching = _Client.watch(self, "RegisterEvent", VDIToImage._show_as_it_is)
+            self._watching = Client.watch(self, "RegisterEvent", VDIToImage._show_as_it_is)
 
     def _show_as_it_is(self) -> None:
         """Turn off *Map Scalars*, once, wherever the picture has just been shown."""
-        client = _Client.of(self, silent=True)
+        client = Client.of(self, silent=True)
         for name, representation in client.representations() if client else ():
             mapped = representation.GetProperty("MapScalars")
             if name not in self._shown and mapped is not None:
@@ -496,13 +279,13 @@ class VDIInScene(Algorithm):
         outline.SetBounds(self._vdi.bounds)
         outline.Update()
         vtkPolyData.GetData(outputs, 0).ShallowCopy(outline.GetOutput())
-        if not self._watching and _Client.of(self) is not None:
-            self._watching = _Client.watch(self, "RegisterEvent", VDIInScene._join_views)
+        if not self._watching and Client.of(self) is not None:
+            self._watching = Client.watch(self, "RegisterEvent", VDIInScene._join_views)
         self._join_views()
 
     def _join_views(self) -> None:
         """Put an actor into each render view that has none; its frames decide if it is seen."""
-        client = _Client.of(self, silent=True)
+        client = Client.of(self, silent=True)
         for view in client.views() if client else ():
             name = view.GetGlobalIDAsString()
             if self._vdi is None or name in self._actors:
@@ -516,7 +299,7 @@ class VDIInScene(Algorithm):
 
     def visible_in(self, view: Any) -> bool:
         """Whether a view shows the output."""
-        client = _Client.of(self, silent=True)
+        client = Client.of(self, silent=True)
         shown = view.GetProperty("Representations")
         proxies = [shown.GetProxy(i) for i in range(shown.GetNumberOfProxies())]
         return client is not None and any(
@@ -566,7 +349,7 @@ def _enter(view: Any, actor: Any, algorithm: VDIInScene) -> None:
          <Hints><FileChooser extensions="vdi exr" file_description="Volumetric Depth Image" />
          </Hints>
        </StringVectorProperty>"""
-    + _TIMES_XML
+    + TIMES_XML
 )
 class VDIReader(vtk_pipeline.VDIReader):
     """VDIs from files, one per time step: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
@@ -617,7 +400,7 @@ class VDIReader(vtk_pipeline.VDIReader):
          <FileListDomain name="files" />
        </StringVectorProperty>
        <Property name="Refresh" command="Modified" panel_visibility="never" />"""
-    + _TIMES_XML
+    + TIMES_XML
 )
 class VDISeriesReader(vtk_pipeline.VDIReader):
     """The steps of a series, from one file: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
@@ -692,74 +475,4 @@ class VDIWriter(vtk_pipeline.VDIWriter):
                 for _ in images:  # which the first rank needs the others for
                     pass
         except (VDIError, OSError) as error:
-            _say(self, error)
-
-
-class _Client:
-    """ParaView's client side of an algorithm, where it lives in the same process."""
-
-    def __init__(self, manager: Any, proxy: Any) -> None:
-        self.manager = manager
-        self.proxy = proxy
-
-    @staticmethod
-    def _manager() -> Any:
-        from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager
-
-        if not vtkSMProxyManager.IsInitialized():
-            return None
-        return vtkSMProxyManager.GetProxyManager().GetActiveSessionProxyManager()
-
-    @classmethod
-    def of(cls, algorithm: Any, *, silent: bool = False) -> _Client | None:
-        """Return the client side, or ``None`` after having said why there is none."""
-        manager = cls._manager()
-        for i in range(manager.GetNumberOfProxies("sources") if manager else 0):
-            proxy = manager.GetProxy("sources", manager.GetProxyName("sources", i))
-            if proxy.GetClientSideObject() is algorithm:
-                return cls(manager, proxy)
-        if not silent:
-            problem = "client and server are two processes: set the properties from the client"
-            _say(algorithm, problem)
-        return None
-
-    @classmethod
-    def watch(cls, algorithm: Any, event: str, changed: Callable[[Any], None]) -> bool:
-        """Call ``changed(algorithm)`` at an event of the manager; return whether there is one."""
-        manager = cls._manager()
-        return manager is not None and bool(watch(manager, algorithm, changed, event))
-
-    def views(self) -> list[Any]:
-        """Return the proxies of render views."""
-        number = self.manager.GetNumberOfProxies("views")
-        names = [self.manager.GetProxyName("views", i) for i in range(number)]
-        views = [self.manager.GetProxy("views", name) for name in names]
-        return [view for view in views if hasattr(view.GetClientSideObject(), "GetRenderer")]
-
-    def representations(self) -> list[tuple[str, Any]]:
-        """Return the names and proxies of what shows the algorithm's output in views."""
-        found = []
-        for i in range(self.manager.GetNumberOfProxies("representations")):
-            name = self.manager.GetProxyName("representations", i)
-            proxy = self.manager.GetProxy("representations", name)
-            source = proxy.GetProperty("Input")
-            inputs = source.GetNumberOfProxies() if source is not None else 0
-            if inputs and source.GetProxy(0) is self.proxy:
-                found.append((name, proxy))
-        return found
-
-    def values(self, name: str, proxy: Any = None) -> list[Any]:
-        """Return a property's values, of this algorithm or of another proxy."""
-        prop = (proxy or self.proxy).GetProperty(name)
-        return [prop.GetElement(i) for i in range(prop.GetNumberOfElements())]
-
-    def set(self, name: str, values: list[Any]) -> None:
-        """Set a property's values; ``UpdateVTKObjects`` applies them."""
-        prop = self.proxy.GetProperty(name)
-        for i, value in enumerate(values):
-            prop.SetElement(i, value)
-
-
-def _say(algorithm: Any, problem: object) -> None:
-    text = f"{type(algorithm).__name__}: {problem}\n"
-    vtkOutputWindow.GetInstance().DisplayErrorText(text)
+            say(self, error)

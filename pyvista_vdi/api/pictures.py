@@ -1,0 +1,409 @@
+"""Raycast a VDI, several, or a volume, and pick: the public functions that make pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_flag
+from pyvista_vdi.model.classification import BLENDINGS, Classification, refuse_keywords
+from pyvista_vdi.model.collection import VDICollection
+from pyvista_vdi.model.inputs import as_vdi, as_volume
+from pyvista_vdi.model.options import MediumOptions
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import (
+    CameraLike,
+    ColorMapLike,
+    CroppingLike,
+    DeviceLike,
+    LightsLike,
+    MemoryLike,
+    OcclusionLike,
+    OpacityLike,
+    RangeLike,
+    ScalarsLike,
+    VDILike,
+    VolumeLike,
+    VTKObject,
+    WindowSize,
+)
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
+
+if TYPE_CHECKING:
+    from pyvista_vdi.raycasting.picking import Pick
+
+#: What is shown for one VDI: of a set that which is nearest to the view.
+Shown: TypeAlias = VDILike | VDICollection
+
+
+def render(
+    vdi: Shown | Sequence[Shown],
+    camera: CameraLike,
+    window_size: WindowSize | None = None,
+    *,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | Sequence[ArrayLike | None] | None = None,
+    cropping: CroppingLike | None = None,
+    opacity_multiplier: float | Sequence[float] = 1.0,
+    model_transforms: Sequence[ArrayLike] | None = None,
+    skip_empty: bool = True,
+    preview_samples: int | None = None,
+    transmittance_cutoff: float | None = None,
+    device: DeviceLike | None = None,
+) -> NDArray[np.float32]:
+    """Raycast a VDI, or several in one scene, from a new view.
+
+    Parameters
+    ----------
+    vdi : VDI or VDISet or vtkImageData, or list or tuple of them
+        What :func:`generate` or :func:`read` returned, or its VTK form (``pv.read("x.vdi")``).
+        A :class:`VDISet` shows what was made nearest to the view, by itself blended with what is
+        about as near.
+        Several are merged by depth along each ray; their order does not matter, to the last bit.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The new view V_N. Its model transform places the VDI's model frame in the world.
+    window_size : (int, int), optional
+        Width and height of the image in pixels; by default those the VDI was made for,
+        :attr:`VDI.picture_size`. Of several VDIs, it can be left out where all have the same.
+    opaque_depth : array_like of float32, shape (H, W), optional
+        Depth at which each ray ends: distance from the eye along the view direction, world
+        units, top row first; infinity where nothing is opaque.
+    clipping_planes : array_like of float, shape (k, 6), optional
+        Origin and normal of each plane, world coordinates; the side that the normal points to
+        is kept, as with VTK's mappers. They cut all of several VDIs; a list of such arrays, or of
+        ``None``, cuts each by its own.
+    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, optional
+        Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
+        :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, z_low and z_high of a box, or
+        a pair of those planes and the regions (flags, or ``"fence"``, ``"cross"`` ...). For
+        several VDIs a list with one of these, or ``None``, for each.
+    opacity_multiplier : float, default: 1.0
+        Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
+        the same as dividing the opacity unit distance by it. For several VDIs one for all, or a
+        list with one for each.
+    model_transforms : sequence of array_like of float, shape (4, 4), optional
+        Where the model frame of each of several VDIs is; the camera's model transform for all by
+        default.
+    skip_empty : bool, default: True
+        Pass by what is empty; the picture is the same to the last bit.
+    preview_samples : int, optional
+        Look a VDI up at so many points of each ray instead of intersecting its supersegments: an
+        approximation (paper section 5). A smaller ``window_size`` is the better one: see
+        docs/decisions/previews.md. For a single VDI only.
+    transmittance_cutoff : float, optional
+        A ray ends where less light than this is left, 0 to below 1; 10⁻⁶ by default. No channel
+        loses more than that: 0.004 changes a picture of 8 bits by one step at most, and saves a
+        fifth to two fifths of the work where things are opaque. For a single VDI only.
+    device : str, int or device, optional
+        Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
+
+    Returns
+    -------
+    numpy.ndarray
+        float32 (H, W, 4), premultiplied RGBA, top row first, no background blended in.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    view = Camera.from_any(camera)
+    look = (clipping_planes, cropping, opacity_multiplier, skip_empty)
+    if isinstance(vdi, list | tuple) or model_transforms is not None:
+        if preview_samples is not None:
+            raise InvalidArgumentError(
+                "preview_samples is for a single VDI: give several a smaller window_size"
+            )
+        if transmittance_cutoff is not None:
+            raise InvalidArgumentError(
+                "transmittance_cutoff is for a single VDI: leave it out for several"
+            )
+        from pyvista_vdi.raycasting.multi_vdi import render_vdis
+        from pyvista_vdi.raycasting.placed import common_window_size, placed_vdis
+
+        several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
+        seen = _seen_in_scene(several, view, model_transforms)
+        placed = placed_vdis(seen, view, model_transforms, *look)
+        size: Any = common_window_size(placed) if window_size is None else window_size
+        return render_vdis(placed, FrameRequest(view, size, RenderOptions(), opaque_depth, device))
+    options = RenderOptions.checked(*look, preview_samples, transmittance_cutoff)
+    shown: Any = vdi if _is_of_views(vdi) else as_vdi(vdi)
+    size = shown.picture_size if window_size is None else window_size
+    request = FrameRequest(view, size, options, opaque_depth, device)
+    if _is_of_views(shown):
+        from pyvista_vdi.raycasting.blend import blended
+
+        return blended(shown.parts(view), request)
+    from pyvista_vdi.raycasting.bands import render_fitting
+
+    return render_fitting(shown, request)
+
+
+def render_depth(
+    vdi: Shown,
+    camera: CameraLike,
+    window_size: WindowSize | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: CroppingLike | None = None,
+    opacity_multiplier: float = 1.0,
+    skip_empty: bool = True,
+    device: DeviceLike | None = None,
+) -> NDArray[np.float32]:
+    """Raycast a VDI for where it begins to be seen: :func:`pick` for every pixel of a view.
+
+    Parameters
+    ----------
+    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+    skip_empty, device
+        As for :func:`render`.
+    opacity_threshold, accumulated
+        What counts as a hit: as for :func:`pick`.
+
+    Returns
+    -------
+    numpy.ndarray
+        View depth of each pixel's hit, float32 (H, W), world units, top row first; infinite where
+        nothing is hit. It can be passed as another :func:`render`'s ``opaque_depth``.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    view = Camera.from_any(camera)
+    seen = _seen(vdi, view)
+    options = RenderOptions.checked(clipping_planes, cropping, opacity_multiplier, skip_empty)
+    size: Any = _picture_size(vdi, seen) if window_size is None else window_size
+    request = FrameRequest(view, size, options, opaque_depth, device)
+    from pyvista_vdi.raycasting.raycast import render_first_hits
+
+    return render_first_hits(seen, request, FirstHit.of(opacity_threshold, accumulated))
+
+
+def pick(
+    vdi: Shown,
+    camera: CameraLike,
+    pixel: Sequence[float],
+    window_size: WindowSize | None = None,
+    *,
+    opacity_threshold: float = DEFAULT_OPACITY,
+    accumulated: bool = True,
+    opaque_depth: float | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: CroppingLike | None = None,
+    opacity_multiplier: float = 1.0,
+) -> Pick | None:
+    """Return what a pixel shows of a VDI: the first supersegment that reaches an opacity.
+
+    Parameters
+    ----------
+    vdi : VDI or VDISet or vtkImageData
+        As for :func:`render`; of a set the hit is one of the VDI nearest to the view.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The view. Its model transform places the VDI's model frame in the world.
+    pixel : (float, float)
+        x and y in pixels, VTK's display coordinates: whole numbers are pixels' centres and y = 0
+        is the bottom row, so that pixel (x, y) is ``image[height - 1 - y, x]`` of a picture.
+    window_size : (int, int), optional
+        Width and height of the view in pixels; :attr:`VDI.picture_size` by default.
+    opacity_threshold : float
+        Opacity that the hit has to reach, at least 0 and less than 1; the default is that of
+        VTK's pickers for volumes. With 0, whatever absorbs light at all is hit.
+    accumulated : bool, default: True
+        Compare the opacity of the ray from its beginning, 1 - exp(-(tau_0 + ... + tau_k)): the hit
+        is the first supersegment with which the ray has become as opaque as that. ``False``
+        compares each supersegment's own, 1 - exp(-tau_k) over the length that the ray crosses
+        of it, and looks through haze; but it depends on how finely the lists are cut, and where
+        the ray runs across the lists, it crosses little of each.
+    opaque_depth : float, optional
+        View depth at which the ray ends, world units.
+    clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+
+    Returns
+    -------
+    Pick or None
+        The supersegment, and where the ray enters it; ``None`` where nothing is hit.
+
+    Raises
+    ------
+    InvalidVDIError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+
+    Notes
+    -----
+    A single ray, walked in float64 on the host: no device is needed.
+    """
+    view = Camera.from_any(camera)
+    seen = _seen(vdi, view)
+    options = RenderOptions.checked(clipping_planes, cropping, opacity_multiplier)
+    size: Any = _picture_size(vdi, seen) if window_size is None else window_size
+    from pyvista_vdi.raycasting.picking import pick_vdi
+
+    request = FrameRequest(view, size, options, opaque_depth)
+    return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated))
+
+
+def render_volume(
+    volume: VolumeLike,
+    camera: CameraLike,
+    window_size: WindowSize,
+    *,
+    sample_distance: float | None = None,
+    opaque_depth: ArrayLike | None = None,
+    clipping_planes: ArrayLike | None = None,
+    cropping: CroppingLike | None = None,
+    opacity_multiplier: float = 1.0,
+    early_termination: bool = True,
+    skip_empty: bool = True,
+    lights: LightsLike | None = None,
+    ambient_occlusion: OcclusionLike | None = None,
+    memory_limit: MemoryLike | None = None,
+    device: DeviceLike | None = None,
+    scalars: ScalarsLike | None = None,
+    preference: str = "point",
+    clim: RangeLike | None = None,
+    n_colors: int = 256,
+    opacity: OpacityLike = "linear",
+    cmap: ColorMapLike | None = None,
+    flip_scalars: bool = False,
+    opacity_unit_distance: float | None = None,
+    log_scale: bool = False,
+    shade: bool = False,
+    ambient: float | None = None,
+    diffuse: float | None = 0.7,
+    specular: float | None = 0.2,
+    specular_power: float | None = 10.0,
+    blending: str = "composite",
+    interpolation: str = "nearest",
+    volume_property: VTKObject | None = None,
+    transfer_function: TransferFunction | None = None,
+    **unknown: NoReturn,
+) -> NDArray[np.float32]:
+    """Raycast the volume itself: direct volume rendering, the baseline of a VDI.
+
+    Parameters
+    ----------
+    volume : pyvista.ImageData or vtkImageData or Volume
+        As for :func:`generate`.
+    camera : pyvista.Camera or vtkCamera or Camera
+        The view.
+    window_size : (int, int)
+        Width and height in pixels.
+    sample_distance : float, optional
+        Length of a step along a ray, model units; half the smallest spacing by default.
+    opaque_depth, clipping_planes, cropping, opacity_multiplier
+        As for :func:`render`.
+    early_termination : bool
+        Stop a ray where what is behind can no longer be seen.
+    skip_empty : bool, default: True
+        Pass by what is empty: blocks of the volume that are transparent. The picture is the same to
+        the last bit.
+    lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
+        As for :func:`generate`; lights that move with the camera are those of this view.
+    ambient_occlusion : bool, float or AmbientOcclusion, optional
+        As for :func:`generate`.
+    memory_limit : int, float or str, optional
+        As for :func:`generate`; the picture is the same to the last bit.
+    device : str, int or device, optional
+        Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
+    scalars, preference, clim, n_colors, opacity, cmap, flip_scalars, opacity_unit_distance
+        As for :func:`generate`.
+    log_scale, shade, ambient, diffuse, specular, specular_power, interpolation
+        As for :func:`generate`.
+    blending : {"composite", "maximum", "minimum", "average", "additive"}
+        What becomes of the scalars along a ray, as in ``add_volume``: the greatest or the least is
+        classified; or opacity times scalar, which is 0 to 1 over the volume's range, is averaged
+        or integrated over opacity unit distances, as a grey value.
+    volume_property, transfer_function
+        As for :func:`generate`.
+
+    Returns
+    -------
+    numpy.ndarray
+        float32 (H, W, 4), premultiplied RGBA, top row first, no background blended in.
+
+    Raises
+    ------
+    TypeError
+        If a keyword is unknown.
+    InvalidVolumeError, InvalidCameraError, InvalidArgumentError
+        If an argument cannot be used.
+    UnsupportedError
+        If ``blending`` does not go with another argument, or for what else cannot be honoured.
+    MissingDependencyError
+        If a colour map or an opacity is named and PyVista is not installed.
+    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
+        If there is no device, or it fails.
+    """
+    refuse_keywords(unknown, render_volume)
+    look = Classification.checked(
+        *(scalars, preference, blending, clim, n_colors, opacity, cmap, flip_scalars),
+        *(opacity_unit_distance, log_scale, shade, ambient, diffuse, specular, specular_power),
+        *(interpolation, volume_property, transfer_function),
+    )
+    view, read = Camera.from_any(camera), as_volume(volume, scalars, preference)
+    cutoff = None if as_flag(early_termination, "early_termination") else 0.0
+    options = RenderOptions.checked(
+        clipping_planes, cropping, opacity_multiplier, skip_empty, None, cutoff
+    )
+    table = look.transfer_function_of(read)
+    request = FrameRequest(
+        view,
+        window_size,  # type: ignore[arg-type]  # which it checks
+        options,
+        opaque_depth,
+        device,
+    )
+    medium = MediumOptions.checked(sample_distance, lights, ambient_occlusion, memory_limit)
+    if blending != BLENDINGS[0]:
+        from pyvista_vdi.volume.project import project_volume
+
+        return project_volume(read, table, request, blending, medium)
+    from pyvista_vdi.volume.render import raycast_volume
+
+    return raycast_volume(read, table, request, medium)
+
+
+def _is_of_views(vdi: Any) -> bool:
+    """Whether these are VDIs of several views, among which a picture's view chooses."""
+    return isinstance(vdi, VDICollection) and vdi.times is None
+
+
+def _seen(vdi: Any, view: Camera) -> VDI:
+    """Return the VDI that is shown: of a set that which is nearest to the view."""
+    return vdi[vdi.nearest(view)] if _is_of_views(vdi) else as_vdi(vdi)
+
+
+def _seen_in_scene(
+    vdis: Sequence[Any], view: Camera, model_transforms: Sequence[ArrayLike] | None
+) -> list[VDI]:
+    """Return the VDIs of a scene, each seen where its model transform places it."""
+    given = list(model_transforms) if np.iterable(model_transforms) else ()
+    if model_transforms is None or len(given) != len(vdis):  # refused where it is used
+        return [_seen(vdi, view) for vdi in vdis]
+    return [
+        _seen(vdi, view.replace(model_transform=placed)) if _is_of_views(vdi) else as_vdi(vdi)
+        for vdi, placed in zip(vdis, given, strict=True)
+    ]
+
+
+def _picture_size(vdi: Any, seen: VDI) -> tuple[int, int]:
+    """Return the size of pictures: the set's, where there is one."""
+    return vdi.picture_size if _is_of_views(vdi) else seen.picture_size

@@ -1,0 +1,87 @@
+"""What the public functions take, by name: the types of their arguments.
+
+VTK's and PyVista's objects are told by the methods that they have, so that this module needs
+neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Union
+
+from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+    from pyvista_vdi.model.camera import Camera
+    from pyvista_vdi.model.cropping import Cropping
+    from pyvista_vdi.model.lighting import Light, Lights
+    from pyvista_vdi.model.vdi import VDI
+    from pyvista_vdi.model.volume import Volume
+
+
+class VTKObject(Protocol):
+    """An object of VTK, or of PyVista, whose classes derive from VTK's."""
+
+    def GetClassName(self) -> str:  # noqa: N802 - VTK's
+        """Return the name of its class."""
+
+
+class ColorMap(Protocol):
+    """A colour map of Matplotlib."""
+
+    name: str
+    N: int
+
+
+class Device(Protocol):
+    """An OpenCL device in use."""
+
+    @property
+    def info(self) -> Any:
+        """What is known of it."""
+
+
+class DaskClient(Protocol):
+    """A ``distributed.Client``."""
+
+    def scheduler_info(self) -> Any:
+        """Return what is known of the cluster."""
+
+
+#: Width and height, pixels.
+WindowSize: TypeAlias = Sequence[int]
+#: Called with the finished fraction, 0 to 1; work stops if it returns ``False``.
+Progress: TypeAlias = Callable[[float], object]
+
+VolumeLike: TypeAlias = Union["Volume", VTKObject]
+CameraLike: TypeAlias = Union["Camera", VTKObject]
+VDILike: TypeAlias = Union["VDI", VTKObject]
+LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]
+CroppingLike: TypeAlias = Union["Cropping", VTKObject, Sequence[float], Sequence[object]]
+OcclusionLike: TypeAlias = Union[bool, float, "AmbientOcclusion"]
+#: Bytes, or a text such as ``"2 GiB"``.
+MemoryLike: TypeAlias = float | str
+#: A name or an index of the list of devices, or a device in use.
+DeviceLike: TypeAlias = str | int | Device
+#: A client of a Dask cluster, or the address of its scheduler.
+ClientLike: TypeAlias = str | DaskClient
+
+#: A name of an array, or the values.
+ScalarsLike: TypeAlias = ArrayLike
+#: A name, one colour, a list of colours, a colour map or a lookup table.
+ColorMapLike: TypeAlias = str | Sequence[str] | ColorMap | VTKObject
+#: A name, one opacity, or opacities.
+OpacityLike: TypeAlias = ArrayLike
+#: The range of a colour map, or its end, which is symmetric then.
+RangeLike: TypeAlias = ArrayLike
+MatrixLike: TypeAlias = ArrayLike | VTKObject
+
+Criterion: TypeAlias = Literal["least-error", "homogeneity"]
+Precision: TypeAlias = Literal["exact", "16-byte", "8-byte"]
+Quality: TypeAlias = Literal["reference", "high", "balanced", "fast"]
+Preference: TypeAlias = Literal["point", "cell"]
+Interpolation: TypeAlias = Literal["nearest", "linear"]
+Coverage: TypeAlias = Literal["bounds", "view"]
+Draw: TypeAlias = Literal["auto", "vdi", "volume"]
+Metadata: TypeAlias = Mapping[str, Any]

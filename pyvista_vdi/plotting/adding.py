@@ -1,0 +1,286 @@
+"""What ``add_vdi`` does with what it was asked for: a source or a VDI, a mapper and an actor."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import cycle
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyvista as pv
+
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
+from pyvista_vdi.model.collection import VDICollection
+from pyvista_vdi.model.drawing_options import DrawingOptions
+from pyvista_vdi.model.options import GenerationOptions, Options, QualityTarget, option, record
+from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
+from pyvista_vdi.plotting.classify import Looks, stored_table
+from pyvista_vdi.plotting.progress import progress_callback
+from pyvista_vdi.plotting.volumes import as_image, held
+from pyvista_vdi.quality.dial import refuse_settings
+from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, require_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.filters.view import as_array
+from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
+
+#: What ``add_actor`` understands as culling, besides nothing.
+_CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
+
+#: SSIM by which a view may fall below what was asked for before it regenerates.
+_BELOW_GOAL = 0.02
+
+#: Colour maps of blocks that are to be told apart: those of ``add_volume``.
+_MAPS = ("Reds", "Greens", "Blues", "Greys", "Oranges", "Purples")
+
+
+def _scalar_bar_args(given: Any) -> Mapping[str, Any]:
+    if not isinstance(given, Mapping | None):
+        raise InvalidArgumentTypeError(f"scalar_bar_args must be a dictionary; got {given!r}")
+    return given or {}
+
+
+def _culling(given: Any) -> str | bool:
+    if given and (given.lower() if isinstance(given, str) else given) not in _CULLING:
+        raise InvalidArgumentError(
+            f"culling must be False or one of {_CULLING}; got {given!r} (faces are a mesh's: "
+            "it changes nothing of a volume)"
+        )
+    return "backface" if given is True else given
+
+
+@record
+@dataclass(frozen=True, eq=False)
+class Placement(Options):
+    """Where an actor is put in a plotter, and what is shown beside it."""
+
+    name: str | None = option(None, "of the actor")
+    culling: str | bool = option(False, "of faces, which a volume has none of", _culling)
+    reset_camera: bool | None = option(None, "whether the view is reset")
+    pickable: bool = option(True, "whether it can be picked")
+    render: bool | None = option(True, "whether the plotter renders at once")
+    user_matrix: MatrixLike | None = option(None, "places the actor in the world")
+    scalar_bar_args: Mapping[str, Any] = option(None, "of the scalar bar", _scalar_bar_args)
+    show_scalar_bar: bool | None = option(None, "whether there is a scalar bar")
+    status: bool = option(False, "show ``actor.status`` in the upper left corner")
+    multi_colors: bool = option(
+        False, "give each block of a ``MultiBlock`` a colour map of its own"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Addition:
+    """All that ``add_vdi`` was asked for."""
+
+    array: ArrayChoice
+    look: Looks
+    options: GenerationOptions
+    target: QualityTarget
+    drawing: DrawingOptions
+    place: Placement
+    resolution: Sequence[float] | None
+    camera: CameraLike | None
+    coverage: str
+    device: DeviceLike | None
+    progress_bar: bool | Callable[[float], object] | None
+
+    def __post_init__(self) -> None:
+        if self.target:
+            refuse_settings(self.target, self.options)
+
+    def refuse_with_a_vdi(self) -> None:
+        """Refuse what only a volume can honour, of the arguments that are not their defaults."""
+        target = {"full_fps" if n == "target_fps" else n for n in self.target.given}
+        changed = {*self.array.given, *self.look.given, *self.options.given, *target}
+        changed -= {"lights", "annotations"}
+        changed |= {n for n in ("resolution", "camera") if getattr(self, n) is not None}
+        changed |= {"coverage"} if self.coverage != "bounds" else set()
+        if changed:
+            raise UnsupportedError(
+                f"{', '.join(sorted(changed))} cannot be given with a VDI: its classification, "
+                "view and lists were fixed when it was generated; generate another from the volume"
+            )
+        if self.drawing.draw == "volume":
+            raise UnsupportedError(
+                "draw='volume' draws the volume, and this is a VDI without one: leave draw out"
+            )
+
+
+class _Shown(NamedTuple):
+    """What an actor shows, its colours, and what its scalar bar says."""
+
+    thing: VDI | VDISource
+    table: Any
+    scalar_range: tuple[float, float]
+    title: str
+    prop: Any = None
+    bar: bool | None = None  # whether there is a scalar bar; None: as the theme says
+
+
+def added(
+    plotter: Any, volume: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
+) -> PlotterVDIActor:
+    """Add a volume, or what is made of one already, to a plotter, and return its actor."""
+    get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
+    several = volume if isinstance(volume, VDICollection) else None
+    first = volume if several is None else several[0]  # which all steps, and all views, look like
+    made = isinstance(first, VDI) or is_vdi_image(first)
+    shown = _vdi_shown(first, asked) if made else _volume_shown(first, asked, plotter)
+    actor = PlotterVDIActor()
+    if shown.prop is not None:
+        actor.prop = shown.prop
+    mapper = _mapper(shown, asked, plotter._theme)
+    thing = shown.thing if several is None else several
+    if isinstance(thing, VDI | VDICollection):
+        mapper.SetInputData(thing)
+    else:
+        mapper.SetInputConnection(thing.GetOutputPort())
+    actor.mapper = mapper
+    place = asked.place
+    actor.user_matrix = np.eye(4) if place.user_matrix is None else place.user_matrix
+    remember(actor)
+    plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
+    with _all_or_nothing(plotter, actor):
+        plotter.add_actor(
+            actor,
+            reset_camera=place.reset_camera,
+            name=place.name,
+            culling=place.culling,
+            pickable=place.pickable,
+            render=not plotter._first_time if place.render is None else place.render,
+        )
+        themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
+        if themed if shown.bar is None else shown.bar:
+            plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
+        if place.status:
+            actor.show_status(plotter)
+    plotter.renderer.Modified()
+    return actor
+
+
+def added_blocks(
+    plotter: Any, blocks: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
+) -> list[Any]:
+    """Add each block of a ``MultiBlock``; return their actors, lists of those within blocks.
+
+    Blocks that are missing are left out, and a name gets the block's number. A block that is no
+    uniform grid is refused before anything is added.
+    """
+    blocks = pv.wrap(blocks)
+    for block in blocks.recursive_iterator(skip_none=True):
+        require_image(block)
+    actors: list[Any] = []
+    maps = cycle(_MAPS)
+    with _all_or_nothing(plotter, actors):
+        for i, block in enumerate(blocks):
+            if block is None:
+                continue
+            own = asked
+            if asked.place.multi_colors:
+                own = replace(own, look=replace(own.look, cmap=next(maps)))
+            if asked.place.name is not None:
+                own = replace(own, place=replace(own.place, name=f"{asked.place.name}-{i}"))
+            add = added_blocks if isinstance(block, pv.MultiBlock) else added
+            actors.append(add(plotter, block, own, remember))
+    return actors
+
+
+def _vdi_shown(vdi: Any, asked: Addition) -> _Shown:
+    """Return a VDI with the colours that it was made with, as far as its metadata has them."""
+    asked.refuse_with_a_vdi()
+    shown = vdi if isinstance(vdi, VDI) else vdi_from_image(vdi)
+    place, annotations = asked.place, asked.look.annotations
+    bar, table = place.show_scalar_bar, stored_table(shown)
+    if table is None:
+        if bar or place.scalar_bar_args or annotations:
+            raise UnsupportedError(
+                "this VDI's metadata holds no transfer function, so there is no scalar bar "
+                "to show: leave out show_scalar_bar, scalar_bar_args and annotations"
+            )
+        bar, table = False, pv.LookupTable()
+    if annotations:
+        table.annotations = annotations
+    title = str(shown.metadata.get("scalars") or "Data")
+    return _Shown(shown, table, table.scalar_range, title, bar=bar)
+
+
+def _volume_shown(volume: Any, asked: Addition, plotter: Any) -> _Shown:
+    """Return a source of VDIs of a volume, classified as ``add_volume`` would."""
+    scalars, preference = asked.array.scalars, asked.array.preference
+    look, place, source = asked.look, asked.place, VDISource()
+    image, array_name = as_image(volume, scalars, asked.resolution)
+    asked.array.require_composite()
+    told = {name: value for name, value in look.describe().items() if name in Look.declared}
+    source.SetMetadata({"classification": {**asked.array.describe(), **told}})
+    data = held(image)
+    named = None if array_name is None else data.GetPointData().GetArray(array_name)
+    if named is not None and preference == "point":
+        # As add_volume: another may be made the active one of the mapper's dataset
+        data.GetPointData().SetActiveScalars(array_name)
+        array_name = None
+    source.SetInputDataObject(data)
+    source.SetScalars(array_name, preference)
+    source.SetOptions(asked.options)
+    source.SetTarget(asked.target)
+    source.SetCoverage(asked.coverage)
+    source.SetDevice(asked.device)
+    source.SetProgressCallback(progress_callback(asked.progress_bar))
+    read = source.GetVolume()
+    bar = place.show_scalar_bar
+    if read.rgba:
+        look, bar = look.of_rgba(), False
+    look = replace(look, clim=range_to_classify(scalars, look.clim))
+    table = look.lookup_table(read.array)
+    prop = look.volume_property(table, read.default_unit_distance, rgba=read.rgba)
+    look.light(prop)
+    source.SetLights(plotter.renderer)
+    source.SetVolumeProperty(prop)
+    if asked.camera is not None:
+        source.SetCamera(asked.camera, _matrix(plotter, place.user_matrix))
+    # As add_volume: values that come without a name have none
+    title = read.name if scalars is None or isinstance(scalars, str) else ""
+    return _Shown(source, table, look.scalar_range(table, read), title, prop, bar)
+
+
+def _mapper(shown: _Shown, asked: Addition, theme: Any) -> Any:
+    """Return a mapper that draws as it was asked for."""
+    drawing, goal = asked.drawing, asked.target.ssim
+    below = drawing.regenerate_below
+    if goal is not None:  # not above what the VDI is made for
+        given = REGENERATE_BELOW if below is None else below
+        below = min(given, max(0.0, goal - _BELOW_GOAL))
+    mapper = PlotterVDIMapper(theme=theme)
+    mapper.scalar_range = shown.scalar_range  # before there is a table that it would change
+    mapper.lookup_table = shown.table
+    mapper.SetDevice(asked.device)
+    mapper.SetTargetFrameRate(drawing.target_fps)
+    mapper.SetAutoAdjustMultiSamples(drawing.adjust_multi_samples)
+    mapper.SetRegenerate(drawing.regenerate)
+    mapper.SetRegenerateBelow(below)
+    mapper.SetDraw(drawing.draw)
+    return mapper
+
+
+@contextlib.contextmanager
+def _all_or_nothing(plotter: Any, actors: Any) -> Iterator[None]:
+    """Take an actor, or several, away again where something is refused on the way."""
+    try:
+        yield
+    except BaseException:
+        plotter.remove_actor(actors, reset_camera=False, render=False)
+        raise
+
+
+def _matrix(plotter: Any, user_matrix: Any) -> Any:
+    """Return the actor's matrix as it will be in the scene, with the renderer's scale."""
+    stand_in = vtkVolume()
+    stand_in.SetScale(*plotter.renderer.scale)
+    if user_matrix is not None:
+        stand_in.SetUserMatrix(pv.vtkmatrix_from_array(np.asarray(user_matrix, dtype=float)))
+    return as_array(stand_in.GetMatrix())

@@ -1,0 +1,68 @@
+"""What users write, for a checker of types: ``mypy --strict`` of it says nothing.
+
+``test_typed_script.py`` has it checked, and finds that what is wrong below a comment is refused.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyvista as pv
+
+import pyvista_vdi as pvdi
+
+
+def without_vtk(folder: Path) -> pvdi.VDI:
+    """Make a VDI of an array, write it, read it, and draw it."""
+    volume = pvdi.Volume(np.zeros((8, 9, 10), np.float32), (1.0, 1.0, 2.0))
+    camera = pvdi.Camera((5, -40, 9), (5, 4, 9), (0, 0, 1))
+    table = pvdi.TransferFunction([(0, 0, 0), (1, 1, 1)], [0, 1], (0, 1))
+    vdi = pvdi.generate(
+        volume,
+        camera,
+        (64, 48),
+        max_supersegments=10,
+        tolerance=0.01,
+        lights=[pvdi.Light()],
+        ambient_occlusion=True,
+        memory_limit="1 GiB",
+        progress=print,
+        transfer_function=table,
+    )
+    vdi.save(folder / "a.vdi")
+    picture = pvdi.render(
+        vdi,
+        camera.azimuth(20),
+        (64, 48),
+        clipping_planes=[(5, 4, 9, 1, 0, 0)],
+        cropping=(0, 5, 0, 5, 0, 5),
+        transmittance_cutoff=0.004,
+    )
+    depth = pvdi.render_depth(vdi, camera, opaque_depth=np.full((48, 64), np.inf))
+    several = pvdi.render([vdi, vdi], camera, opacity_multiplier=[1.0, 0.5])
+    hit = pvdi.pick(vdi, camera, (32, 24))
+    assert picture.shape == several.shape == (*depth.shape, 4)
+    assert hit is None or 0 <= hit.opacity <= 1
+    return vdi
+
+
+def with_pyvista(plotter: pvdi.Plotter, grid: pv.ImageData) -> pvdi.VDI:
+    """Make VDIs as ``add_volume`` is called, and show them."""
+    vdi = pvdi.generate(grid, plotter.camera, (64, 48), cmap="bone", opacity="sigmoid_5")
+    pvdi.generate(grid, plotter.camera, [64, 48], quality="high", opacity=[0.0, 0.5], clim=(0, 9))
+    pvdi.render_volume(grid, plotter.camera, (64, 48), cmap=["red", "blue"], shade=True)
+    needed = pvdi.estimate(grid, (64, 48), cmap="bone")
+    assert needed.total > 0
+    plotter.add_vdi(grid, cmap="bone", opacity=0.5, quality="balanced", regenerate="never")
+    plotter.add_vdi(vdi, show_scalar_bar=False)
+    return vdi
+
+
+def mistakes(grid: pv.ImageData, camera: pvdi.Camera, plotter: pvdi.Plotter) -> None:
+    """Make mistakes that a checker of types finds: each is silenced, and would be useless else."""
+    pvdi.generate(grid, camera, (64, 48), max_supersegments="many")  # type: ignore[arg-type]
+    pvdi.generate(grid, camera, (64, 48), colour_map="bone")  # type: ignore[arg-type]
+    pvdi.generate(grid, 5, (64, 48))  # type: ignore[arg-type]
+    pvdi.render("a.vdi", camera)  # type: ignore[arg-type]
+    plotter.add_vdi(grid, precision="half")  # type: ignore[arg-type]
