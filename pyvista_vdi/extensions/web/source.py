@@ -145,8 +145,8 @@ class Source:
         self.range = first.finite_range()
         self.transfer_function(Wish())  # refused now, not when a client has come
         checked_sample_distance(first, options.sample_distance)  # likewise
-        given = looks.given
-        self.started_with = {n: given[n] for n in _NAMED if isinstance(given.get(n), str)}
+        named = {name: getattr(looks, name) for name in _NAMED}
+        self.started_with = {n: v for n, v in named.items() if isinstance(v, str)}
         free = find_spec("pyvista") is not None and not first.rgba and not looks.in_place
         self.offer = Offer(len(volumes), *(self._names(n, free) for n in _NAMED))
 
