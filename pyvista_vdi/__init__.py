@@ -98,7 +98,7 @@ providers.provide(
     store_identity="pyvista_vdi.io.store_identity:identity_of",
     scene_pages="pyvista_vdi.extensions.web.scenes.export:export_html",
     temporal_volumes="pyvista_vdi.vtk_pipeline.filters.temporal:steps_and_times",
-    thinned="pyvista_vdi.model.thinned:thinned",
+    thinned="pyvista_vdi.model.list_subsampling:subsampled_lists",
     transfer_function_from_arguments="pyvista_vdi.plotting.classify:transfer_function_from_arguments",
     transfer_function_from_property="pyvista_vdi.vtk_pipeline:transfer_function_from_property",
     vdi_from_image="pyvista_vdi.vtk_pipeline:vdi_from_image",

@@ -1,4 +1,4 @@
-// Volume to records of runs, one march per ray (paper section 2; DESIGN section 3 "Merging").
+// Volume to records of runs, one march per ray (paper section 2; docs/conventions.md, "Merging").
 //
 // -D VOXEL_T, INDEX_T, RGBA, NEAREST, BY_SCALAR, SKIP_EMPTY, MACROCELL_SHIFT: see volume/sampling.cl and volume/march.cl
 // -D SHADED, HEADLIGHT, POSITIONAL_LIGHTS, GRADIENT_OPACITY: see volume/shading.cl; OCCLUSION: see volume/occlusion.cl

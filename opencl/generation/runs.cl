@@ -1,7 +1,7 @@
 // Runs: the supersegments of one ray while they are being made, and how two neighbours become one.
 //
 // Colour is premultiplied by the run's own opacity and merged front to back, so that the view from V_O stays exact
-// (DESIGN section 3, "Merging samples into a supersegment").
+// (docs/conventions.md, "Merging samples into a supersegment").
 //
 // Merging is judged by how inhomogeneous the merged run would be (the criterion of Frey et al. 2013, which the paper
 // follows): by Ward's increase of the sum of squares, along the ray in reference lengths, of the feature

@@ -1,5 +1,5 @@
 // Records that have grown too long, brought to a number of runs: by merging neighbours within a threshold that is raised until
-// they fit, or, for the budget, at least error (DESIGN section 3, "Merging", "Budget").
+// they fit, or, for the budget, at least error (docs/conventions.md, "Merging samples").
 //
 // -D LANES  16 on CPUs: ray by ray each merge waits for the divisions of the one before, and for branches that no processor
 //           foresees. The rays of a block of 4 x 4 take the same steps, and what depends on the ray is selected.

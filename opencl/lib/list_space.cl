@@ -1,4 +1,4 @@
-// V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight (DESIGN section 3).
+// V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight (docs/conventions.md).
 //
 // u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth and is projective:
 //

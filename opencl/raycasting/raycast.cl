@@ -1,7 +1,7 @@
 // VDI to image from any view: the paper's raycaster (section 3).
 //
 // A ray steps from list to list (Amanatides and Woo), finds the first supersegment of each by the index found in the last
-// one, and composites, front to back, the length that it crosses of each (DESIGN section 3 "Lengths", "A supersegment is a
+// one, and composites, front to back, the length that it crosses of each (docs/conventions.md, "Lengths", "A supersegment is a
 // homogeneous medium"). All that is one loop, each turn of which makes a guess, composites a supersegment or leaves a list, or
 // the last two: the lanes of a vector need not wait for the one that searches longest or meets most.
 //

@@ -1,4 +1,4 @@
-// What of a volume is left out though its grid has it: blank points and cells (docs/conventions.md, "Blanking").
+// What of a volume is left out though its grid has it: blank points and cells (docs/conventions.md, "From a volume to the medium").
 //
 // -D BLANKED  there are some; without it nothing of this is compiled. Positions are the whole grid's: not with GRID_PART
 #include "lib/lanes.cl"

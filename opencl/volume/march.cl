@@ -1,6 +1,6 @@
 // The march along one ray of a volume: one place for the steps that generation and direct volume rendering share.
 //
-// Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (DESIGN section 3).
+// Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter (docs/conventions.md).
 // Every face is computed from its step's number, never accumulated.
 //
 // -D BY_SCALAR     with NEAREST and voxels of integers: the table holds the medium of each scalar from `low` on, of which no

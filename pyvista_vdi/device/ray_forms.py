@@ -24,7 +24,7 @@ from pyvista_vdi.model.cropping import Cropping
 
 Floats: TypeAlias = NDArray[np.float64]
 
-#: Depth before which nothing is looked up in perspective, in diagonals of the bounds (DESIGN 3).
+#: Depth before which nothing is looked up in perspective, in diagonals of the bounds ("Lengths").
 NEAREST_DEPTH = 1e-6
 
 #: Tangents of a hull between which :func:`cells_of_points` looks for cells.

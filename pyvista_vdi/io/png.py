@@ -20,23 +20,10 @@ PNG_SUFFIX = ".png"
 def to_bytes(image: ArrayLike, background: Sequence[float] | None = None) -> NDArray[np.uint8]:
     """Return a rendered image in eight bits per channel.
 
-    Parameters
-    ----------
-    image : array_like of float, shape (H, W, 4)
-        Premultiplied RGBA, top row first.
-    background : (float, float, float), optional
-        RGB, 0 to 1, to blend it over.
-
-    Returns
-    -------
-    numpy.ndarray
-        uint8 (H, W, 4), straight (not premultiplied) RGBA as PNG wants it, rounded; or, over a
-        background, uint8 (H, W, 3).
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the background is not a colour, or the image no image.
+    ``image`` (float, shape (H, W, 4)): premultiplied RGBA, top row first. ``background``: RGB, 0 to
+    1, to blend it over. Returns: uint8 (H, W, 4), straight (not premultiplied) RGBA as PNG wants
+    it, rounded; or, over a background, uint8 (H, W, 3). Raises InvalidArgumentError if the
+    background is not a colour, or the image no image.
     """
     pixels = np.asarray(image)
     if background is not None:
@@ -57,22 +44,9 @@ def _rounded(values: NDArray[np.float64]) -> NDArray[np.uint8]:
 def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
     """Write an image as PNG; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    pixels : numpy.ndarray
-        uint8 (H, W, 3) RGB or (H, W, 4) straight RGBA, top row first.
-    path : path-like
-        The target; its name ends in ``.png``.
-
-    Returns
-    -------
-    pathlib.Path
-        The file.
-
-    Raises
-    ------
-    VDIFileError
-        If the target cannot be written.
+    ``pixels``: uint8 (H, W, 3) RGB or (H, W, 4) straight RGBA, top row first. ``path``: the target;
+    its name ends in ``.png``. Returns: The file. Raises VDIFileError if the target cannot be
+    written.
     """
     from PIL import Image
 

@@ -19,7 +19,7 @@ class Pieces:
         self._progress, self._total, self._done = progress, max(1, total), 0
 
     def __call__(self) -> None:
-        """Say that one more is done; raises Cancelled where the callback returns False."""
+        """Report that one more is done; raise Cancelled where the callback returns False."""
         self._done += 1
         if self._progress is not None and self._progress(self._done / self._total) is False:
             raise Cancelled("reading or writing the file was cancelled")

@@ -33,12 +33,7 @@ ZARR_FILES = ("zarr.json", ".zgroup", ".zarray", ".zattrs")
 def keeper_of(array: Any, index: Sequence[int | slice] | None = None) -> RangeFile | None:
     """Return what keeps the ranges of an array's chunks, if it is in a file or a folder here.
 
-    Parameters
-    ----------
-    array : zarr.Array or h5py.Dataset
-        Others have no place.
-    index : sequence of int or slice, optional
-        What is taken of it: its time and its channel.
+    ``array``: others have no place. ``index``: what is taken of it: its time and its channel.
     """
     found = local_files(array)
     if found is None:
@@ -57,18 +52,9 @@ def keeper_of(array: Any, index: Sequence[int | slice] | None = None) -> RangeFi
 class RangeFile:
     """Keeps the ranges of one array's chunks beside its store, or in the cache folder.
 
-    Parameters
-    ----------
-    store : str
-        The store's file, or its outermost folder.
-    data : str
-        The file or the folder whose files hold the chunks.
-    name : str
-        The array's in the store.
-    index : sequence of int or slice, optional
-        What is taken of it.
-    in_file : h5py.Dataset, optional
-        The array, if a file that is open holds it.
+    ``store``: the store's file, or its outermost folder. ``data``: the file or the folder whose
+    files hold the chunks. ``name``: the array's in the store. ``index``: what is taken of it.
+    ``in_file``: the array, if a file that is open holds it.
     """
 
     def __init__(

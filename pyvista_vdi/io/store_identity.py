@@ -56,12 +56,7 @@ def by_absolute_path(array: Any) -> Any:
 def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> StoreIdentity | None:
     """Return what tells an array's files from others, if it is in files here.
 
-    Parameters
-    ----------
-    array : zarr.Array or h5py.Dataset
-        Others have none.
-    index : sequence of int or slice, optional
-        What is taken of it: its time and its channel.
+    ``array``: others have none. ``index``: what is taken of it: its time and its channel.
     """
     found = local_files(array)
     if found is None:
@@ -85,16 +80,9 @@ def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> Store
 class StoreIdentity:
     """What tells an array's files from others.
 
-    Attributes
-    ----------
-    path : str
-        The array's file or its folder.
-    samples : tuple of (str, str or None)
-        Names of some files in it, and digests of samples of them; ``None`` where there is none.
-    chunks : _Chunks, optional
-        How files of chunks are called, if there are any.
-    absent : frozenset of str, optional
-        Chunks that have no file; ``None`` where these are not known.
+    ``path``: the array's file or its folder. ``samples``: names of some files in it, and digests of
+    samples of them; ``None`` where there is none. ``chunks``: how files of chunks are called, if
+    there are any. ``absent``: chunks that have no file; ``None`` where these are not known.
     """
 
     path: str
@@ -216,11 +204,8 @@ def _digest(file: Path, name: str) -> str | None:
             return hashlib.sha256(file.read_bytes()).hexdigest()
         except (FileNotFoundError, NotADirectoryError):
             return None
-    return _sampled(file, _OF_CHUNK if name else _OF_FILE)
-
-
-def _sampled(file: Path, pieces: int) -> str | None:
-    """Return a digest of a file's length and of some pieces of it; ``None`` if it is not there."""
+    # Find a digest of a file's length and of some pieces of it; None if it is not there
+    pieces = _OF_CHUNK if name else _OF_FILE
     try:
         with file.open("rb") as stream:
             size = stream.seek(0, os.SEEK_END)

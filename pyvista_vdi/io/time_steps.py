@@ -40,10 +40,7 @@ def lists_steps(path: str | os.PathLike[str]) -> bool:
 def listed_steps(path: str | os.PathLike[str]) -> list[tuple[Path, float]]:
     """Return the files that a file lists, and their times, which ascend.
 
-    Raises
-    ------
-    InvalidVolumeError
-        If it cannot be read, lists nothing, or several files for one time.
+    Raises InvalidVolumeError if it cannot be read, lists nothing, or several files for one time.
     """
     file = Path(path)
     try:

@@ -39,7 +39,26 @@ def read_file(file: Path, by_pyvista: Callable[[Path], Any] | None = None) -> An
     if lists_steps(file):
         return read_file(_only_step(file), by_pyvista)
     if suffix == ".raw":
-        return _read_raw(file)
+        # Read bare scalars, little-endian, whose name says what they are
+        found = re.search(r"_(\d+)x(\d+)x(\d+)_([a-z]+\d+)\.raw$", file.name, re.IGNORECASE)
+        if found is None or found[4].lower() not in VOXEL_TYPES:
+            raise InvalidVolumeError(
+                f"{file} does not say what it holds: name raw files like "
+                f"kingsnake_1024x1024x795_uint8.raw, with a type of {', '.join(VOXEL_TYPES)}"
+            )
+        nx, ny, nz = (int(found[i]) for i in (1, 2, 3))
+        if not os.path.isfile(file):  # noqa: PTH113 - pathlib's raises for a name that is too long
+            raise InvalidVolumeError(f"{file} does not exist: check the volume's path")
+        dtype = np.dtype(found[4].lower()).newbyteorder("<")
+        expected = nx * ny * nz * dtype.itemsize
+        if file.stat().st_size != expected:
+            raise InvalidVolumeError(
+                f"{file} has {file.stat().st_size} bytes; {nx} x {ny} x {nz} of {found[4].lower()} "
+                f"are {expected}"
+            )
+        require_free_memory(expected, f"the volume in {file.name}", "take a smaller one")
+        array: NDArray[Any] = np.fromfile(file, dtype).reshape(nz, ny, nx)
+        return Volume(array.astype(dtype.newbyteorder("="), copy=False))
     if suffix == ".npy":
         return _read_npy(file)
     if suffix in (".nrrd", ".nhdr"):
@@ -65,28 +84,6 @@ def _only_step(file: Path) -> Path:
             f"one, such as {steps[0][0]}, or make a series of all (pyvista-vdi series)"
         )
     return steps[0][0]
-
-
-def _read_raw(file: Path) -> Volume:
-    found = re.search(r"_(\d+)x(\d+)x(\d+)_([a-z]+\d+)\.raw$", file.name, re.IGNORECASE)
-    if found is None or found[4].lower() not in VOXEL_TYPES:
-        raise InvalidVolumeError(
-            f"{file} does not say what it holds: name raw files like "
-            f"kingsnake_1024x1024x795_uint8.raw, with a type of {', '.join(VOXEL_TYPES)}"
-        )
-    nx, ny, nz = (int(found[i]) for i in (1, 2, 3))
-    if not os.path.isfile(file):  # noqa: PTH113 - pathlib's raises for a name that is too long
-        raise InvalidVolumeError(f"{file} does not exist: check the volume's path")
-    dtype = np.dtype(found[4].lower()).newbyteorder("<")
-    expected = nx * ny * nz * dtype.itemsize
-    if file.stat().st_size != expected:
-        raise InvalidVolumeError(
-            f"{file} has {file.stat().st_size} bytes; {nx} x {ny} x {nz} of {found[4].lower()} "
-            f"are {expected}"
-        )
-    require_free_memory(expected, f"the volume in {file.name}", "take a smaller one")
-    array: NDArray[Any] = np.fromfile(file, dtype).reshape(nz, ny, nx)
-    return Volume(array.astype(dtype.newbyteorder("="), copy=False))
 
 
 def _read_npy(file: Path) -> Volume:

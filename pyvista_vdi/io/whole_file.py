@@ -20,20 +20,9 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     Until then the data are under a temporary name in the same folder; on any failure, an
     interrupt included, they are removed and what was at ``path`` stays as it was.
 
-    Parameters
-    ----------
-    path : path-like
-        The target. A symbolic link is followed.
-
-    Yields
-    ------
-    BinaryIO
-        Seekable binary file.
-
-    Raises
-    ------
-    VDIFileError
-        If the target cannot be written; when the block is entered, or when the disk is full.
+    ``path``: the target. A symbolic link is followed. Yields: Seekable binary file. Raises
+    VDIFileError if the target cannot be written; when the block is entered, or when the disk is
+    full.
     """
     target = _resolved_target(path)
     temporary, stream = _open_beside(target)
@@ -45,7 +34,14 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         if target.exists():
             shutil.copymode(target, temporary)
         temporary.replace(target)
-        _sync_folder(target.parent)
+        # Make the new name itself durable, where folders can be opened (not on Windows)
+        folder = target.parent
+        with contextlib.suppress(OSError):
+            descriptor = os.open(folder, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
@@ -56,20 +52,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 def check_writable(path: str | os.PathLike[str]) -> Path:
     """Raise now if ``path`` could not be written later; nothing is left behind.
 
-    Parameters
-    ----------
-    path : path-like
-        A target to be written after long work.
-
-    Returns
-    -------
-    pathlib.Path
-        The target, links followed.
-
-    Raises
-    ------
-    VDIFileError
-        If its folder is absent or cannot be written, or a folder or device has its name.
+    ``path``: a target to be written after long work. Returns: The target, links followed. Raises
+    VDIFileError if its folder is absent or cannot be written, or a folder or device has its name.
     """
     target = _resolved_target(path)
     temporary, stream = _open_beside(target)
@@ -123,16 +107,6 @@ def _open_beside(target: Path) -> tuple[Path, BinaryIO]:
         raise VDIFileError(
             f"{target} cannot be written: {_reason(error)}; choose another folder"
         ) from error
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make the new name itself durable, where folders can be opened (not on Windows)."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 def _reason(error: Exception) -> str:

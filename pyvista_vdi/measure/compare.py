@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.measure.clock import Step, Times, take_turns
 from pyvista_vdi.measure.harness import (
     ROOMS,
@@ -26,7 +27,6 @@ from pyvista_vdi.measure.harness import (
     Bench,
     Case,
     Image,
-    Steps,
     check_angles,
     check_count,
 )
@@ -224,7 +224,7 @@ def measure(
         If the transfer function leaves nothing to see.
     """
     looks = Classification(settings.classification, "compare")
-    steps, begun = Steps(progress, 1 + 2 * len(settings.angles)), now()
+    done, begun = Pieces(progress, 1 + 2 * len(settings.angles)), now()
     with Bench(
         volume,
         looks.transfer_function(volume),
@@ -237,14 +237,14 @@ def measure(
         for error in bench.left_out.values():
             raise error
         vdi, times = _generated(bench, settings)
-        steps()
+        done()
         images, seconds = {}, {}
         for angle in settings.angles:
             images[angle] = _images(bench, vdi, angle)
-            steps()
+            done()
         for angle in settings.angles:
             seconds[angle] = _frame_times(bench, vdi, angle, settings.repeats)
-            steps()
+            done()
         system = describe_system(settings.device)
         if bench.opengl is not None:
             system["opengl"] = bench.opengl

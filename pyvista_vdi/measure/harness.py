@@ -213,19 +213,6 @@ def refusal(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-class Steps:
-    """Counts pieces of work and reports their share."""
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._total, self._done = progress, max(1, total), 0
-
-    def __call__(self, *doing: str) -> None:
-        """Say that a piece is finished, and what is being done now."""
-        self._done += 1
-        if self._progress is not None:
-            self._progress(min(1.0, self._done / self._total), *doing)
-
-
 class Latest(Generic[_Made]):
     """Keeps what was made for the latest key; for another it is closed, and made anew.
 
@@ -253,7 +240,7 @@ class Latest(Generic[_Made]):
         return self._found[0]
 
     def close(self) -> None:
-        """Give up what is kept, and close it if it can be closed."""
+        """Drop what is kept, and close it if it can be closed."""
         for one in self._found:
             getattr(one, "close", lambda: None)()
         self._found.clear()
@@ -331,18 +318,10 @@ class Bench:
     multisampling: ``vtk`` holds those that take part, by the keys of :data:`CANDIDATES`, and
     ``left_out`` the errors of those that cannot.
 
-    Parameters
-    ----------
-    volume, table : Volume, TransferFunction
-        The scalars, and how they look.
-    window_size : (int, int)
-        Of all frames, pixels.
-    device, vtk : optional
-        OpenCL device of ours, and whether VTK's mappers take part.
-    view : Camera, optional
-        V_O; the view that the volume fills unless given.
-    volume_property : vtkVolumeProperty, optional
-        How the volume looks to VTK; as `table` says unless given.
+    ``volume``, ``table``: the scalars, and how they look. ``window_size``: of all frames, pixels.
+    ``device``, ``vtk``: OpenCL device of ours, and whether VTK's mappers take part. ``view``: V_O;
+    the view that the volume fills unless given. ``volume_property``: how the volume looks to VTK;
+    as `table` says unless given.
     """
 
     def __init__(

@@ -24,22 +24,11 @@ _KERNEL_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 def provenance(rooms: Iterable[str]) -> dict[str, Any]:
     """Return what code a figure measures, for its file of results.
 
-    Parameters
-    ----------
-    rooms : iterable of str
-        Folders below ``pyvista_vdi/`` and below ``opencl/`` whose code decides the figure, such as
-        ``"raycasting"``. Those that every picture passes through are added.
-
-    Returns
-    -------
-    dict
-        ``commit``: of the checkout that the package runs from, with ``+`` where files differ from
-        it, and ``None`` outside a checkout; ``sources``: SHA-256 by room, see :func:`room_hash`.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a room is neither a folder of the package nor of the kernels.
+    ``rooms``: folders below ``pyvista_vdi/`` and below ``opencl/`` whose code decides the figure,
+    such as ``"raycasting"``. Those that every picture passes through are added. Returns:
+    ``commit``: of the checkout that the package runs from, with ``+`` where files differ from it,
+    and ``None`` outside a checkout; ``sources``: SHA-256 by room, see :func:`room_hash`. Raises
+    InvalidArgumentError if a room is neither a folder of the package nor of the kernels.
     """
     wanted = sorted({*_EVERY_FIGURE, *rooms})
     return {"commit": _commit(), "sources": {room: room_hash(room) for room in wanted}}
@@ -50,10 +39,7 @@ def room_hash(room: str) -> str:
 
     Comments, docstrings and white space do not count: they change no figure.
 
-    Raises
-    ------
-    InvalidArgumentError
-        If there is no such room.
+    Raises InvalidArgumentError if there is no such room.
     """
     digest = hashlib.sha256()
     found = [
@@ -75,10 +61,7 @@ def room_hash(room: str) -> str:
 def outdated(measured: Mapping[str, Any]) -> list[str]:
     """Return the rooms whose code is another now than when a figure was measured.
 
-    Parameters
-    ----------
-    measured : mapping
-        What :func:`provenance` returned then. A room that is gone counts as changed.
+    ``measured``: what :func:`provenance` returned then. A room that is gone counts as changed.
     """
     changed = []
     for room, digest in measured["sources"].items():

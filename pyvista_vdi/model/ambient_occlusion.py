@@ -130,17 +130,10 @@ class OcclusionGrid:
     Node (i, j, k) lies at the volume's index position ``(i, j, k) * cell``. Occlusion changes over
     lengths of the radius, so cells are an eighth of it where that is more than a voxel.
 
-    Attributes
-    ----------
-    cell : (int, int, int)
-        Voxels from node to node along x, y and z.
-    nodes : (int, int, int)
-        Nodes along x, y and z; the last of them may lie beyond the volume.
-    step : float
-        Length of a step, model units.
-    offsets : numpy.ndarray
-        Midpoints of the steps from the node along each direction, in cells; float64
-        (directions, steps, 3).
+    ``cell``: voxels from node to node along x, y and z. ``nodes``: nodes along x, y and z; the last
+    of them may lie beyond the volume. ``step``: length of a step, model units. ``offsets``:
+    midpoints of the steps from the node along each direction, in cells; float64 (directions, steps,
+    3).
     """
 
     cell: tuple[int, int, int]

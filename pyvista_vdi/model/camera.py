@@ -1,4 +1,4 @@
-"""The camera: the only place that knows world, view and list coordinates (DESIGN section 3)."""
+"""The camera and its coordinates: world, view and list (docs/conventions.md#list-coordinates)."""
 
 from __future__ import annotations
 
@@ -21,22 +21,9 @@ MAX_WINDOW_EDGE = 65536
 def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
     """Return ``window_size`` as two positive Python ints.
 
-    Parameters
-    ----------
-    window_size : sequence of int
-        Width and height in pixels.
-    name : str
-        What to call it in an error.
-
-    Returns
-    -------
-    tuple of int
-        ``(width, height)``.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it is not two whole numbers between 1 and :data:`MAX_WINDOW_EDGE`.
+    ``window_size``: width and height in pixels. ``name``: what to call it in an error. Returns:
+    ``(width, height)``. Raises InvalidArgumentError if it is not two whole numbers between 1 and
+    :data:`MAX_WINDOW_EDGE`.
     """
     try:
         width, height = window_size
@@ -359,7 +346,7 @@ class Camera:
         numpy.ndarray
             float64 (4, 4), K with ``K [X, Y, Z, 1] = [u d, v d, Z, d]``: ``(u, v)`` in [-1, 1]²
             is the viewport; ``d`` is Z in perspective and 1 in parallel projection
-            (DESIGN section 3, "List coordinates").
+            (docs/conventions.md#list-coordinates).
         """
         half_width, half_height = self.half_extent(window_size)
         denominator = 3 if self.parallel_projection else 2

@@ -53,10 +53,7 @@ def not_taken(value: Any) -> type[InvalidArgumentError]:
 def as_flag(value: Any, name: str) -> bool:
     """Return what is true or false as a bool.
 
-    Raises
-    ------
-    InvalidArgumentTypeError
-        If it is anything else than a truth value, a number or ``None``.
+    Raises InvalidArgumentTypeError if it is anything else than a truth value, a number or ``None``.
     """
     if isinstance(value, bool | np.bool_ | int | float | np.number | None):
         return bool(value)
@@ -66,10 +63,7 @@ def as_flag(value: Any, name: str) -> bool:
 def one_of(value: Any, name: str, names: Sequence[str]) -> str:
     """Return a text that is one of some.
 
-    Raises
-    ------
-    InvalidArgumentError
-        If it is not.
+    Raises InvalidArgumentError if it is not.
     """
     if isinstance(value, str) and value in names:
         return value
@@ -100,10 +94,7 @@ def three_wholes(values: Any, what: str, least: int) -> tuple[int, int, int]:
 
     ``what`` says what they are: the argument's name, and what it means.
 
-    Raises
-    ------
-    InvalidArgumentError
-        If they are no such numbers.
+    Raises InvalidArgumentError if they are no such numbers.
     """
     try:
         x, y, z = (as_whole(k) for k in values)
@@ -127,20 +118,9 @@ def as_floats(values: Any) -> NDArray[np.float64]:
 def memory_limit_bytes(memory_limit: Any) -> int | None:
     """Return a memory limit in bytes.
 
-    Parameters
-    ----------
-    memory_limit : None, int, float or str
-        Bytes, or a text with a unit: ``"2 GiB"`` (2^30 bytes), ``"2 GB"`` (10^9), KiB to TiB.
-
-    Returns
-    -------
-    int or None
-        ``None`` where there is none.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it is no size above 0.
+    ``memory_limit``: bytes, or a text with a unit: ``"2 GiB"`` (2^30 bytes), ``"2 GB"`` (10^9), KiB
+    to TiB. Returns: ``None`` where there is none. Raises InvalidArgumentError if it is no size
+    above 0.
     """
     if memory_limit is None:
         return None

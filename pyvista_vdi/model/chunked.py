@@ -30,30 +30,13 @@ _CHUNK_POINTS = 64
 class ChunkedArray:
     """A three-dimensional array in chunks, of which parts are read as NumPy arrays.
 
-    Parameters
-    ----------
-    source : dask.array.Array or zarr.Array or h5py.Dataset
-        Whatever has ``shape``, ``dtype``, ``chunks`` and is indexed by slices.
-    index : sequence of int or slice, optional
-        What is taken of a source that has more dimensions, time and channel say: a number for each
-        axis that is left out, ``slice(None)`` for z, y and x.
-    name : str, optional
-        What messages call it.
-    checked : callable, optional
-        Turns what was read into what a volume holds: widened, native, C-contiguous.
-    dtype : dtype_like, optional
-        Of that.
-
-    Attributes
-    ----------
-    shape, dtype, ndim, size, nbytes
-        As of a NumPy array (z, y, x).
-    chunks : (int, int, int)
-        Points of a chunk along z, y and x; the last ones may have fewer.
-    source : str
-        What messages call it.
-    lazy : dask.array.Array or None
-        The array as Dask has it, if it does.
+    ``source``: whatever has ``shape``, ``dtype``, ``chunks`` and is indexed by slices. ``index``:
+    what is taken of a source that has more dimensions, time and channel say: a number for each axis
+    that is left out, ``slice(None)`` for z, y and x. ``name``: what messages call it. ``checked``:
+    turns what was read into what a volume holds: widened, native, C-contiguous. ``dtype``: of that.
+    ``shape``, ``dtype``, ``ndim``, ``size``, ``nbytes``: as of a NumPy array (z, y, x). ``chunks``:
+    points of a chunk along z, y and x; the last ones may have fewer. ``source``: what messages call
+    it. ``lazy``: the array as Dask has it, if it does.
     """
 
     def __init__(

@@ -15,17 +15,8 @@ def coarser(vdi: VDI, step: int = 4) -> VDI:
     A list of the result is the one of ``vdi`` that the middle of its pixel lies in. The medium of
     its supersegments is the same, so their optical depths follow the length along the new middle.
 
-    Parameters
-    ----------
-    vdi : VDI
-        What it stands for.
-    step : int
-        Lists along an edge that one takes the place of.
-
-    Returns
-    -------
-    VDI
-        Of ⌈W / step⌉ by ⌈H / step⌉ lists, exact and without metadata.
+    ``vdi``: what it stands for. ``step``: lists along an edge that one takes the place of. Returns:
+    Of ⌈W / step⌉ by ⌈H / step⌉ lists, exact and without metadata.
     """
     camera, (width, height) = vdi.camera, vdi.window_size
     window = (-(-width // step), -(-height // step))

@@ -1,8 +1,8 @@
 """Over, opacity over a length, split and merge of homogeneous segments, in float64 NumPy.
 
-The laws of DESIGN section 3, "A supersegment is a homogeneous medium" and "Merging samples into a
-supersegment". A *segment* is a homogeneous medium between two depths; what it absorbs is its
-optical depth tau, never its opacity: opacity rounds to 1 and then no longer says how much.
+The laws of docs/conventions.md#a-supersegment-is-a-homogeneous-medium and
+docs/conventions.md#merging-samples-into-a-supersegment. A *segment* is a homogeneous medium between
+two depths; what it absorbs is its optical depth tau, never its opacity, which rounds to 1.
 Colours are straight RGB in segments and premultiplied in images.
 """
 
@@ -24,14 +24,8 @@ WEIGHTINGS = ("transmittance", "optical_depth")
 class Segment(NamedTuple):
     """A homogeneous medium between two depths on a ray.
 
-    Attributes
-    ----------
-    front, back : float
-        Where it begins and ends, in any unit of length along the ray; ``front < back``.
-    color : numpy.ndarray
-        Straight RGB, float64 (3,).
-    optical_depth : float
-        tau >= 0 from front to back.
+    ``front``, ``back``: where it begins and ends, in any unit of length along the ray; ``front <
+    back``. ``color``: straight RGB, float64 (3,). ``optical_depth``: tau >= 0 from front to back.
     """
 
     front: float
@@ -41,17 +35,10 @@ class Segment(NamedTuple):
 
 
 def opacity(optical_depth: ArrayLike) -> Array:
-    """Return the opacity of a medium, alpha = 1 - exp(-tau) (DESIGN section 3).
+    """Return the opacity of a medium, alpha = 1 - exp(-tau).
 
-    Parameters
-    ----------
-    optical_depth : array_like of float
-        tau >= 0, any shape; infinity is opaque.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64, 0 to 1, of the same shape; exact for small tau, where 1 - exp would cancel.
+    ``optical_depth``: tau >= 0, any shape; infinity is opaque. Returns: float64, 0 to 1, of the
+    same shape; exact for small tau, where 1 - exp would cancel.
     """
     return np.asarray(-np.expm1(-_not_negative("optical_depth", optical_depth)))
 
@@ -59,20 +46,8 @@ def opacity(optical_depth: ArrayLike) -> Array:
 def optical_depth(opacity: ArrayLike) -> Array:
     """Return the optical depth of an opacity, tau = -log1p(-alpha); infinite where alpha is 1.
 
-    Parameters
-    ----------
-    opacity : array_like of float
-        0 to 1, any shape.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 of the same shape.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a value lies outside [0, 1] or is NaN.
+    ``opacity``: 0 to 1, any shape. Returns: float64 of the same shape. Raises InvalidArgumentError
+    if a value lies outside [0, 1] or is NaN.
     """
     alpha = np.asarray(opacity, dtype=np.float64)
     if not ((alpha >= 0) & (alpha <= 1)).all():
@@ -84,15 +59,7 @@ def optical_depth(opacity: ArrayLike) -> Array:
 def transmittance(optical_depth: ArrayLike) -> Array:
     """Return the share of light that passes, exp(-tau) = 1 - alpha.
 
-    Parameters
-    ----------
-    optical_depth : array_like of float
-        tau >= 0, any shape.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64, 0 to 1, of the same shape.
+    ``optical_depth``: tau >= 0, any shape. Returns: float64, 0 to 1, of the same shape.
     """
     return np.asarray(np.exp(-_not_negative("optical_depth", optical_depth)))
 
@@ -102,24 +69,10 @@ def optical_depth_over_length(
 ) -> Array:
     """Return tau l / L, what a ray meets that crosses length l of a segment of length L.
 
-    Parameters
-    ----------
-    optical_depth : array_like of float
-        tau over the whole length.
-    length : array_like of float
-        l >= 0, the length crossed; may exceed L where the ray is oblique. Model units.
-    whole_length : array_like of float
-        L > 0, the length over which tau was measured; the same unit.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64, the extinction tau / L times the length (Beer-Lambert).
-
-    Raises
-    ------
-    InvalidArgumentError
-        If an argument is negative or NaN, or L is zero.
+    ``optical_depth``: tau over the whole length. ``length``: l >= 0, the length crossed; may exceed
+    L where the ray is oblique. Model units. ``whole_length``: l > 0, the length over which tau was
+    measured; the same unit. Returns: float64, the extinction tau / L times the length
+    (Beer-Lambert). Raises InvalidArgumentError if an argument is negative or NaN, or L is zero.
     """
     whole = np.asarray(whole_length, dtype=np.float64)
     if not (whole > 0).all():
@@ -131,15 +84,8 @@ def optical_depth_over_length(
 def over(front: ArrayLike, back: ArrayLike) -> Array:
     """Composite ``front`` over ``back`` (Porter and Duff 1984, the paper's reference 10).
 
-    Parameters
-    ----------
-    front, back : array_like of float, shape (..., 4)
-        Premultiplied RGBA.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (..., 4), premultiplied RGBA: ``front + (1 - front alpha) back``. Associative.
+    ``front``, ``back`` (float, shape (..., 4)): premultiplied RGBA. Returns: float64 (..., 4),
+    premultiplied RGBA: ``front + (1 - front alpha) back``. Associative.
     """
     near, far = np.asarray(front, dtype=np.float64), np.asarray(back, dtype=np.float64)
     return np.asarray(near + (1 - near[..., 3:]) * far)
@@ -148,19 +94,11 @@ def over(front: ArrayLike, back: ArrayLike) -> Array:
 def composite(color: ArrayLike, optical_depth: ArrayLike) -> Array:
     """Composite homogeneous media, front to back, onto nothing.
 
-    Parameters
-    ----------
-    color : array_like of float, shape (n, 3)
-        Straight RGB of each medium, the nearest first.
-    optical_depth : array_like of float, shape (n,)
-        tau of each on this ray.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (4,), premultiplied RGBA. The same as n times :func:`over`, but formed from sums
-        of optical depths, so that no rounding of 1 - alpha enters: medium k contributes
-        ``exp(-(tau_0 + ... + tau_(k-1))) (1 - exp(-tau_k))`` of its colour.
+    ``color`` (float, shape (n, 3)): straight RGB of each medium, the nearest first.
+    ``optical_depth`` (float, shape (n,)): tau of each on this ray. Returns: float64 (4,),
+    premultiplied RGBA. The same as n times :func:`over`, but formed from sums of optical depths, so
+    that no rounding of 1 - alpha enters: medium k contributes ``exp(-(tau_0 + ... + tau_(k-1))) (1
+    - exp(-tau_k))`` of its colour.
     """
     tau = _not_negative("optical_depth", optical_depth)
     rgb = np.asarray(color, dtype=np.float64).reshape(len(tau), 3)
@@ -172,23 +110,10 @@ def composite(color: ArrayLike, optical_depth: ArrayLike) -> Array:
 def split(segment: Segment, depth: float) -> tuple[Segment, Segment]:
     """Cut a segment in two at a depth.
 
-    Parameters
-    ----------
-    segment : Segment
-        What to cut.
-    depth : float
-        Where; strictly between its front and its back.
-
-    Returns
-    -------
-    tuple of Segment
-        The nearer and the farther part, of the same colour, with tau in proportion to length:
-        composited again they are the whole.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If ``depth`` does not lie inside.
+    ``segment``: what to cut. ``depth``: where; strictly between its front and its back. Returns:
+    The nearer and the farther part, of the same colour, with tau in proportion to length:
+    composited again they are the whole. Raises InvalidArgumentError if ``depth`` does not lie
+    inside.
     """
     if not segment.front < depth < segment.back:
         raise InvalidArgumentError(
@@ -205,24 +130,13 @@ def split(segment: Segment, depth: float) -> tuple[Segment, Segment]:
 def merge(near: Segment, far: Segment, weighting: str = "transmittance") -> Segment:
     """Replace two neighbours by one homogeneous segment that spans both.
 
-    Parameters
-    ----------
-    near, far : Segment
-        The nearer and the farther; they touch, or what lies between them is empty.
-    weighting : {"transmittance", "optical_depth"}
-        ``"transmittance"``: the colour that makes the merged segment look exactly as the two
-        looked along this ray. ``"optical_depth"``: the mean weighted by tau, unbiased from other
-        directions. They agree in the limit of thin segments and where the colours are equal.
-
-    Returns
-    -------
-    Segment
-        From the nearer front to the farther back; optical depths add.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the two overlap or are in the wrong order, or ``weighting`` is unknown.
+    ``near``, ``far``: the nearer and the farther; they touch, or what lies between them is empty.
+    ``weighting`` ("transmittance", "optical_depth"): ``"transmittance"``: the colour that makes the
+    merged segment look exactly as the two looked along this ray. ``"optical_depth"``: the mean
+    weighted by tau, unbiased from other directions. They agree in the limit of thin segments and
+    where the colours are equal. Returns: From the nearer front to the farther back; optical depths
+    add. Raises InvalidArgumentError if the two overlap or are in the wrong order, or ``weighting``
+    is unknown.
     """
     if not near.back <= far.front:
         raise InvalidArgumentError(

@@ -36,35 +36,18 @@ def covering_view(
     projected corners. So V_N = V_O hits every list on its centre ray, and neither panning nor
     zooming out shows a cut edge.
 
-    Parameters
-    ----------
-    camera : Camera
-        The view on the screen, with the model transform in it.
-    window_size : (int, int)
-        The screen's width and height in pixels.
-    corners : array_like of float, shape (n, 3)
-        Points whose convex hull contains the volume, model frame.
-    max_lists_per_pixel : float
-        Most lists, as a multiple of the window's pixels. Where the rectangle would need more,
-        lists become larger than pixels, square as before, and their borders no longer coincide.
+    ``camera``: the view on the screen, with the model transform in it. ``window_size``: the
+    screen's width and height in pixels. ``corners`` (float, shape (n, 3)): points whose convex hull
+    contains the volume, model frame. ``max_lists_per_pixel``: most lists, as a multiple of the
+    window's pixels. Where the rectangle would need more, lists become larger than pixels, square as
+    before, and their borders no longer coincide. Returns: The view with its own window centre and
+    view angle (or parallel scale), and its window size. ``None`` if a corner is behind the eye or
+    closer than a thousandth of the corners' diagonal: no window can cover them. Raises
+    InvalidArgumentError if the window size or the limit is out of range.
 
-    Returns
-    -------
-    (Camera, (int, int)) or None
-        The view with its own window centre and view angle (or parallel scale), and its window
-        size. ``None`` if a corner is behind the eye or closer than a thousandth of the corners'
-        diagonal: no window can cover them.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the window size or the limit is out of range.
-
-    Notes
-    -----
-    With t the tangents of the half angles and c the window centre (DESIGN section 3), the pixel
-    rectangle [x0, x1) of width w in a window of width W has t' = t w / W and
-    c' t' = t (c + (x0 + x1) / W - 1); the same in y, and with s for t in parallel projection.
+    With t the tangents of the half angles and c the window centre, the pixel rectangle [x0, x1) of
+    width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
+    in y, and with s for t in parallel projection (docs/conventions.md#list-coordinates).
     """
     camera = Camera.from_any(camera)
     size = np.asarray(check_window_size(window_size), dtype=np.float64)
@@ -99,21 +82,11 @@ def view_in_sight(
 ) -> tuple[Camera, tuple[int, int]] | None:
     """Cut a view's window down to the pixels in which a volume can be seen.
 
-    Parameters
-    ----------
-    camera : Camera
-        The view on the screen, with the model transform in it.
-    window_size : (int, int)
-        The screen's width and height in pixels.
-    corners : array_like of float, shape (n, 3)
-        Points whose convex hull contains the volume, model frame.
-
-    Returns
-    -------
-    (Camera, (int, int)) or None
-        The view of the smallest rectangle of whole pixels of the window that the projected corners
-        allow, and its size: the whole window where a corner is behind the eye or close to it.
-        ``None`` if nothing of the volume is in the window.
+    ``camera``: the view on the screen, with the model transform in it. ``window_size``: the
+    screen's width and height in pixels. ``corners`` (float, shape (n, 3)): points whose convex hull
+    contains the volume, model frame. Returns: The view of the smallest rectangle of whole pixels of
+    the window that the projected corners allow, and its size: the whole window where a corner is
+    behind the eye or close to it. ``None`` if nothing of the volume is in the window.
     """
     size = check_window_size(window_size)
     points = np.asarray(corners, dtype=np.float64)

@@ -177,13 +177,9 @@ class Cropping:
 class Within:
     """What cropping keeps of a box.
 
-    Attributes
-    ----------
-    cuts : numpy.ndarray
-        The low and the high plane of each axis, moved into the box, float64 (3, 2).
-    box : numpy.ndarray or None
-        Low and high of what is kept along each normal, where that is a box, float64 (3, 2): NaN if
-        it is nothing. ``None`` where it takes the regions to say it.
+    ``cuts``: the low and the high plane of each axis, moved into the box, float64 (3, 2). ``box``:
+    low and high of what is kept along each normal, where that is a box, float64 (3, 2): NaN if it
+    is nothing. ``None`` where it takes the regions to say it.
     """
 
     cuts: NDArray[np.float64]
@@ -193,10 +189,7 @@ class Within:
 def checked_opacity_multiplier(multiplier: Any) -> float:
     """Return a factor of the extinction as a float, 0 or above.
 
-    Raises
-    ------
-    InvalidArgumentError
-        If it is no finite number, or below 0.
+    Raises InvalidArgumentError if it is no finite number, or below 0.
     """
     factor = as_float(multiplier)
     if not 0 <= factor < np.inf:

@@ -54,16 +54,10 @@ class Geometry:
 class Grid(Geometry):
     """A uniform grid without its values.
 
-    Attributes
-    ----------
-    dimensions : (int, int, int)
-        Points along x, y and z.
-    spacing, origin : (float, float, float)
-        As of a :class:`~pyvista_vdi.model.volume.Volume`, model units.
-    direction : numpy.ndarray, float64 (3, 3)
-        Columns are the directions of the index axes.
-    unit_distance : float or None
-        In place of :attr:`default_unit_distance`.
+    ``dimensions``: points along x, y and z. ``spacing``, ``origin``: as of a
+    :class:`~pyvista_vdi.model.volume.Volume`, model units. ``direction`` (float64 (3, 3)): columns
+    are the directions of the index axes. ``unit_distance``: in place of
+    :attr:`default_unit_distance`.
     """
 
     dimensions: tuple[int, int, int]

@@ -21,19 +21,8 @@ _COARSER = 1.01
 def nearest_depth(grid: Geometry, camera: Camera, window_size: Sequence[int]) -> float | None:
     """Return the view depth of the visible part of a grid's box that is nearest to the eye.
 
-    Parameters
-    ----------
-    grid : Geometry
-        Of a volume.
-    camera : Camera
-        V_O.
-    window_size : (int, int)
-        Lists of V_O along x and y.
-
-    Returns
-    -------
-    float or None
-        World units, 0 where the eye is in the box; ``None`` where nothing of it is in the window.
+    ``grid``: of a volume. ``camera``: V_O. ``window_size``: lists of V_O along x and y. Returns:
+    World units, 0 where the eye is in the box; ``None`` where nothing of it is in the window.
     """
     to_view = camera.model_to_view @ grid.index_to_model
     to_view[:3, :3] *= np.asarray(grid.dimensions) - 1  # the box is [0, 1]³ then
@@ -77,21 +66,8 @@ def required_level(
     nearest to V_O: between the lists, what a finer one has more is hardly seen. Edges of voxels
     count along the axes in which a level is coarser: many stores keep their few planes in all.
 
-    Parameters
-    ----------
-    levels : sequence of Geometry
-        From the finest to the coarsest.
-    camera : Camera
-        V_O.
-    window_size : (int, int)
-        Lists of V_O along x and y.
-    unit : str
-        What lengths are called.
-
-    Returns
-    -------
-    (int, str)
-        Its number, and a sentence.
+    ``levels``: from the finest to the coarsest. ``camera``: V_O. ``window_size``: lists of V_O
+    along x and y. ``unit``: what lengths are called. Returns: Its number, and a sentence.
     """
     width = nearest_list_width(levels[0], camera, window_size)
     if width is None:

@@ -67,22 +67,9 @@ def over_background(
 ) -> NDArray[np.float64]:
     """Blend a premultiplied image over a background.
 
-    Parameters
-    ----------
-    image : array_like of float, shape (H, W, 4) or (H, W, 3)
-        Premultiplied RGBA, or RGB, which has nothing to blend.
-    background : (float, float, float)
-        RGB, 0 to 1.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (H, W, 3), clipped to 0..1.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it is not such an image, or not finite.
+    ``image`` (float, shape (H, W, 4) or (H, W, 3)): premultiplied RGBA, or RGB, which has nothing
+    to blend. ``background``: RGB, 0 to 1. Returns: float64 (H, W, 3), clipped to 0..1. Raises
+    InvalidArgumentError if it is not such an image, or not finite.
     """
     try:
         pixels = np.asarray(image)

@@ -68,10 +68,7 @@ class Lists(Protocol):
 class Packed16:
     """The 16-byte form: depths and optical depths as they are, colours in 32 bits.
 
-    Parameters
-    ----------
-    color : numpy.ndarray
-        uint32 (n,): red in bits 0 to 10, green in 11 to 21, blue in 22 to 31.
+    ``color``: uint32 (n,): red in bits 0 to 10, green in 11 to 21, blue in 22 to 31.
     """
 
     color: NDArray[np.uint32]
@@ -94,17 +91,10 @@ class Packed8:
     A depth is ``step * (origins[i] + code * strides[i])`` in list i, in whole numbers below 2^24
     that float32 holds, times a power of two: exact on every device.
 
-    Parameters
-    ----------
-    step : float
-        Step of the VDI's depth grid, world units; a power of two.
-    origins : numpy.ndarray
-        int32 (W * H,): where each list's codes begin, steps; 0 for an empty list.
-    strides : numpy.ndarray
-        uint16 (W * H,): steps per code; 0 for an empty list.
-    words : numpy.ndarray
-        uint32 (n, 2): front in bits 0 to 13, back in 14 to 27, optical depth in 28 to 39, red,
-        green and blue from 40, 48 and 56 on.
+    ``step``: step of the VDI's depth grid, world units; a power of two. ``origins``: int32 (W *
+    H,): where each list's codes begin, steps; 0 for an empty list. ``strides``: uint16 (W * H,):
+    steps per code; 0 for an empty list. ``words``: uint32 (n, 2): front in bits 0 to 13, back in 14
+    to 27, optical depth in 28 to 39, red, green and blue from 40, 48 and 56 on.
     """
 
     step: float
@@ -191,10 +181,7 @@ def check_precision(precision: object) -> str:
 def packing_of(vdi: Lists, precision: str) -> Packing:
     """Return a VDI's supersegments in a packed form.
 
-    Raises
-    ------
-    InvalidArgumentError
-        If a list is too long for the 8-byte form.
+    Raises InvalidArgumentError if a list is too long for the 8-byte form.
     """
     if precision == "16-byte":
         return Packed16(packed_color(vdi.color, _COLOR_16))
@@ -367,22 +354,10 @@ def packed_8(
 ) -> Packed8:
     """Return the 8-byte form of what a file holds, checked.
 
-    Parameters
-    ----------
-    step : float
-        Of the depth grid.
-    offsets : numpy.ndarray
-        The lists'.
-    stored : mapping
-        ``origin``, ``stride``, ``front`` and ``back`` as :func:`gaps_and_thicknesses` gives them
-        for every ``chunk_rows`` supersegments, ``color`` and ``optical_depth``.
-    chunk_rows : int
-        See above.
-
-    Raises
-    ------
-    InvalidVDIError
-        If packing gives no such codes.
+    ``step``: of the depth grid. ``offsets``: the lists'. ``stored``: ``origin``, ``stride``,
+    ``front`` and ``back`` as :func:`gaps_and_thicknesses` gives them for every ``chunk_rows``
+    supersegments, ``color`` and ``optical_depth``. ``chunk_rows``: see above. Raises
+    InvalidVDIError if packing gives no such codes.
     """
     if (offsets[1:] < offsets[:-1]).any():
         raise InvalidVDIError("offsets must not decrease")

@@ -54,9 +54,10 @@ class TransferFunction:
 
     Notes
     -----
-    The extinction at a scalar x is sigma(x) = -log1p(-a(x)) / U (DESIGN section 3): opacity is
-    interpolated first and converted then, as VTK does. Where a is 1 the medium is opaque whatever
-    U is: every step then has an optical depth of at least :data:`OPAQUE_OPTICAL_DEPTH`.
+    The extinction at a scalar x is sigma(x) = -log1p(-a(x)) / U: opacity is interpolated first and
+    converted then, as VTK does (docs/conventions.md#from-a-volume-to-the-medium). Where a is 1
+    the medium is opaque whatever U is: every step then has an optical depth of at least
+    :data:`OPAQUE_OPTICAL_DEPTH`.
 
     A gradient opacity g makes of a step's opacity alpha g alpha, as VTK's GPU mapper does. The
     magnitude is that of central differences over a voxel each way, times the mean of the three

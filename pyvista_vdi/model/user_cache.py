@@ -34,10 +34,7 @@ def user_cache() -> Path | None:
 def writable_cache(name: str, author: str | None = None) -> Path:
     """Return the user's cache folder of a program, which is made if it is not there.
 
-    Raises
-    ------
-    OSError
-        If files cannot be made in it.
+    Raises OSError if files cannot be made in it.
     """
     try:
         folder = Path(platformdirs.user_cache_dir(name, author or False))

@@ -1,4 +1,4 @@
-"""The Volumetric Depth Image: its arrays and their rules (DESIGN section 2)."""
+"""The Volumetric Depth Image: arrays and rules (docs/conventions.md#the-arrays-of-a-vdi)."""
 
 from __future__ import annotations
 
@@ -99,7 +99,30 @@ class VDI:
         self.optical_depth = _array("optical_depth", optical_depth, np.float32, ())
         self.bounds = _checked_bounds(bounds)
         self.packing = None
-        self._check_lists()
+        # Check that the lists' offsets and the arrays' lengths fit together
+        width, height = self.window_size
+        n_lists, n = width * height, len(self.front)
+        if len(self.offsets) != n_lists + 1:
+            raise InvalidVDIError(
+                f"offsets must have W * H + 1 = {n_lists + 1} entries for {width} x {height} "
+                f"lists; got {len(self.offsets)}"
+            )
+        if self.offsets[0] != 0:
+            raise InvalidVDIError(f"offsets[0] must be 0; got {self.offsets[0]}")
+        falls = self.offsets[1:] < self.offsets[:-1]
+        if falls.any():
+            i = int(np.argmax(falls))
+            raise InvalidVDIError(
+                f"offsets must not decrease; offsets[{i}] = {self.offsets[i]} is followed by "
+                f"{self.offsets[i + 1]}"
+            )
+        for name in _MEDIA:
+            if len(getattr(self, name)) != n or self.offsets[-1] != n:
+                lengths = [f"{each} has {len(getattr(self, each))}" for each in _MEDIA]
+                raise InvalidVDIError(
+                    f"offsets[-1] = {self.offsets[-1]} supersegments, but {', '.join(lengths)} "
+                    "entries: give each as many"
+                )
         self._check_media()
 
     @classmethod
@@ -252,7 +275,7 @@ class VDI:
     def thinned(self, along_x: int = 1, along_y: int = 1) -> VDI:
         """Return a VDI of every k-th list along the window's width and height.
 
-        See :func:`pyvista_vdi.model.thinned.thinned`.
+        See :func:`pyvista_vdi.model.list_subsampling.subsampled_lists`.
         """
         return provider("thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
 
@@ -308,31 +331,6 @@ class VDI:
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         """Return what a notebook shows: a viewer, or a picture."""
         return provider("notebook_bundle")(self, include, exclude)
-
-    def _check_lists(self) -> None:
-        width, height = self.window_size
-        n_lists, n = width * height, len(self.front)
-        if len(self.offsets) != n_lists + 1:
-            raise InvalidVDIError(
-                f"offsets must have W * H + 1 = {n_lists + 1} entries for {width} x {height} "
-                f"lists; got {len(self.offsets)}"
-            )
-        if self.offsets[0] != 0:
-            raise InvalidVDIError(f"offsets[0] must be 0; got {self.offsets[0]}")
-        falls = self.offsets[1:] < self.offsets[:-1]
-        if falls.any():
-            i = int(np.argmax(falls))
-            raise InvalidVDIError(
-                f"offsets must not decrease; offsets[{i}] = {self.offsets[i]} is followed by "
-                f"{self.offsets[i + 1]}"
-            )
-        for name in _MEDIA:
-            if len(getattr(self, name)) != n or self.offsets[-1] != n:
-                lengths = [f"{each} has {len(getattr(self, each))}" for each in _MEDIA]
-                raise InvalidVDIError(
-                    f"offsets[-1] = {self.offsets[-1]} supersegments, but {', '.join(lengths)} "
-                    "entries: give each as many"
-                )
 
     def _check_media(self) -> None:
         if len(self.front) == 0:

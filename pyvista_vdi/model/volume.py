@@ -84,7 +84,16 @@ class Volume(Geometry):
         self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
         self.spacing = _checked_vector("spacing", spacing)
         self.origin = _checked_vector("origin", origin)
-        self.direction = _checked_direction(direction)
+        matrix = np.eye(3) if direction is None else as_floats(direction)
+        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+            raise InvalidVolumeError(f"direction must be 3 x 3 finite numbers; got {direction!r}")
+        if abs(np.linalg.det(matrix)) < 1e-9:
+            raise InvalidVolumeError(
+                f"the direction matrix {matrix.tolist()} cannot be inverted: its columns must be "
+                "three independent directions"
+            )
+        matrix.setflags(write=False)
+        self.direction = matrix
         self.name = str(name)
         self.blanked = None if blanked is None else self._checked_blanked(blanked)
         if min(self.spacing) <= 0:
@@ -92,7 +101,18 @@ class Volume(Geometry):
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
             )
-        self._check_places()
+        # Warn where float64 rounds the places of voxels by more than pictures bear
+        farthest = np.abs(self.bounds).reshape(3, 2).max(axis=1)
+        rounded = np.abs(self.direction.T) @ [math.ulp(at) for at in farthest]  # along each axis
+        worst = int(np.argmax(rounded / self.spacing))
+        rounding, step = rounded[worst], self.spacing[worst]
+        if rounding * _PLACES_IN_A_STEP > step:
+            warn_external(
+                f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
+                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} "
+                "apart: pictures are off by that share of a voxel; move its origin, and the "
+                "camera with it, towards 0"
+            )
 
     @property
     def dimensions(self) -> tuple[int, int, int]:  # type: ignore[override]
@@ -132,20 +152,6 @@ class Volume(Geometry):
                 f"got {octants.dtype} of shape {octants.shape}"
             )
         return octants
-
-    def _check_places(self) -> None:
-        """Warn where float64 rounds the places of voxels by more than pictures bear."""
-        farthest = np.abs(self.bounds).reshape(3, 2).max(axis=1)
-        rounded = np.abs(self.direction.T) @ [math.ulp(at) for at in farthest]  # along each axis
-        worst = int(np.argmax(rounded / self.spacing))
-        rounding, step = rounded[worst], self.spacing[worst]
-        if rounding * _PLACES_IN_A_STEP > step:
-            warn_external(
-                f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
-                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} "
-                "apart: pictures are off by that share of a voxel; move its origin, and the "
-                "camera with it, towards 0"
-            )
 
     def load(self) -> Volume:
         """Return the volume with all its voxels in memory."""
@@ -269,16 +275,3 @@ def _checked_vector(name: str, value: ArrayLike) -> tuple[float, float, float]:
         raise InvalidVolumeError(f"{name} must be three finite numbers; got {value!r}")
     x, y, z = vector.tolist()
     return x, y, z
-
-
-def _checked_direction(value: ArrayLike | None) -> NDArray[np.float64]:
-    matrix = np.eye(3) if value is None else as_floats(value)
-    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-        raise InvalidVolumeError(f"direction must be 3 x 3 finite numbers; got {value!r}")
-    if abs(np.linalg.det(matrix)) < 1e-9:
-        raise InvalidVolumeError(
-            f"the direction matrix {matrix.tolist()} cannot be inverted: its columns must be "
-            "three independent directions"
-        )
-    matrix.setflags(write=False)
-    return matrix

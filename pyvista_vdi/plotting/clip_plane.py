@@ -15,10 +15,7 @@ from pyvista_vdi.plotting.registration import Component
 class AddVDIClipPlane(Component):
     """Adds VDIs that a plane widget clips: ``plotter.add_vdi_clip_plane(volume)``.
 
-    Parameters
-    ----------
-    plotter : pyvista.BasePlotter
-        Held weakly.
+    ``plotter``: held weakly.
     """
 
     def __call__(self, volume: Any, **arguments: Any) -> Any:

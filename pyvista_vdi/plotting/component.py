@@ -31,8 +31,8 @@ from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
-from pyvista_vdi.quality.ways import checked_draw
-from pyvista_vdi.quality.when_anew import REGENERATE_BELOW, checked_bound
+from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW, checked_bound
+from pyvista_vdi.quality.render_mode import checked_draw
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array

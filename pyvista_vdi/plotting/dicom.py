@@ -102,10 +102,7 @@ def require_uncompressed(one: Slice) -> None:
 def read_slice(path: Path) -> Slice | None:
     """Return what a file says of its slice, or None where it is no DICOM image.
 
-    Raises
-    ------
-    InvalidVolumeError
-        If it is a damaged one.
+    Raises InvalidVolumeError if it is a damaged one.
     """
     pydicom = _pydicom()
     try:

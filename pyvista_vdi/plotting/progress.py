@@ -55,7 +55,7 @@ class DelayedBar:
         self._bar.set_description_str(text, refresh=False)
 
     def _compiling(self) -> None:
-        """Say why nothing goes on: the first use of a kernel may take seconds."""
+        """Show why nothing goes on: the first use of a kernel may take seconds."""
         with self._lock:
             if self._bar is not None:
                 self._describe("compiling kernels")

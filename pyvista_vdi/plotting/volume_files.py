@@ -168,7 +168,7 @@ def _code(reader: Any) -> str:
 
 
 def _place(data: pv.ImageData, to_world: NDArray[np.float64], file: Path) -> pv.ImageData:
-    """Give a grid the map from point index to world coordinates, float64 (4, 4)."""
+    """Set a grid's map from point index to world coordinates, float64 (4, 4)."""
     spacing = np.linalg.norm(to_world[:3, :3], axis=0)
     volume = abs(np.linalg.det(to_world[:3, :3]))  # of a voxel
     if not (np.isfinite(to_world).all() and volume > 1e-9 * np.prod(spacing) > 0):
@@ -243,7 +243,7 @@ def _dicom_file(file: Path) -> pv.ImageData:
 
 
 def _with_spacing(data: pv.ImageData, one: Slice) -> pv.ImageData:
-    """Give a grid its slices' spacing: releases of VTK differ in which number comes first."""
+    """Set a grid's spacing of slices: releases of VTK differ in which number comes first."""
     if one.spacing is not None and (one.spacing > 0).all():
         between_rows, between_columns = one.spacing
         data.spacing = (between_columns, between_rows, data.spacing[2])

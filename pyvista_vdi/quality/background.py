@@ -108,7 +108,7 @@ class BackgroundGeneration:
         self._worker.put(Job(make, self._device, key))
 
     def cancel(self, *, wait: bool = False) -> None:
-        """Give up what is being made, and what was made and not taken.
+        """Cancel what is being made, and drop what was made and not taken.
 
         Parameters
         ----------

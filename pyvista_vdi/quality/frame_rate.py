@@ -189,7 +189,16 @@ class FrameRateController:
         if self._choice is None:
             self._leave_full(full)
         else:
-            self._adjust(self._choice, full)
+            # Go back to full quality if it fits; change a reduced choice if it misses the aim
+            choice = self._choice
+            cost = self._cost()
+            aim, dear = self._aim(cost), full * self._full_excess
+            if cost.of(dear) + cost.error * dear <= aim:
+                self._choice, self._trial, self._cost_before_full = None, _TRIAL, cost.per_sample
+            elif abs(cost.of(choice) - aim) > self._slack(cost, choice):
+                self._choice = self._reduced(full)
+            else:
+                self._choice = self._within(choice, full)
         return full if self._choice is None else self._choice
 
     def record(self, samples: int, work_seconds: float, frame_seconds: float) -> None:
@@ -277,7 +286,7 @@ class FrameRateController:
         return band + cost.error * samples
 
     def _leave_full(self, full: int) -> None:
-        """Give up full quality if it misses the aim."""
+        """Leave full quality if it misses the aim."""
         cost = self._cost()
         if cost.of(full) <= self._aim(cost) + self._slack(cost, full):
             return
@@ -287,17 +296,6 @@ class FrameRateController:
             self._full_excess = max(raised, cost.per_sample / self._cost_before_full)
             self._trial = 0
         self._choice = self._reduced(full)
-
-    def _adjust(self, choice: int, full: int) -> None:
-        """Go back to full quality if it fits; change a reduced choice if it misses the aim."""
-        cost = self._cost()
-        aim, dear = self._aim(cost), full * self._full_excess
-        if cost.of(dear) + cost.error * dear <= aim:
-            self._choice, self._trial, self._cost_before_full = None, _TRIAL, cost.per_sample
-        elif abs(cost.of(choice) - aim) > self._slack(cost, choice):
-            self._choice = self._reduced(full)
-        else:
-            self._choice = self._within(choice, full)
 
     def _reduced(self, full: int) -> int:
         """Return the samples that meet the aim, fewer than a full frame's."""

@@ -56,23 +56,12 @@ class Pictures:
     ) -> bool:
         """Whether a VDI's picture of a view does.
 
-        Parameters
-        ----------
-        vdi : VDI
-            Of what the volume is now.
-        view : View
-            Of the whole picture.
-        detail : float
-            Magnification of the picture's own pixels, see
-            :func:`~pyvista_vdi.quality.view_error.magnification`.
-        bound : float or None
-            Least SSIM that does; ``None``: :data:`SIMILAR`, and as much contrast and detail.
-        options
-            What else an estimate depends on, compared by ``==``.
-        estimate : callable
-            Makes an estimate for this view, where no former one tells.
-        within : float
-            Degrees from V_O.
+        ``vdi``: of what the volume is now. ``view``: of the whole picture. ``detail``:
+        magnification of the picture's own pixels, see
+        :func:`~pyvista_vdi.quality.view_error.magnification`. ``bound``: least SSIM that does;
+        ``None``: :data:`SIMILAR`, and as much contrast and detail. ``options``: what else an
+        estimate depends on, compared by ``==``. ``estimate``: makes an estimate for this view,
+        where no former one tells. ``within``: degrees from V_O.
         """
         if self._of() is not vdi:
             self._of, self._judged, self._poor_from = weakref.ref(vdi), [], float("inf")

@@ -39,18 +39,10 @@ _EVEN_SHARE = 0.1
 class TileSample:
     """Tiles of a picture, and how the SSIM of the whole follows from theirs.
 
-    Attributes
-    ----------
-    corners : numpy.ndarray
-        int64 (k, 2): column and row of each tile's first pixel, from the top left.
-    size : (int, int)
-        Width and height of a tile, pixels.
-    chances, guess : numpy.ndarray
-        float64 (k,): probability of each tile to be chosen, and its guessed loss.
-    guessed : float
-        Sum of the guesses for all cells of the picture.
-    share : float
-        Of the picture's pixels that have an SSIM, in one cell.
+    ``corners``: int64 (k, 2): column and row of each tile's first pixel, from the top left.
+    ``size``: width and height of a tile, pixels. ``chances``, ``guess``: float64 (k,): probability
+    of each tile to be chosen, and its guessed loss. ``guessed``: sum of the guesses for all cells
+    of the picture. ``share``: of the picture's pixels that have an SSIM, in one cell.
     """
 
     corners: NDArray[np.int64]
@@ -62,7 +54,17 @@ class TileSample:
 
     def infer(self, ssim: Floats) -> tuple[float, float]:
         """Return the SSIM of the whole picture, and its standard error, from the tiles'."""
-        total, error = _ratio_estimate(1.0 - ssim, self.chances, self.guess, self.guessed)
+        # Total loss of all cells, and its standard error, from those that were chosen
+        losses = 1.0 - ssim
+        chances = self.chances
+        guess = self.guess
+        guessed = self.guessed
+        seen, expected = float((losses / chances).sum()), float((guess / chances).sum())
+        ratio = seen / expected if expected > 0 else 0.0
+        residuals = (losses - ratio * guess) / chances
+        n = len(losses)
+        variance = n / max(1, n - 1) * float(((1 - chances) * residuals**2).sum())
+        total, error = seen + ratio * (guessed - expected), math.sqrt(variance)
         return float(1.0 - self.share * total), float(self.share * error)
 
 
@@ -115,12 +117,8 @@ class Region:
 class Cells:
     """A region of a window cut into cells, each the part of a tile whose SSIM the tile tells.
 
-    Attributes
-    ----------
-    corners : numpy.ndarray
-        int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling curve.
-    tile_size : (int, int)
-        Width and height of a tile, pixels.
+    ``corners``: int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling
+    curve. ``tile_size``: width and height of a tile, pixels.
     """
 
     def __init__(self, region: Region, size: tuple[int, int], edge: int) -> None:
@@ -154,7 +152,8 @@ class Cells:
         """Return ``tiles`` of them, or all, the likelier the more of the loss a cell is guessed."""
         n = len(self.corners)
         chances = _chances(guess, min(tiles, n))
-        chosen = _systematic(chances)
+        turns = np.floor(np.concatenate([[0.0], np.cumsum(chances)]) + 0.5)
+        chosen = np.flatnonzero(np.diff(turns) > 0)
         return TileSample(
             self.corners[chosen],
             self.tile_size,
@@ -290,24 +289,3 @@ def _chances(guess: Floats, tiles: int) -> Floats:
         chances[beyond] = 1.0
         certain |= beyond
     return chances
-
-
-def _systematic(chances: Floats) -> NDArray[np.int64]:
-    """Indices of a systematic sample, as many as the chances add up to (Madow 1949)."""
-    turns = np.floor(np.concatenate([[0.0], np.cumsum(chances)]) + 0.5)
-    return np.flatnonzero(np.diff(turns) > 0)
-
-
-def _ratio_estimate(
-    losses: Floats, chances: Floats, guess: Floats, guessed: float
-) -> tuple[float, float]:
-    """Total loss of all cells, and its standard error, from those that were chosen.
-
-    ``guessed`` is the sum of the guesses for all cells, the arrays are of the chosen ones.
-    """
-    seen, expected = float((losses / chances).sum()), float((guess / chances).sum())
-    ratio = seen / expected if expected > 0 else 0.0
-    residuals = (losses - ratio * guess) / chances
-    n = len(losses)
-    variance = n / max(1, n - 1) * float(((1 - chances) * residuals**2).sum())
-    return seen + ratio * (guessed - expected), math.sqrt(variance)

@@ -162,23 +162,11 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
 
     Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
 
-    Parameters
-    ----------
-    vdi : VDI
-        Its camera and window say what it has.
-    camera : Camera or vtkCamera or pyvista.Camera
-        The new view V_N.
-    window_size : (int, int)
-        Width and height of its picture in pixels.
+    ``vdi``: its camera and window say what it has. ``camera``: the new view V_N. ``window_size``:
+    width and height of its picture in pixels. Returns: 0 to 1, of 33 x 33 rays that reach from edge
+    to edge of the window, and of those through the corners of the bounds; 1 where none of them
+    meets the volume.
 
-    Returns
-    -------
-    float
-        0 to 1, of 33 x 33 rays that reach from edge to edge of the window, and of those through the
-        corners of the bounds; 1 where none of them meets the volume.
-
-    Notes
-    -----
     V_O's window and what lies before its eye are convex: they contain a part of a ray if they
     contain its two ends.
     """
@@ -488,10 +476,7 @@ def eye_from_centre(
     A unit vector and a length, of the model frame as the matrix ``shown`` (3, 3) shows it. In
     parallel projection, and of an eye at the centre, they are of the vector against the view.
 
-    Raises
-    ------
-    InvalidCameraError
-        If float64 cannot hold the vector.
+    Raises InvalidCameraError if float64 cannot hold the vector.
     """
     to_world = camera.model_transform[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):

@@ -42,12 +42,8 @@ class Worker:
 
     The thread begins with a job and ends when there is none.
 
-    Parameters
-    ----------
-    name : str
-        Of the thread.
-    notify : callable
-        Returns what is called, from the worker thread, when there is something to take.
+    ``name``: of the thread. ``notify``: returns what is called, from the worker thread, when there
+    is something to take.
     """
 
     def __init__(

@@ -21,20 +21,10 @@ def cut_at_equal_lengths(
 ) -> list[Segment]:
     """Cut at equal depths from the first face to the last (Brady et al. 1997).
 
-    Parameters
-    ----------
-    runs : sequence of Segment
-        What the ray meets, nearest first; what lies between two of them is empty.
-    limit : int
-        N_S. Stretches that are empty throughout make no supersegment; the others begin and end
-        where their medium does.
-    weighting : {"transmittance", "optical_depth"}
-        Of the colours; see :func:`pyvista_vdi.model.compositing.merge`.
-
-    Returns
-    -------
-    list of Segment
-        Nearest first.
+    ``runs``: what the ray meets, nearest first; what lies between two of them is empty. ``limit``:
+    N_S. Stretches that are empty throughout make no supersegment; the others begin and end where
+    their medium does. ``weighting`` ("transmittance", "optical_depth"): of the colours; see
+    :func:`pyvista_vdi.model.compositing.merge`. Returns: Nearest first.
     """
     if not runs:
         return []
@@ -50,15 +40,7 @@ def cut_at_equal_transmittance(
     paper's "accumulated transmittance" in equal parts. What lies behind what has become opaque is
     all in the last.
 
-    Parameters
-    ----------
-    runs, limit, weighting
-        As for :func:`cut_at_equal_lengths`.
-
-    Returns
-    -------
-    list of Segment
-        Nearest first.
+    ``runs``, ``limit``, ``weighting``: as for :func:`cut_at_equal_lengths`. Returns: Nearest first.
     """
     if not runs:
         return []
@@ -71,15 +53,7 @@ def cut_at_equal_optical_depths(
 ) -> list[Segment]:
     """Cut at equal steps of optical depth, so that each supersegment lets the same share through.
 
-    Parameters
-    ----------
-    runs, limit, weighting
-        As for :func:`cut_at_equal_lengths`.
-
-    Returns
-    -------
-    list of Segment
-        Nearest first.
+    ``runs``, ``limit``, ``weighting``: as for :func:`cut_at_equal_lengths`. Returns: Nearest first.
     """
     if not runs:
         return []
@@ -97,17 +71,9 @@ def cut_where_unlike(
 
     The threshold is the least, to a thousandth, that keeps the budget on this ray.
 
-    Parameters
-    ----------
-    runs, limit, weighting
-        As for :func:`cut_at_equal_lengths`.
-    per_reference : float
-        Reference lengths (the smallest spacing) per unit of the segments' depths.
-
-    Returns
-    -------
-    list of Segment
-        Nearest first.
+    ``runs``, ``limit``, ``weighting``: as for :func:`cut_at_equal_lengths`. ``per_reference``:
+    reference lengths (the smallest spacing) per unit of the segments' depths. Returns: Nearest
+    first.
     """
     if len(runs) <= limit:
         return list(runs)

@@ -1,4 +1,4 @@
-"""From a volume to samples, to an image and to a plain VDI, in float64 (DESIGN section 3)."""
+"""From a volume to samples, to an image and to a plain VDI, in float64."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def samples(
     """Yield the samples of every pixel's ray.
 
     Samples lie at the midpoints of steps of model length ``sample_distance`` from where the ray
-    enters the grid, the last step being shorter (DESIGN section 3, "From volume to medium"), so
-    that the steps' lengths add up to the ray's length in the grid whatever its directions are.
+    enters the grid, the last step being shorter, so that the steps' lengths add up to the ray's
+    length in the grid whatever its directions are: docs/conventions.md#from-a-volume-to-the-medium.
     In perspective a ray begins no earlier than at the eye.
 
     Parameters
@@ -245,7 +245,32 @@ def build_vdi(
             else 0.0
         )
         lists.append(_cut(runs, criterion, max_supersegments, per_reference, weighting))
-    return _vdi_from(lists, camera, window_size, volume.bounds, depth_origin, criterion)
+    # Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint
+    bounds = volume.bounds
+    front, back = [], []
+    for segments in lists:
+        end = np.float32(-np.inf)
+        for segment in segments:
+            begin = max(np.float32(segment.front - depth_origin), end)
+            end = max(
+                np.float32(segment.back - depth_origin), np.nextafter(begin, np.float32(np.inf))
+            )
+            front.append(begin)
+            back.append(end)
+    flat = [segment for segments in lists for segment in segments]
+    return VDI(
+        camera,
+        window_size,
+        np.concatenate(([0], np.cumsum([len(segments) for segments in lists]))).astype(np.uint64),
+        np.array(front, dtype=np.float32),
+        np.array(back, dtype=np.float32),
+        # Means of colours in [0, 1] may round beyond it
+        np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
+        np.array([segment.optical_depth for segment in flat]),
+        bounds,
+        depth_origin=depth_origin,
+        metadata={"criterion": f"reference: {criterion}"},
+    )
 
 
 def near_depth(bounds: Sequence[float], camera: Camera) -> float:
@@ -267,36 +292,14 @@ def medium_at(
 ) -> tuple[Array, Array]:
     """Return colour and optical depth of steps whose midpoints have given grid coordinates.
 
-    Parameters
-    ----------
-    volume : Volume
-        What to sample.
-    transfer_function : TransferFunction
-        Classification and interpolation.
-    position : numpy.ndarray
-        Grid coordinates (x, y, z), in points, float64 (n, 3); transparent outside
-        [0, dimensions - 1].
-    length : numpy.ndarray
-        Of each step, float64 (n,), model units.
-    camera : Camera, optional
-        The view; a shaded volume needs one.
-    lights : Lights, optional
-        What a shaded volume is lit by; one headlight by default.
-    occlusion : NodeOcclusion, optional
-        What :func:`node_occlusion` returned.
-
-    Returns
-    -------
-    color : numpy.ndarray
-        Straight RGB, float64 (n, 3).
-    optical_depth : numpy.ndarray
-        float64 (n,): ``-log1p(-a) length / U``; where a is 1, no less than 30. A gradient opacity
-        g makes of the opacity alpha of this g alpha.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the volume is shaded and there is no camera.
+    ``volume``: what to sample. ``transfer_function``: classification and interpolation.
+    ``position``: grid coordinates (x, y, z), in points, float64 (n, 3); transparent outside [0,
+    dimensions - 1]. ``length``: of each step, float64 (n,), model units. ``camera``: the view; a
+    shaded volume needs one. ``lights``: what a shaded volume is lit by; one headlight by default.
+    ``occlusion``: what :func:`node_occlusion` returned. Returns: ``color``, straight RGB, float64
+    (n, 3). Returns: ``optical_depth``, float64 (n,): ``-log1p(-a) length / U``; where a is 1, no
+    less than 30. A gradient opacity g makes of the opacity alpha of this g alpha. Raises
+    InvalidArgumentError if the volume is shaded and there is no camera.
     """
     top = np.array(volume.dimensions) - 1
     outside = ((position < -GRID_TOLERANCE) | (position > top + GRID_TOLERANCE)).any(axis=1)
@@ -338,14 +341,9 @@ def node_occlusion(
 ) -> NodeOcclusion | None:
     """Return the occlusion on a coarse grid, as the device computes it; ``None`` for none.
 
-    Parameters
-    ----------
-    volume, transfer_function
-        What is occluded, by itself.
-    ambient_occlusion : AmbientOcclusion, optional
-        Radius, directions and strength.
-    sample_distance : float, optional
-        Length of the volume's own steps, model units; half the smallest spacing by default.
+    ``volume``, ``transfer_function``: what is occluded, by itself. ``ambient_occlusion``: radius,
+    directions and strength. ``sample_distance``: length of the volume's own steps, model units;
+    half the smallest spacing by default.
     """
     if ambient_occlusion is None:
         return None
@@ -499,11 +497,7 @@ def _cut(
         return cut_at_equal_transmittance(runs, budget, weighting)
     if criterion == "optical-depth":
         return cut_at_equal_optical_depths(runs, budget, weighting)
-    return _within_budget(runs, budget, weighting)
-
-
-def _within_budget(runs: list[Segment], budget: int, weighting: str) -> list[Segment]:
-    """Merge neighbours at least cost until there are no more than ``budget``."""
+    # Merge neighbours at least cost until there are no more than budget
     merged = list(runs)
     parts = [[run] for run in runs]  # what each was made of
     costs = [_merge_cost(a + b) for a, b in itertools.pairwise(parts)]
@@ -526,38 +520,3 @@ def _merge_cost(parts: list[Segment]) -> float:
     mean = amount.sum(axis=0) / whole
     gap = max(0.0, whole - float(length.sum()))
     return float(np.abs(amount - length[:, None] * mean).sum() + gap * mean.sum())
-
-
-def _vdi_from(
-    lists: list[list[Segment]],
-    camera: Camera,
-    window_size: Sequence[int],
-    bounds: Sequence[float],
-    depth_origin: float,
-    criterion: str,
-) -> VDI:
-    """Store segments, in view depth, as a valid VDI: rounded to float32 and still disjoint."""
-    front, back = [], []
-    for segments in lists:
-        end = np.float32(-np.inf)
-        for segment in segments:
-            begin = max(np.float32(segment.front - depth_origin), end)
-            end = max(
-                np.float32(segment.back - depth_origin), np.nextafter(begin, np.float32(np.inf))
-            )
-            front.append(begin)
-            back.append(end)
-    flat = [segment for segments in lists for segment in segments]
-    return VDI(
-        camera,
-        window_size,
-        np.concatenate(([0], np.cumsum([len(segments) for segments in lists]))).astype(np.uint64),
-        np.array(front, dtype=np.float32),
-        np.array(back, dtype=np.float32),
-        # Means of colours in [0, 1] may round beyond it
-        np.clip(np.array([segment.color for segment in flat]).reshape(-1, 3), 0, 1),
-        np.array([segment.optical_depth for segment in flat]),
-        bounds,
-        depth_origin=depth_origin,
-        metadata={"criterion": f"reference: {criterion}"},
-    )

@@ -34,14 +34,8 @@ Array = NDArray[np.float64]
 class Segments(NamedTuple):
     """What a ray crosses of one VDI, in the order in which it is met.
 
-    Attributes
-    ----------
-    begin, end : numpy.ndarray
-        float64 (n,), view depth of V_N, world units.
-    optical_depth : numpy.ndarray
-        float64 (n,), of the whole segment on this ray.
-    color : numpy.ndarray
-        float64 (n, 3), straight.
+    ``begin``, ``end``: float64 (n,), view depth of V_N, world units. ``optical_depth``: float64
+    (n,), of the whole segment on this ray. ``color``: float64 (n, 3), straight.
     """
 
     begin: Array

@@ -29,18 +29,9 @@ def mean_transmittance(
 ) -> Array:
     """Return the mean over directions of the transmittance along ``radius``, float64 (n,).
 
-    Parameters
-    ----------
-    volume : Volume
-        Its grid.
-    optical_depth : callable
-        What is in it.
-    position : numpy.ndarray
-        Grid coordinates (x, y, z) in points, float64 (n, 3).
-    radius, step : float
-        How far to march, and a step's length at most; model units.
-    directions : int
-        How many of them.
+    ``volume``: its grid. ``optical_depth``: what is in it. ``position``: grid coordinates (x, y, z)
+    in points, float64 (n, 3). ``radius``, ``step``: how far to march, and a step's length at most;
+    model units. ``directions``: how many of them.
     """
     to_index = np.linalg.inv(volume.index_to_model[:3, :3])
     steps = math.ceil(radius / step)
@@ -57,23 +48,10 @@ def mean_transmittance(
 class NodeOcclusion:
     """The occlusion on a grid's nodes, and factors of colours from it.
 
-    Parameters
-    ----------
-    volume : Volume
-        What is occluded, by itself.
-    grid : OcclusionGrid
-        Nodes and marches.
-    optical_depth : callable
-        Of the volume's own steps.
-    sample_distance : float
-        Their length, model units.
-    strength : float
-        See :class:`~pyvista_vdi.AmbientOcclusion`.
-
-    Attributes
-    ----------
-    open : numpy.ndarray
-        Mean transmittance around each node, float64 (nz, ny, nx).
+    ``volume``: what is occluded, by itself. ``grid``: nodes and marches. ``optical_depth``: of the
+    volume's own steps. ``sample_distance``: their length, model units. ``strength``: see
+    :class:`~pyvista_vdi.AmbientOcclusion`. ``open``: mean transmittance around each node, float64
+    (nz, ny, nx).
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What float32 arithmetic may make of a ray: the oracle's range (DESIGN section 3, "Borders")."""
+"""What float32 may make of a ray: the oracle's range (docs/conventions.md#borders)."""
 
 from __future__ import annotations
 
@@ -187,7 +187,11 @@ class _ListSpace:
         self.half_window = np.array(vdi.window_size) / 2
         self.depth_origin = vdi.depth_origin
         self.parallel = vdi.camera.parallel_projection
-        near, far = _depths_of_bounds(vdi)
+        # Find the smallest and largest view depth of the bounds' corners in V_O; world units
+        corners = np.array(list(itertools.product(*np.reshape(vdi.bounds, (3, 2)))))
+        matrix = vdi.camera.model_to_view
+        depth = corners @ matrix[2, :3] + matrix[2, 3]
+        near, far = max(float(depth.min()), near_limit(vdi)), float(depth.max())
         self.deep = not self.parallel and (far > DEEP_RATIO * near or self.depth_origin == 0)
 
     def moved(self, line: Line, move: _Move, size: float) -> Line:
@@ -203,21 +207,9 @@ class _ListSpace:
     def crossing(self, line: Line, axis: int, size: float, draw: Array) -> Array:
         """Return displacements of both ends in U or V that cross the nearest border at a depth.
 
-        Parameters
-        ----------
-        line : Line
-            The ray.
-        axis : int
-            0 for U, 1 for V.
-        size : float
-            Half the box, in half windows.
-        draw : numpy.ndarray
-            Two numbers in [0, 1]: which share of the ray's length, and how steeply.
-
-        Returns
-        -------
-        numpy.ndarray
-            float64 (2,), each in -1 to 1; random where no border is near enough.
+        ``line``: the ray. ``axis``: 0 for U, 1 for V. ``size``: half the box, in half windows.
+        ``draw``: two numbers in [0, 1]: which share of the ray's length, and how steeply. Returns:
+        float64 (2,), each in -1 to 1; random where no border is near enough.
         """
         at = line.t0 + draw[0] * (line.t1 - line.t0)
         first, here, last = (
@@ -266,11 +258,3 @@ class _ListSpace:
             z = self.depth_origin / (1 - q[2])
         at = np.append(1.0, q[:2] / self.half_window)
         return np.asarray(at @ self.ray_origin + z * (at @ self.ray_direction))
-
-
-def _depths_of_bounds(vdi: VDI) -> tuple[float, float]:
-    """Return the smallest and largest view depth of the bounds' corners in V_O; world units."""
-    corners = np.array(list(itertools.product(*np.reshape(vdi.bounds, (3, 2)))))
-    matrix = vdi.camera.model_to_view
-    depth = corners @ matrix[2, :3] + matrix[2, 3]
-    return max(float(depth.min()), near_limit(vdi)), float(depth.max())

@@ -1,4 +1,4 @@
-"""The exact image of any VDI from any view, in float64 (DESIGN section 3): the oracle.
+"""The exact image of any VDI from any view, in float64: the oracle (docs/conventions.md).
 
 A VDI's medium is piecewise constant, so nothing is sampled: a ray is cut where it crosses from one
 list to the next, each piece is intersected with every supersegment of its list by a linear scan,
@@ -25,7 +25,7 @@ from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, inside_
 Array = NDArray[np.float64]
 
 #: Nearest view depth of V_O, in diagonals of the bounds, that a ray is followed to in perspective:
-#: list coordinates are undefined at the eye (DESIGN section 3, "Lengths").
+#: list coordinates are undefined at the eye (docs/conventions.md#lengths).
 NEAR_LIMIT = 1e-6
 
 
@@ -45,23 +45,11 @@ class Line(NamedTuple):
 class Lists:
     """A VDI in float64, with what does not depend on the ray.
 
-    Parameters
-    ----------
-    vdi : VDI
-        What to look at.
-    opacity_multiplier : float
-        Factor of the optical depths.
-
-    Attributes
-    ----------
-    optical_depth : numpy.ndarray
-        tau, float64 (n,), multiplied.
-    front, back : numpy.ndarray
-        View depth of the faces in V_O, float64 (n,), world units, depth origin added.
-    length : numpy.ndarray
-        L, float64 (n,): length of each supersegment on its list's centre ray, model units.
-    viewport : numpy.ndarray
-        float64 (4, 4), view space of V_O to (u d, v d, Z, d).
+    ``vdi``: what to look at. ``opacity_multiplier``: factor of the optical depths.
+    ``optical_depth``: tau, float64 (n,), multiplied. ``front``, ``back``: view depth of the faces
+    in V_O, float64 (n,), world units, depth origin added. ``length``: l, float64 (n,): length of
+    each supersegment on its list's centre ray, model units. ``viewport``: float64 (4, 4), view
+    space of V_O to (u d, v d, Z, d).
     """
 
     def __init__(self, vdi: VDI, opacity_multiplier: float = 1.0) -> None:
@@ -90,12 +78,9 @@ class Lists:
 def centre_ray_scale(vdi: VDI) -> Array:
     """Return the model length of one world unit of view depth along each list's centre ray.
 
-    Returns
-    -------
-    numpy.ndarray
-        float64 (H, W), bottom row first; for the identity as model transform
-        ``sqrt(1 + (u_c t_x)^2 + (v_c t_y)^2)``, in parallel projection 1 (DESIGN section 3,
-        "A supersegment is a homogeneous medium").
+    Returns: float64 (H, W), bottom row first; for the identity as model transform ``sqrt(1 + (u_c
+    t_x)^2 + (v_c t_y)^2)``, in parallel projection 1
+    (docs/conventions.md#a-supersegment-is-a-homogeneous-medium).
     """
     width, height = vdi.window_size
     scale = np.empty((height, width))
@@ -303,18 +288,8 @@ def composite_lines(lists: Lists, lines: Sequence[Line]) -> Array:
 def composite_line(lists: Lists, line: Line) -> Array:
     """Return what the medium along a line looks like from its beginning.
 
-    Parameters
-    ----------
-    lists : Lists
-        The medium.
-    line : Line
-        Where to look, within V_O's half space Z > 0 in perspective; what lies outside its
-        viewport is empty.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (4,), premultiplied RGBA.
+    ``lists``: the medium. ``line``: where to look, within V_O's half space Z > 0 in perspective;
+    what lies outside its viewport is empty. Returns: float64 (4,), premultiplied RGBA.
     """
     crossed = crossings(lists, line)
     tau = optical_depth_over_length(
@@ -326,14 +301,9 @@ def composite_line(lists: Lists, line: Line) -> Array:
 class Crossings(NamedTuple):
     """The supersegments that a line passes through, in the order in which it meets them.
 
-    Attributes
-    ----------
-    member : numpy.ndarray
-        int64 (n,), indices of supersegments; one may be met in several pieces.
-    length : numpy.ndarray
-        float64 (n,), what is crossed of each, model units.
-    begin, end : numpy.ndarray
-        float64 (n,), where, as t of the line.
+    ``member``: int64 (n,), indices of supersegments; one may be met in several pieces. ``length``:
+    float64 (n,), what is crossed of each, model units. ``begin``, ``end``: float64 (n,), where, as
+    t of the line.
     """
 
     member: NDArray[np.int64]
@@ -414,7 +384,7 @@ def _list_crossings(
 def _list_of(at: Array, slope: Array, t: Array, window_size: tuple[int, int]) -> NDArray[np.int64]:
     """Return the list that holds the line at each t; -1 outside the viewport.
 
-    A border belongs to the higher index (DESIGN section 3, "Borders").
+    A border belongs to the higher index (docs/conventions.md#borders).
     """
     width, height = window_size
     d = at[3] + t * slope[3]

@@ -37,20 +37,10 @@ class HalfSpace(NamedTuple):
 def pixel_ray(camera: Camera, window_size: Sequence[int], x: float, y: float) -> Ray:
     """Return the ray through a point of the window.
 
-    Parameters
-    ----------
-    camera : Camera
-        The view; its model transform leads into the model frame.
-    window_size : (int, int)
-        Width and height in pixels.
-    x, y : float
-        Pixel coordinates; y = 0 is the bottom row, and whole numbers are pixel centres (pixel i
-        covers i - 1/2 to i + 1/2 here).
-
-    Returns
-    -------
-    Ray
-        In the model frame, parametrised by view depth.
+    ``camera``: the view; its model transform leads into the model frame. ``window_size``: width and
+    height in pixels. ``x``, ``y``: pixel coordinates; y = 0 is the bottom row, and whole numbers
+    are pixel centres (pixel i covers i - 1/2 to i + 1/2 here). Returns: In the model frame,
+    parametrised by view depth.
     """
     u = (2 * x + 1) / window_size[0] - 1
     v = (2 * y + 1) / window_size[1] - 1
@@ -68,11 +58,8 @@ def _view_to_model(camera: Camera) -> NDArray[np.floating[Any]]:
 def clip(half_spaces: Iterable[HalfSpace]) -> tuple[float, float] | None:
     """Return the parameters between which a ray lies in all half spaces.
 
-    Returns
-    -------
-    tuple of float or None
-        First and last t, the first smaller; ``None`` where nothing is left. Infinite where no
-        half space limits the ray.
+    Returns: First and last t, the first smaller; ``None`` where nothing is left. Infinite where no
+    half space limits the ray.
     """
     t0, t1 = -math.inf, math.inf
     for offset, slope in half_spaces:
@@ -98,14 +85,9 @@ def inside_box(ray: Ray, bounds: Sequence[float]) -> list[HalfSpace]:
 def inside_planes(ray: Ray, camera: Camera, clipping_planes: ArrayLike | None) -> list[HalfSpace]:
     """Return the half spaces that clipping planes keep.
 
-    Parameters
-    ----------
-    ray : Ray
-        In the model frame of ``camera``.
-    camera : Camera
-        Its model transform leads to the world.
-    clipping_planes : array_like of float, shape (k, 6), optional
-        Origin and normal of each, world coordinates; the side the normal points to is kept.
+    ``ray``: in the model frame of ``camera``. ``camera``: its model transform leads to the world.
+    ``clipping_planes`` (float, shape (k, 6)): origin and normal of each, world coordinates; the
+    side the normal points to is kept.
     """
     if clipping_planes is None:
         return []

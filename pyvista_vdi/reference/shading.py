@@ -18,14 +18,9 @@ def gradient_factors(
 ) -> Array:
     """Return the factor of each sample's opacity, float64 (n,), 1 without gradient opacity.
 
-    Parameters
-    ----------
-    volume : Volume
-        Its spacing and its range of scalars.
-    transfer_function : TransferFunction
-        With or without gradient opacities.
-    differences : numpy.ndarray
-        Of the scalar, from a voxel behind to a voxel ahead along x, y and z; float64 (n, 3).
+    ``volume``: its spacing and its range of scalars. ``transfer_function``: with or without
+    gradient opacities. ``differences``: of the scalar, from a voxel behind to a voxel ahead along
+    x, y and z; float64 (n, 3).
     """
     factors, limits = transfer_function.gradient_opacities, transfer_function.gradient_range
     if factors is None or limits is None:
@@ -49,49 +44,29 @@ def lit_colors(
 ) -> Array:
     """Return the colours that samples send to the eye, float64 (n, 3), clamped to [0, 1].
 
-    Parameters
-    ----------
-    volume, camera : Volume and Camera
-        Where the samples, the eye and the lights are.
-    shading, lights : Shading and Lights
-        What reflects what; without any light everything is black.
-    position : numpy.ndarray
-        Grid coordinates (x, y, z) in points, float64 (n, 3).
-    differences : numpy.ndarray
-        As for :func:`gradient_factors`.
-    color : numpy.ndarray
-        From the transfer function, float64 (n, 3).
+    ``volume``, ``camera``: where the samples, the eye and the lights are. ``shading``, ``lights``:
+    what reflects what; without any light everything is black. ``position``: grid coordinates (x, y,
+    z) in points, float64 (n, 3). ``differences``: as for :func:`gradient_factors`. ``color``: from
+    the transfer function, float64 (n, 3).
     """
     to_model = volume.index_to_model
     to_world = camera.model_transform @ to_model
     if lights.headlight_only:
-        sent = _by_headlight(camera, shading, lights, to_model, position, differences, color)
+        # Angles are those of the model frame, whatever the actor's matrix does to them
+        (light,) = lights.lights
+        eye = np.linalg.inv(camera.model_transform) @ np.append(camera.position, 1.0)
+        view = _unit(position @ to_model[:3, :3].T + to_model[:3, 3] - eye[:3])
+        facing = (_normals(to_model, differences) * view).sum(axis=1)
+        reflected = np.maximum(2 * facing**2 - 1, 0)
+        if lights.two_sided:
+            facing = np.abs(facing)
+        diffuse = shading.diffuse * facing[:, None] * np.array(light.diffuse) * color
+        highlight = np.where(reflected > 0, reflected**shading.specular_power, 0.0)
+        specular = shading.specular * highlight[:, None] * np.array(light.specular)
+        sent = shading.ambient * color + np.where(facing[:, None] > 0, diffuse + specular, 0.0)
     else:
         sent = _by_lights(camera, shading, lights, to_world, position, differences, color)
     return np.clip(sent, 0.0, 1.0)
-
-
-def _by_headlight(
-    camera: Camera,
-    shading: Shading,
-    lights: Lights,
-    to_model: Array,
-    position: Array,
-    differences: Array,
-    color: Array,
-) -> Array:
-    """Angles are those of the model frame, whatever the actor's matrix does to them."""
-    (light,) = lights.lights
-    eye = np.linalg.inv(camera.model_transform) @ np.append(camera.position, 1.0)
-    view = _unit(position @ to_model[:3, :3].T + to_model[:3, 3] - eye[:3])
-    facing = (_normals(to_model, differences) * view).sum(axis=1)
-    reflected = np.maximum(2 * facing**2 - 1, 0)
-    if lights.two_sided:
-        facing = np.abs(facing)
-    diffuse = shading.diffuse * facing[:, None] * np.array(light.diffuse) * color
-    highlight = np.where(reflected > 0, reflected**shading.specular_power, 0.0)
-    specular = shading.specular * highlight[:, None] * np.array(light.specular)
-    return shading.ambient * color + np.where(facing[:, None] > 0, diffuse + specular, 0.0)
 
 
 def _by_lights(

@@ -13,11 +13,6 @@ if TYPE_CHECKING:
         vdi_to_image,
         volume_from_vtk,
     )
-    from pyvista_vdi.vtk_pipeline.filters.dense import (
-        VDIToDenseImage,
-        vdi_from_dense_image,
-        vdi_to_dense_image,
-    )
     from pyvista_vdi.vtk_pipeline.filters.files import VDIReader, VDIWriter
     from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
     from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
@@ -31,13 +26,10 @@ _MODULES = {
     "VDIReader": "filters.files",
     "VDISource": "filters.source",
     "VDIStatus": "interaction.status",
-    "VDIToDenseImage": "filters.dense",
     "VDIToImage": "filters.image",
     "VDIWriter": "filters.files",
     "transfer_function_from_property": "filters.properties",
-    "vdi_from_dense_image": "filters.dense",
     "vdi_from_image": "filters.convert",
-    "vdi_to_dense_image": "filters.dense",
     "vdi_to_image": "filters.convert",
     "volume_from_vtk": "filters.convert",
 }
@@ -48,13 +40,10 @@ __all__ = [
     "VDIReader",
     "VDISource",
     "VDIStatus",
-    "VDIToDenseImage",
     "VDIToImage",
     "VDIWriter",
     "transfer_function_from_property",
-    "vdi_from_dense_image",
     "vdi_from_image",
-    "vdi_to_dense_image",
     "vdi_to_image",
     "volume_from_vtk",
 ]

@@ -143,6 +143,24 @@ def test_where_is_what_names_kernels_tests_and_pages_that_exist():
     assert not missing, f"docs/where_is_what.md: {missing}"
 
 
+def test_sources_refer_to_pages_and_headings_that_exist():
+    missing = set()
+    reference = re.compile(r'(docs/[\w/]+\.md)(?:#([\w-]+)|,? \(?"([^"]+)")?')
+    folders = (Path(pvdi.__file__).parent, CHECKOUT / "opencl")
+    sources = (path for folder in folders for path in folder.rglob("*"))
+    for path in (each for each in sources if each.suffix in (".py", ".cl", ".js")):
+        # A reference may go on in the next line of a comment
+        text = re.sub(r"\s*\n\s*(?:#:?|//|\*)? *", " ", path.read_text(encoding="utf-8"))
+        for page, anchor, title in reference.findall(text):
+            wanted = anchor or re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
+            there = (CHECKOUT / page).is_file()
+            anchors = _anchors(CHECKOUT / page) if there else ()
+            if not any(each.startswith(wanted) for each in anchors):
+                missing.add(f"{path.name}: {page}#{wanted}")
+        missing |= {f"{path.name}: {each}" for each in re.findall(r"DESIGN section \d+", text)}
+    assert not missing, sorted(missing)
+
+
 def test_pages_name_files_that_exist():
     missing = set()
     for page in _pages():

@@ -158,6 +158,7 @@ def pipeline(folder):
         VTK_UNSIGNED_CHAR,
         vtkImageData,
         vtkPolyData,
+        vtkStreamingDemandDrivenPipeline,
         vtkVolumeProperty,
     )
 
@@ -175,7 +176,9 @@ def pipeline(folder):
             super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
 
         def RequestInformation(self, request, inputs, outputs):
-            announce(outputs, (16, 16), (VTK_FLOAT, 1), 16)
+            announce(outputs, (16, 16), (VTK_FLOAT, 1))
+            extent = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+            outputs.GetInformationObject(0).Set(extent, (0, 15) * 3, 6)
             return int(self.fails != "information")
 
         def RequestData(self, request, inputs, outputs):

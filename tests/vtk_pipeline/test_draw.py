@@ -10,7 +10,7 @@ from skimage.metrics import structural_similarity
 from watched_windows import MOVING, WINDOW, finish, frame, frames_until, small_vdi, watched
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.quality.ways import Ways
+from pyvista_vdi.quality.render_mode import RenderModeChooser
 from pyvista_vdi.vtk_pipeline.interaction import regeneration
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM
 
@@ -84,7 +84,7 @@ def chosen(monkeypatch):
         self._way = Chosen.way
         return Chosen.way
 
-    monkeypatch.setattr(Ways, "choose", choose)
+    monkeypatch.setattr(RenderModeChooser, "choose", choose)
     return Chosen
 
 
@@ -142,7 +142,7 @@ def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_t
     actor = watched(plotter, draw="vdi")
     finish("stand-in")
     actor.mapper.SetDraw("auto")
-    each = Ways()
+    each = RenderModeChooser()
     each.took("volume", 0.0, 1.0, 1e-3)  # a millisecond per ray
     actor.mapper.painter.upkeep.ways = each
     plotter.camera.azimuth = 40
@@ -153,12 +153,12 @@ def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_t
 
 def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
     """Clocks are set: a VDI's rays cost a thousand times a volume's, far from V_O."""
-    took = Ways.took
+    took = RenderModeChooser.took
 
     def dear(self, way, angle, pixels, seconds):
         took(self, way, angle, pixels, 1e-9 * pixels * (1000 if way == "vdi" else 1))
 
-    monkeypatch.setattr(Ways, "took", dear)
+    monkeypatch.setattr(RenderModeChooser, "took", dear)
     actor = watched(plotter, draw="auto")
     finish("stand-in")  # pictures of the volume tell what its rays take
     plotter.camera.azimuth = 60

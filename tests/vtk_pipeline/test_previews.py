@@ -395,13 +395,13 @@ def test_few_pixels_from_the_side_take_few_lists(plotter, counted):
 
 def test_frames_go_on_while_fewer_lists_are_made(plotter, counted, monkeypatch):
     drawn, waited = threading.Event(), []
-    thinned = few_lists.thinned
+    subsampled = few_lists.subsampled_lists
 
     def slow(vdi, *steps):
         waited.append(drawn.wait(30))  # s; frames that waited for this would end the test here
-        return thinned(vdi, *steps)
+        return subsampled(vdi, *steps)
 
-    monkeypatch.setattr(few_lists, "thinned", slow)
+    monkeypatch.setattr(few_lists, "subsampled_lists", slow)
     watched(plotter, target_fps=400.0)
     turned(plotter, 30)
     while not threads("few lists"):

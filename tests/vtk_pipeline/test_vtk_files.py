@@ -1,4 +1,4 @@
-"""VDIs as VTK's data: the canonical and the dense form, in memory and files, bit for bit."""
+"""VDIs as VTK's data: the canonical form, in memory and files, bit for bit."""
 
 from __future__ import annotations
 
@@ -16,30 +16,18 @@ from plugin_scenes import soft_ball
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import (
-    DeviceMemoryError,
     InvalidArgumentError,
     InvalidVDIError,
     InvalidVolumeError,
     VDIFileError,
 )
 from pyvista_vdi.io import is_vdi_file, read_info
-from pyvista_vdi.model import host_memory
-from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline import (
-    VDIReader,
-    VDIToDenseImage,
-    vdi_from_dense_image,
     vdi_from_image,
-    vdi_to_dense_image,
     vdi_to_image,
 )
-from pyvista_vdi.vtk_pipeline.filters.dense import is_dense_image
 from pyvista_vdi.vtk_pipeline.vtk import (
-    vtk_to_numpy,
-    vtkExtractVOI,
-    vtkImageFlip,
-    vtkTrivialProducer,
     vtkXMLImageDataReader,
     vtkXMLImageDataWriter,
 )
@@ -333,155 +321,3 @@ def test_command_line_converts_both_ways(tmp_path, capsys):
     assert main(["render", names[1], "-o", str(tmp_path / "a.png")]) == 0
     assert main(["generate", names[1], "-o", str(tmp_path / "e.vdi")]) == 1
     assert "not a volume" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("kind", VDIS)
-def test_the_exact_dense_form_keeps_every_bit(kind, tmp_path):
-    vdi = VDIS[kind]()
-    image = vdi_to_dense_image(vdi, exact=True)
-    longest = max(1, int(vdi.counts.max()))
-    assert image.GetDimensions() == (*vdi.window_size, longest)
-    assert is_dense_image(image)
-    assert_same(vdi_from_dense_image(image), vdi)
-    wide = vdi_to_dense_image(vdi, exact=True, max_supersegments=longest + 3)
-    assert wide.GetDimensions()[2] == longest + 3
-    assert_same(vdi_from_dense_image(wide), vdi)
-    path = tmp_path / "dense.vti"
-    pv.wrap(image).save(path)
-    assert is_vdi_file(path)
-    assert_same(pvdi.read(path), vdi)
-    with pytest.raises(InvalidVDIError, match="a dense form by vdi_from_dense_image"):
-        pvdi.render(pv.read(path), vdi.camera)
-
-
-def test_points_are_the_supersegments():
-    vdi = some_vdi(5, max_window=(7, 5), max_supersegments=4)
-    image = pv.wrap(vdi_to_dense_image(vdi))
-    wide, high, deep = image.dimensions
-    color, depth, tau = (
-        image.point_data[name].reshape(deep, high, wide, -1)
-        for name in ("color", "depth", "optical_depth")
-    )
-    assert color.dtype == np.uint8
-    assert image.active_scalars_name == "color"
-    for y in range(high):
-        for x in range(wide):
-            members = vdi.list_at(x, y)
-            n = members.stop - members.start
-            alpha = opacity(vdi.optical_depth[members])
-            np.testing.assert_array_equal(color[:n, y, x, :3], np.rint(vdi.color[members] * 255))
-            np.testing.assert_allclose(color[:n, y, x, 3], alpha * 255, atol=0.501)
-            np.testing.assert_array_equal(depth[:n, y, x, 0], vdi.front[members])
-            np.testing.assert_array_equal(depth[:n, y, x, 1], vdi.back[members])
-            np.testing.assert_array_equal(tau[:n, y, x, 0], vdi.optical_depth[members])
-            for rest in (color, depth, tau):
-                assert not rest[n:, y, x].any()
-    np.testing.assert_array_equal(image.field_data["count"].reshape(high, wide), vdi.counts)
-
-
-def test_bytes_lose_colour_only_and_no_more_than_documented():
-    vdi = some_vdi(6)
-    longest = int(vdi.counts.max())
-    with pytest.raises(InvalidArgumentError, match=f"longest list has {longest}.*would drop some"):
-        vdi_to_dense_image(vdi, max_supersegments=longest - 1)
-    again = vdi_from_dense_image(vdi_to_dense_image(vdi))
-    for name in ("offsets", "front", "back", "optical_depth"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(vdi, name))
-    # half a step, and a rounding of the division
-    assert np.abs(again.color.astype(float) - vdi.color).max() <= 1 / 510 + 2**-24
-
-
-def test_memory_is_asked_for_before_it_is_taken(monkeypatch):
-    vdi = some_vdi(8)
-    width, height = vdi.window_size
-    n = width * height * int(vdi.counts.max())
-    monkeypatch.setattr(host_memory, "physical_memory", lambda: 20 * n + 24 * len(vdi.front))
-    vdi_to_dense_image(vdi)
-    with pytest.raises(DeviceMemoryError, match=r"dense form of .* lists of .*keep the canonical"):
-        vdi_to_dense_image(vdi, exact=True)
-    # A terabyte is refused at once
-    with pytest.raises(DeviceMemoryError, match="needs .* GiB on the host"):
-        vdi_to_dense_image(vdi, max_supersegments=2**40)
-
-
-@pytest.mark.parametrize(
-    ("damage", "message"),
-    [
-        (lambda i: i.field_data.remove("vdi_dense"), "no field string 'vdi_dense'"),
-        (lambda i: i.field_data.remove("count"), "needs an array 'count' of shape.*there is none"),
-        (lambda i: i.point_data.remove("depth"), "needs an array 'depth'"),
-        (lambda i: i.field_data["count"].fill(200), "must be 0 to"),
-        (lambda i: i["depth"].fill(0.0), "front < back"),
-        (lambda i: i.field_data.set_array(["{"], "vdi_dense"), "description is damaged"),
-    ],
-    ids=["plain", "no counts", "no depths", "counts", "depths", "no json"],
-)
-def test_damaged_dense_forms_are_refused(damage, message):
-    image = pv.wrap(vdi_to_dense_image(some_vdi(9))).copy()
-    damage(image)
-    with pytest.raises(InvalidVDIError, match=message):
-        vdi_from_dense_image(image)
-
-
-def test_the_filter_in_a_pipeline():
-    vdi, producer, dense = some_vdi(11), vtkTrivialProducer(), VDIToDenseImage()
-    producer.SetOutput(vdi_to_image(vdi))
-    dense.SetInputConnection(producer.GetOutputPort())
-    dense.Update()
-    longest = int(vdi.counts.max())
-    assert dense.GetOutputDataObject(0).GetDimensions() == (*vdi.window_size, longest)
-    assert not dense.GetExact()
-    dense.ExactOn()
-    dense.SetMaxSupersegments(longest + 2)
-    stamp = dense.GetMTime()
-    dense.SetExact(True)
-    dense.SetMaxSupersegments(longest + 2)
-    assert dense.GetMTime() == stamp
-    dense.Update()
-    assert dense.GetOutputDataObject(0).GetDimensions()[2] == longest + 2
-    assert_same(vdi_from_dense_image(dense.GetOutputDataObject(0)), vdi)
-    dense.ExactOff()
-    assert (dense.GetExact(), dense.GetMaxSupersegments()) == (False, longest + 2)
-    voi = vtkExtractVOI()  # what streams by extent: one slice of it
-    voi.SetInputConnection(dense.GetOutputPort())
-    voi.SetVOI(0, vdi.window_size[0] - 1, 0, vdi.window_size[1] - 1, 0, 0)
-    voi.Update()
-    assert voi.GetOutput().GetNumberOfPoints() == np.prod(vdi.window_size)
-    assert voi.GetOutput().GetPointData().GetArray("depth").GetNumberOfComponents() == 2
-    dense.SetMaxSupersegments(1)
-    with pytest.raises(InvalidArgumentError, match="would drop some"):
-        dense.Update()
-    for nonsense in (0, 1.5, "two"):
-        with pytest.raises(InvalidArgumentError, match="max_supersegments must be a whole number"):
-            dense.SetMaxSupersegments(nonsense)
-
-
-@pytest.mark.parametrize("given", ["data", "file"])
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("limit", [None, 40])
-def test_filters_behind_the_dense_form_see_all_of_it(given, exact, limit, tmp_path):
-    """They write as many components, and along z as many points, as they were told."""
-    vdi = strategies.random_vdi(np.random.default_rng(11))
-    dense = VDIToDenseImage()
-    dense.SetExact(exact)
-    dense.SetMaxSupersegments(limit)
-    if given == "data":
-        dense.SetInputDataObject(vdi_to_image(vdi))
-    else:
-        vdi.save(tmp_path / "a.vdi")
-        reader = VDIReader()
-        reader.SetFileName(tmp_path / "a.vdi")
-        dense.SetInputConnection(reader.GetOutputPort())
-    behind = vtkImageFlip()
-    behind.SetInputConnection(dense.GetOutputPort())
-    behind.SetFilteredAxis(2)
-    behind.Update()
-    expected = vdi_to_dense_image(vdi, exact=exact, max_supersegments=limit)
-    found = behind.GetOutput()
-    assert found.GetDimensions() == expected.GetDimensions()
-    one, other = (
-        vtk_to_numpy(image.GetPointData().GetScalars()).reshape(image.GetDimensions()[2], -1)
-        for image in (found, expected)
-    )
-    assert one.dtype == other.dtype
-    np.testing.assert_array_equal(one, other[::-1])

@@ -31,7 +31,7 @@ from pyvista_vdi.extensions.web.source import Made, Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.quality.when_anew import REGENERATE_BELOW, checked_bound
+from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW, checked_bound
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web

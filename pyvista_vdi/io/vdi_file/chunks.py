@@ -53,25 +53,11 @@ def write_chunks(
 ) -> list[tuple[int, int]]:
     """Compress an array chunk by chunk and write it.
 
-    Parameters
-    ----------
-    stream : file-like
-        Where the chunks go, one behind the other.
-    layout : Layout
-        Length of the array and of its chunks.
-    codec : str
-        One of :data:`CODECS`, or ``"none"`` for the bare bytes.
-    level : int
-        Effort of the compressor, 1 to 9.
-    encoded : callable
-        ``encoded(first, last)`` gives those rows as they are stored: little-endian, contiguous.
-    done : callable
-        Called after each chunk.
-
-    Returns
-    -------
-    list of (int, int)
-        Bytes of each chunk, and their CRC-32.
+    ``stream``: where the chunks go, one behind the other. ``layout``: length of the array and of
+    its chunks. ``codec``: one of :data:`CODECS`, or ``"none"`` for the bare bytes. ``level``:
+    effort of the compressor, 1 to 9. ``encoded``: ``encoded(first, last)`` gives those rows as they
+    are stored: little-endian, contiguous. ``done``: called after each chunk. Returns: Bytes of each
+    chunk, and their CRC-32.
     """
 
     def compressed(first: int) -> tuple[bytes, int]:
@@ -107,26 +93,11 @@ class PackedArray:
 
     So what is allocated afterwards is bounded by what the file really holds.
 
-    Parameters
-    ----------
-    name : str
-        Of the array, for errors.
-    layout : Layout
-        What the array must be.
-    codec : str
-        As written.
-    sizes : array_like of int
-        Bytes of each chunk.
-    n_bytes : int
-        What the sizes must add up to.
-    fetch : callable
-        ``fetch(k, begin, end)`` gives the bytes of chunk k, which lie there among the array's;
-        it raises DamagedChunkError where they are not what was written.
-
-    Raises
-    ------
-    DamagedChunkError
-        If the chunks are not as many and as long as such an array needs.
+    ``name``: of the array, for errors. ``layout``: what the array must be. ``codec``: as written.
+    ``sizes``: bytes of each chunk. ``n_bytes``: what the sizes must add up to. ``fetch``:
+    ``fetch(k, begin, end)`` gives the bytes of chunk k, which lie there among the array's; it
+    raises DamagedChunkError where they are not what was written. Raises DamagedChunkError if the
+    chunks are not as many and as long as such an array needs.
     """
 
     def __init__(
@@ -169,17 +140,9 @@ class PackedArray:
     def read(self, first: int, out: NDArray[Any]) -> None:
         """Decompress the chunk that begins with row ``first``.
 
-        Parameters
-        ----------
-        first : int
-            As :meth:`ranges` says.
-        out : numpy.ndarray
-            Takes the chunk's rows as they were stored; contiguous.
-
-        Raises
-        ------
-        DamagedChunkError
-            If the chunk is not what was written, or does not decompress.
+        ``first``: as :meth:`ranges` says. ``out``: takes the chunk's rows as they were stored;
+        contiguous. Raises DamagedChunkError if the chunk is not what was written, or does not
+        decompress.
         """
         k, rows = first // self.layout.chunk_rows, out.reshape(-1)
         try:
@@ -227,10 +190,7 @@ def workers() -> ThreadPoolExecutor:
 def chunk_sizes(data: bytes, layout: Layout, codec: str) -> list[int]:
     """Return the bytes of each chunk of an array that says so only in the chunks' own headers.
 
-    Raises
-    ------
-    DamagedChunkError
-        If the headers are not those of such an array.
+    Raises DamagedChunkError if the headers are not those of such an array.
     """
     view, sizes, begin = memoryview(data), [], 0
     for first in range(0, layout.n_rows, layout.chunk_rows):
@@ -245,10 +205,7 @@ def chunk_sizes(data: bytes, layout: Layout, codec: str) -> list[int]:
 def chunk_size(view: memoryview, raw: int, codec: str) -> int:
     """Return the bytes of the compressed chunk that begins here, its header checked.
 
-    Raises
-    ------
-    DamagedChunkError
-        If it is not the header of ``raw`` bytes compressed by that codec.
+    Raises DamagedChunkError if it is not the header of ``raw`` bytes compressed by that codec.
     """
     if len(view) < _HEADER.size:
         raise DamagedChunkError("the data end before the last chunk")

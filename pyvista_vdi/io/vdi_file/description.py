@@ -31,13 +31,10 @@ def describe(vdi: VDI, version: int) -> dict[str, Any]:
 def to_json(description: dict[str, Any]) -> str:
     """Return a description as ASCII text; float64 come back from it to the last bit.
 
-    Raises
-    ------
-    VDIFileError
-        If the metadata hold what JSON cannot, or are too long.
+    Raises VDIFileError if the metadata hold what JSON cannot, or are too long.
     """
     try:
-        text = json.dumps(description, allow_nan=False, default=_plain_number)
+        text = json.dumps(description, allow_nan=False, default=plain_number)
     except (TypeError, ValueError, RecursionError) as error:
         raise VDIFileError(
             f"the VDI's metadata cannot be written: {error}; "
@@ -53,7 +50,11 @@ def to_json(description: dict[str, Any]) -> str:
 
 def from_json(text: str | bytes) -> Any:
     """Return what the text says; ValueError or RecursionError where it is no JSON."""
-    return json.loads(text, parse_constant=_no_constant)
+
+    def no_constant(name: str) -> NoReturn:
+        raise ValueError(f"{name} is not a number of JSON")
+
+    return json.loads(text, parse_constant=no_constant)
 
 
 def number(value: object) -> float:
@@ -63,12 +64,8 @@ def number(value: object) -> float:
     return float(value)
 
 
-def _plain_number(value: Any) -> Any:
+def plain_number(value: Any) -> Any:
     """Return NumPy's numbers and arrays as Python's."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"a value of type {type(value).__name__} is not JSON")
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is not a number of JSON")

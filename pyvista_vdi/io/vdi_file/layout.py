@@ -53,18 +53,9 @@ MAX_DESCRIPTION_BYTES = 1 << 26
 class Layout:
     """How one array lies in its member.
 
-    Parameters
-    ----------
-    dtype : numpy.dtype
-        Type of its elements, little-endian.
-    row_shape : tuple of int
-        Shape of a row.
-    n_rows : int
-        Number of rows.
-    filter : {"none", "difference", "channel-difference"}
-        What was done to the rows before they were compressed.
-    chunk_rows : int
-        Rows that are compressed together.
+    ``dtype``: type of its elements, little-endian. ``row_shape``: shape of a row. ``n_rows``:
+    number of rows. ``filter`` ("none", "difference", "channel-difference"): what was done to the
+    rows before they were compressed. ``chunk_rows``: rows that are compressed together.
     """
 
     dtype: np.dtype[Any]
@@ -108,20 +99,10 @@ def layouts(
 ) -> dict[str, Layout]:
     """Return the arrays of a file, in their order.
 
-    Parameters
-    ----------
-    window_size : (int, int)
-        W and H.
-    n : int
-        Supersegments in all lists.
-    counts : numpy.dtype
-        Type of the lists' lengths, as small as they allow.
-    filtered : bool
-        Whether depths are stored as differences.
-    version : int
-        Of the format. In version 1 front and back were one array.
-    precision : str
-        One of :data:`pyvista_vdi.model.packing.PRECISIONS`; packed since version 3.
+    ``window_size``: W and H. ``n``: supersegments in all lists. ``counts``: type of the lists'
+    lengths, as small as they allow. ``filtered``: whether depths are stored as differences.
+    ``version``: of the format. In version 1 front and back were one array. ``precision``: one of
+    :data:`pyvista_vdi.model.packing.PRECISIONS`; packed since version 3.
     """
     n_lists = window_size[0] * window_size[1]
     rows = CHUNK_ROWS[version]

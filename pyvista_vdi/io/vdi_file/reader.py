@@ -77,37 +77,14 @@ _REMEDY = "copy it from its source again, or generate the VDI anew"
 class FileInfo:
     """What a .vdi file says about itself, without its arrays.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    format_version : int
-        Version of the format.
-    written_by : str
-        Program and version.
-    camera : Camera
-        The generating view V_O.
-    window_size : (int, int)
-        Lists along each edge of the viewport.
-    n_supersegments : int
-        Supersegments in all lists.
-    bounds : tuple of float
-        Axis-aligned bounds in the model frame.
-    depth_origin : float
-        World units, added to every front and back.
-    metadata : dict
-        What made the VDI.
-    codec : str
-        How the arrays are compressed: ``"zstd"``, ``"lz4"``, ``"deflate"`` or
-        ``"none"``.
-    file_bytes : int
-        Size of the file.
-    memory_bytes : int
-        Size of the VDI's arrays in memory.
-    precision : str
-        One of :data:`pyvista_vdi.model.packing.PRECISIONS`.
-    depth_step : float
-        Of the 8-byte form: step of its depths, world units.
+    ``path``: the file. ``format_version``: version of the format. ``written_by``: program and
+    version. ``camera``: the generating view V_O. ``window_size``: lists along each edge of the
+    viewport. ``n_supersegments``: supersegments in all lists. ``bounds``: axis-aligned bounds in
+    the model frame. ``depth_origin``: world units, added to every front and back. ``metadata``:
+    what made the VDI. ``codec``: how the arrays are compressed: ``"zstd"``, ``"lz4"``,
+    ``"deflate"`` or ``"none"``. ``file_bytes``: size of the file. ``memory_bytes``: size of the
+    VDI's arrays in memory. ``precision``: one of :data:`pyvista_vdi.model.packing.PRECISIONS`.
+    ``depth_step``: of the 8-byte form: step of its depths, world units.
     """
 
     path: Path

@@ -53,22 +53,14 @@ def write(
 ) -> Path:
     """Write a VDI to a file, exactly or packed: see :func:`pyvista_vdi.io.write`.
 
-    Parameters
-    ----------
-    vdi, path
-        As there; the name ends in ``.vdi``.
-    compression : {"lz4", "zstd", "deflate", "none"}
-        ``"lz4"`` is the fastest to write and to read, ``"zstd"`` makes files a few percent
-        smaller, ``"deflate"`` is for pages: browsers decode it, and draw a coarse level that it
-        begins with while they read the rest. ``"none"`` leaves plain little-endian arrays.
-    level : int, optional
-        Effort of the compressor, 1 to 9; 9 for lz4, 6 for deflate and 1 for zstd by default. Higher
-        levels are slower to write, not to read.
-    precision : {"exact", "16-byte", "8-byte"}, optional
-        Bytes of a supersegment before they are compressed, as for
-        :meth:`pyvista_vdi.VDI.with_precision`; the VDI's own by default.
-    progress : callable, optional
-        As for :func:`pyvista_vdi.io.write`.
+    ``vdi``, ``path``: as there; the name ends in ``.vdi``. ``compression`` ("lz4", "zstd",
+    "deflate", "none"): ``"lz4"`` is the fastest to write and to read, ``"zstd"`` makes files a few
+    percent smaller, ``"deflate"`` is for pages: browsers decode it, and draw a coarse level that it
+    begins with while they read the rest. ``"none"`` leaves plain little-endian arrays. ``level``:
+    effort of the compressor, 1 to 9; 9 for lz4, 6 for deflate and 1 for zstd by default. Higher
+    levels are slower to write, not to read. ``precision`` ("exact", "16-byte", "8-byte"): bytes of
+    a supersegment before they are compressed, as for :meth:`pyvista_vdi.VDI.with_precision`; the
+    VDI's own by default. ``progress``: as for :func:`pyvista_vdi.io.write`.
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
     with whole_file(path) as stream:
@@ -87,14 +79,9 @@ def write_to(
 ) -> None:
     """Write a .vdi file to a stream that can be sought in.
 
-    Parameters
-    ----------
-    stream : file-like
-        Takes the bytes.
-    vdi, compression, level, progress
-        As for :func:`write`; the VDI has the precision to write.
-    coarse : bool
-        Whether a file of version 4 begins with a coarse level.
+    ``stream``: takes the bytes. ``vdi``, ``compression``, ``level``, ``progress``: as for
+    :func:`write`; the VDI has the precision to write. ``coarse``: whether a file of version 4
+    begins with a coarse level.
     """
     counts = smallest(np.diff(vdi.offsets))
     arrays = layouts(
@@ -162,7 +149,27 @@ def _encoder(
     name: str, layout: Layout, vdi: VDI, counts: NDArray[Any]
 ) -> Callable[[int, int], NDArray[Any]]:
     if isinstance(vdi.packing, Packed8) and name != "counts":
-        return _code_encoder(name, layout, vdi)
+        # Encode an array of the 8-byte form
+        packed = vdi.packing
+        assert isinstance(packed, Packed8)
+
+        def encoded(first: int, last: int) -> NDArray[Any]:
+            rows: NDArray[Any]
+            if name in ("front", "back"):
+                rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
+            elif name == "color":
+                rows = packed.colors(first, last)
+                if layout.filter == "channel-difference":
+                    rows = channel_differences(rows)
+            elif name == "optical_depth":
+                rows = packed.tau_codes(first, last)
+            elif name == "origin":
+                rows = packed.origins[first:last]
+            else:
+                rows = packed.strides[first:last]
+            return np.ascontiguousarray(rows, dtype=layout.dtype)
+
+        return encoded
     if layout.filter == "difference":
         encode = {"front": _gaps, "back": _thicknesses}[name]
         front, back = vdi.front.view(np.uint32), vdi.back.view(np.uint32)
@@ -171,30 +178,6 @@ def _encoder(
     if isinstance(vdi.packing, Packed16) and name == "color":
         array = vdi.packing.color
     return lambda first, last: np.ascontiguousarray(array[first:last], dtype=layout.dtype)
-
-
-def _code_encoder(name: str, layout: Layout, vdi: VDI) -> Callable[[int, int], NDArray[Any]]:
-    """Encode an array of the 8-byte form."""
-    packed = vdi.packing
-    assert isinstance(packed, Packed8)
-
-    def encoded(first: int, last: int) -> NDArray[Any]:
-        rows: NDArray[Any]
-        if name in ("front", "back"):
-            rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
-        elif name == "color":
-            rows = packed.colors(first, last)
-            if layout.filter == "channel-difference":
-                rows = channel_differences(rows)
-        elif name == "optical_depth":
-            rows = packed.tau_codes(first, last)
-        elif name == "origin":
-            rows = packed.origins[first:last]
-        else:
-            rows = packed.strides[first:last]
-        return np.ascontiguousarray(rows, dtype=layout.dtype)
-
-    return encoded
 
 
 def _gaps(front: NDArray[np.uint32], back: NDArray[np.uint32]) -> NDArray[Any]:

@@ -309,7 +309,7 @@ class _Rows:
 def _kept(
     way: Callable[[int], Image], most: int, target_fps: float
 ) -> tuple[int, list[float], Image]:
-    """Let the controller find its choice; return it, the frames' times and the last picture."""
+    """Return the controller's settled choice, the frames' times and the last picture."""
     way(most)  # not counted: its kernel may have to be compiled
     controller = FrameRateController(target_fps, floor=1 / most)
     image: list[Image] = []

@@ -175,7 +175,7 @@ def _procedural(name: str, seed: int) -> Dataset:
 
 
 def require_allocation(runtime: Runtime, dataset: Dataset) -> None:
-    """Let the engine refuse a volume that no buffer of the device can hold, before it is made."""
+    """Raise the engine's error for a volume that no buffer of the device can hold."""
     if dataset.nbytes is not None:
         with runtime.buffer((dataset.nbytes,), np.uint8, f"volume {dataset.name!r}"):
             pass

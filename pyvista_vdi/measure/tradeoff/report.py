@@ -92,7 +92,7 @@ def _dominated(points: Sequence[Point]) -> Iterator[str]:
 
 
 def _volumes(data: dict[str, Any], points: Sequence[Point]) -> Iterator[str]:
-    """Say what volume renderers take, and which settings are no faster."""
+    """Yield what volume renderers take, and which settings are no faster."""
     baselines = list(Results(data).rows(what="volume rendering"))
     others = {
         name: "without skipping" if name == "volume" else label

@@ -10,7 +10,7 @@ from typing import Any
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.thinned import lists_crossed, thinned
+from pyvista_vdi.model.list_subsampling import lists_crossed, subsampled_lists
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -81,7 +81,7 @@ class FewLists:
 def _thinning(vdi: VDI, steps: Steps) -> Callable[[Runtime, Callable[[float], None]], VDI]:
     def work(runtime: Runtime, _: Callable[[float], None]) -> VDI:
         with runtime.aside():  # hundreds of milliseconds where lists are many
-            made = thinned(vdi, *steps)
+            made = subsampled_lists(vdi, *steps)
         prepared_vdi(runtime, made)  # on the device before a frame waits for it
         return made
 

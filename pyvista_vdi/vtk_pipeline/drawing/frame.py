@@ -17,8 +17,8 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.render_mode import RenderMode, rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
-from pyvista_vdi.quality.ways import Way, rise
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
 from pyvista_vdi.vtk_pipeline.interaction.window_clock import Cost, WindowClock
@@ -174,7 +174,7 @@ class Frame:
         return self.size != self.full_size
 
     @property
-    def way(self) -> Way:
+    def way(self) -> RenderMode:
         """What is raycast."""
         return "vdi" if self.stand_in is None else "volume"
 
@@ -338,7 +338,7 @@ class Drawn:
     number: int | None = None  # by which an upload is known
     joint: bool = False  # a part of a picture that other actors show the rest of
     stand_in: bool = False  # of the volume, until there is a VDI
-    way: Way = "vdi"  # what was raycast
+    way: RenderMode = "vdi"  # what was raycast
     pixels: Image | None = None
 
     @property

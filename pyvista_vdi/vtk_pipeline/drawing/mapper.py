@@ -9,7 +9,6 @@ and the fragment shader that ``VDIActor`` installs looks it up.
 from __future__ import annotations
 
 import gc
-from functools import partial
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -18,14 +17,13 @@ from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.ways import checked_draw
-from pyvista_vdi.quality.when_anew import checked_bound
+from pyvista_vdi.quality.regeneration_policy import checked_bound
+from pyvista_vdi.quality.render_mode import checked_draw
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
 from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
 from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
-from pyvista_vdi.vtk_pipeline.filters.algorithm import DEVICE, accessors
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.interaction.regeneration import checked_policy
@@ -190,50 +188,56 @@ class VDIMapperMethods(ArrayChoiceMethods):
         source = self.painter.input
         return source.source if isinstance(source, SourceInput) else None
 
-    SetDevice, GetDevice = accessors("Device", "painter.device", "device", *DEVICE, modifies=False)
+    def SetDevice(self, device: Any) -> None:
+        """Choose the OpenCL device; ``None`` is the default one."""
+        self.painter.device = device
 
-    SetAutomaticView, GetAutomaticView = accessors(
-        "AutomaticView",
-        "painter.upkeep.automatic_view",
-        "automatic",
-        "Give a source without camera the view of the first frame (on by default).",
-        "Whether a source without camera gets the view of the first frame.",
-        bool,
-        modifies=False,
-    )
+    def GetDevice(self) -> Any:
+        """Return the device as it was set."""
+        return self.painter.device
 
-    SetOpacityMultiplier, GetOpacityMultiplier = accessors(
-        "OpacityMultiplier",
-        "painter.opacity_multiplier",
-        "multiplier",
+    def SetAutomaticView(self, automatic: bool) -> None:
+        """Take the view of the first frame for a source without camera (on by default)."""
+        self.painter.upkeep.automatic_view = bool(automatic)
+
+    def GetAutomaticView(self) -> bool:
+        """Whether a source without camera gets the view of the first frame."""
+        return self.painter.upkeep.automatic_view
+
+    def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
         """Multiply the extinction of everything that is drawn; 1 by default.
 
         It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent. For
         what is not opaque it is the same as dividing the volume property's scalar opacity unit
         distance by it; changing that itself makes the VDI anew. ``InvalidArgumentError`` is raised
         if it is no finite number, or below 0.
-        """,
-        "Return the factor of the extinction.",
-        checked_opacity_multiplier,
-    )
-    SetTransmittanceCutoff, GetTransmittanceCutoff = accessors(
-        "TransmittanceCutoff",
-        "painter.transmittance_cutoff",
-        "cutoff",
+        """
+        value = checked_opacity_multiplier(multiplier)
+        if self.painter.opacity_multiplier != value:
+            self.painter.opacity_multiplier = value
+            self.Modified()
+
+    def GetOpacityMultiplier(self) -> float:
+        """Return the factor of the extinction."""
+        return self.painter.opacity_multiplier
+
+    def SetTransmittanceCutoff(self: Any, cutoff: float) -> None:
         """End rays where less light than this is left; 10^-6 by default.
 
         No channel of the picture loses more than that. VTK's own volume mappers stop at about
         1/255. VDIs that overlap are merged to the default, whatever is set here.
         ``InvalidArgumentError`` is raised if it is not from 0 to below 1.
-        """,
-        "Return the light below which rays end.",
-        checked_transmittance_cutoff,
-    )
+        """
+        value = checked_transmittance_cutoff(cutoff)
+        if self.painter.transmittance_cutoff != value:
+            self.painter.transmittance_cutoff = value
+            self.Modified()
 
-    SetDraw, GetDraw = accessors(
-        "Draw",
-        "painter.upkeep.draw",
-        "draw",
+    def GetTransmittanceCutoff(self) -> float:
+        """Return the light below which rays end."""
+        return self.painter.transmittance_cutoff
+
+    def SetDraw(self: Any, draw: str) -> None:
         """Choose what is raycast where the volume is at hand.
 
         Parameters
@@ -253,22 +257,30 @@ class VDIMapperMethods(ArrayChoiceMethods):
         ------
         InvalidArgumentError
             If it is something else.
-        """,
-        "Return what is raycast where the volume is at hand.",
-        checked_draw,
-    )
-    SetImageSampleDistance, GetImageSampleDistance = accessors(
-        "ImageSampleDistance",
-        "painter.image_distance",
-        "distance",
+        """
+        value = checked_draw(draw)
+        if self.painter.upkeep.draw != value:
+            self.painter.upkeep.draw = value
+            self.Modified()
+
+    def GetDraw(self) -> str:
+        """Return what is raycast where the volume is at hand."""
+        return self.painter.upkeep.draw
+
+    def SetImageSampleDistance(self: Any, distance: float) -> None:
         """Cast a ray for every so many pixels along each edge; 1 by default.
 
         The picture is interpolated linearly, as by VTK's mappers. Previews have fewer rays where
         the frame rate asks for it. ``InvalidArgumentError`` is raised if it is not from 1 to 100.
-        """,
-        "Return for how many pixels along each edge a ray is cast.",
-        checked_image_distance,
-    )
+        """
+        value = checked_image_distance(distance)
+        if self.painter.image_distance != value:
+            self.painter.image_distance = value
+            self.Modified()
+
+    def GetImageSampleDistance(self) -> float:
+        """Return for how many pixels along each edge a ray is cast."""
+        return self.painter.image_distance
 
     # In VTK's GPU mapper the following would draw VTK's own volume into a smaller framebuffer, so
     # its own switch stays off and these methods, called from Python, keep ours.
@@ -295,52 +307,47 @@ class VDIMapperMethods(ArrayChoiceMethods):
         """Draw every frame in full."""
         self.SetAutoAdjustSampleDistances(False)
 
-    SetAutoAdjustMultiSamples, GetAutoAdjustMultiSamples = accessors(
-        "AutoAdjustMultiSamples",
-        "painter.interaction.adjust_multi_samples",
-        "on",
+    def SetAutoAdjustMultiSamples(self, on: bool) -> None:
         """Draw previews without multisampling where that makes them late (on by default).
 
         Where OpenGL is software, multisampling takes most of a frame, and a VDI has no edges that
         it would smooth: so it is given up before rays are. Frames at rest, screenshots, exports and
         off-screen windows have the window's ``GetMultiSamples()``, which is left as it was set.
         With several VDIs in a window all of them must allow it.
-        """,
-        "Whether previews may be drawn without multisampling.",
-        bool,
-        modifies=False,
-    )
+        """
+        self.painter.interaction.adjust_multi_samples = bool(on)
 
-    SetInteractiveUpdateRate, GetInteractiveUpdateRate = accessors(
-        "InteractiveUpdateRate",
-        "painter.interaction.update_rate",
-        "rate",
+    def GetAutoAdjustMultiSamples(self) -> bool:
+        """Whether previews may be drawn without multisampling."""
+        return self.painter.interaction.adjust_multi_samples
+
+    def SetInteractiveUpdateRate(self, rate: float) -> None:
         """Set the window's desired update rate from which on a frame is interactive, 1/s.
 
         1 by default, as in ``vtkSmartVolumeMapper``.
-        """,
-        "Return the desired update rate from which on a frame is interactive, 1/s.",
-        partial(checked_rate, "the interactive update rate"),
-        modifies=False,
-    )
-    SetTargetFrameRate, GetTargetFrameRate = accessors(
-        "TargetFrameRate",
-        "painter.interaction.target",
-        "rate",
+        """
+        self.painter.interaction.update_rate = checked_rate("the interactive update rate", rate)
+
+    def GetInteractiveUpdateRate(self) -> float:
+        """Return the desired update rate from which on a frame is interactive, 1/s."""
+        return self.painter.interaction.update_rate
+
+    def SetTargetFrameRate(self, rate: float | None) -> None:
         """Set the frames per second that previews keep.
 
         ``None``, the default, means the window's desired update rate, which the interactor gives
         (``SetDesiredUpdateRate``: 15 in VTK, 30 in PyVista); 0 means that no rate is to be kept,
         so that every frame is full. Several VDIs in a window keep the highest of their targets.
-        """,
-        "Return the frames per second that previews keep, as it was set.",
-        lambda rate: None if rate is None else checked_rate("the target frame rate", rate),
-        modifies=False,
-    )
-    SetRegenerate, GetRegenerate = accessors(
-        "Regenerate",
-        "painter.upkeep.regeneration.policy",
-        "policy",
+        """
+        self.painter.interaction.target = (
+            None if rate is None else checked_rate("the target frame rate", rate)
+        )
+
+    def GetTargetFrameRate(self) -> float | None:
+        """Return the frames per second that previews keep, as it was set."""
+        return self.painter.interaction.target
+
+    def SetRegenerate(self, policy: Any) -> None:
         """Choose what decides that a view needs a VDI of its own.
 
         Parameters
@@ -355,15 +362,14 @@ class VDIMapperMethods(ArrayChoiceMethods):
         ------
         InvalidArgumentError
             If it is something else.
-        """,
-        "Return what decides that a view needs a VDI of its own.",
-        checked_policy,
-        modifies=False,
-    )
-    SetRegenerateBelow, GetRegenerateBelow = accessors(
-        "RegenerateBelow",
-        "painter.upkeep.regeneration.bound",
-        "ssim",
+        """
+        self.painter.upkeep.regeneration.policy = checked_policy(policy)
+
+    def GetRegenerate(self) -> Any:
+        """Return what decides that a view needs a VDI of its own."""
+        return self.painter.upkeep.regeneration.policy
+
+    def SetRegenerateBelow(self, ssim: float | None) -> None:
         """Set the estimated SSIM below which a VDI does not do for a view.
 
         ``SetRegenerate("auto")`` makes another of a view at rest in a watched window; while the
@@ -371,47 +377,44 @@ class VDIMapperMethods(ArrayChoiceMethods):
         place, where that is at hand. ``None``, the default, is 0.95 for the former; for the latter
         it is 0.98, contrast within 4 x 4 pixels that differs by a tenth at most, and lists no wider
         than 1.25 pixels.
-        """,
-        "Return the estimated SSIM below which a VDI does not do for a view, as it was set.",
-        lambda ssim: None if ssim is None else checked_bound(ssim),
-        modifies=False,
-    )
-    SetInteractiveOffScreen, GetInteractiveOffScreen = accessors(
-        "InteractiveOffScreen",
-        "painter.interaction.off_screen",
-        "on",
+        """
+        self.painter.upkeep.regeneration.bound = None if ssim is None else checked_bound(ssim)
+
+    def GetRegenerateBelow(self) -> float | None:
+        """Return the estimated SSIM below which a VDI does not do for a view, as it was set."""
+        return self.painter.upkeep.regeneration.bound
+
+    def SetInteractiveOffScreen(self, on: bool | None) -> None:
         """Treat off-screen windows as if somebody watched them, or not.
 
         By default, ``None``, those are that a browser shows through a remote view of trame, as in
         notebooks: previews are drawn, and VDIs are made in the background.
-        """,
-        "Whether off-screen windows are treated as watched; ``None`` where trame tells.",
-        lambda on: None if on is None else bool(on),
-        modifies=False,
-    )
+        """
+        self.painter.interaction.off_screen = None if on is None else bool(on)
 
-    SetPickingOpacity, GetPickingOpacity = accessors(
-        "PickingOpacity",
-        "painter.selection.opacity",
-        "opacity",
+    def GetInteractiveOffScreen(self) -> bool | None:
+        """Whether off-screen windows are treated as watched; ``None`` where trame tells."""
+        return self.painter.interaction.off_screen
+
+    def SetPickingOpacity(self, opacity: float) -> None:
         """Set the opacity that a ray must reach in the VDI to pick it.
 
         At least 0 and less than 1; 0.05 by default, as in VTK's pickers for volumes. What is
         compared says ``SetPickingAccumulated``; see :func:`pyvista_vdi.pick`.
-        """,
-        "Return the opacity that a ray must reach in the VDI to pick it.",
-        checked_opacity,
-        modifies=False,
-    )
-    SetPickingAccumulated, GetPickingAccumulated = accessors(
-        "PickingAccumulated",
-        "painter.selection.accumulated",
-        "accumulated",
-        "Compare the opacity from the ray's beginning (the default), or each supersegment's.",
-        "Whether the opacity from the ray's beginning is compared.",
-        bool,
-        modifies=False,
-    )
+        """
+        self.painter.selection.opacity = checked_opacity(opacity)
+
+    def GetPickingOpacity(self) -> float:
+        """Return the opacity that a ray must reach in the VDI to pick it."""
+        return self.painter.selection.opacity
+
+    def SetPickingAccumulated(self, accumulated: bool) -> None:
+        """Compare the opacity from the ray's beginning (the default), or each supersegment's."""
+        self.painter.selection.accumulated = bool(accumulated)
+
+    def GetPickingAccumulated(self) -> bool:
+        """Whether the opacity from the ray's beginning is compared."""
+        return self.painter.selection.accumulated
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.

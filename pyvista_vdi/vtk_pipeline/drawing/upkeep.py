@@ -19,13 +19,13 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import TRIAL_SIZE
 from pyvista_vdi.quality.frame_rate import FLOOR, FrameRateController
 from pyvista_vdi.quality.pictures import FINE_ENOUGH, SIMILAR, Pictures
+from pyvista_vdi.quality.render_mode import RenderModeChooser
 from pyvista_vdi.quality.view_error import (
     ViewError,
     angle_from_generating_view,
     coverage,
     magnification,
 )
-from pyvista_vdi.quality.ways import Ways
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
@@ -68,7 +68,7 @@ class Upkeep:
         self.automatic_view = True
         self.regeneration = Regeneration()
         self.draw: Literal["auto", "vdi", "volume"] = "auto"
-        self.ways = Ways()
+        self.ways = RenderModeChooser()
         self._pictures = Pictures()
         self._content: Any = None  # what they are of
         self._estimators = Estimators()
@@ -435,7 +435,7 @@ class Upkeep:
     def _forget_volume(self) -> None:
         self._stand_in = self._lasting = self._refused = self._content = None
         self._estimators, self._pictures = Estimators(), Pictures()
-        self.ways = Ways()
+        self.ways = RenderModeChooser()
 
     def _standing_in(self) -> StandIn | None:
         """Return what is drawn while the VDI shows what is no longer so; None if it need not be."""

@@ -63,11 +63,9 @@ class Algorithm(VTKPythonAlgorithmBase):
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
         if not self._updated(*args):
-            raise self.bad_input(
-                f"what is before {type(self).__name__} failed: VTK's output window says why"
-                if self.GetNumberOfInputConnections(0) > 0
-                else self._no_input()
-            )
+            failed = f"what is before {type(self).__name__} failed: VTK's output window says why"
+            connected = self.GetNumberOfInputConnections(0) > 0
+            raise self.bad_input(failed if connected else self._no_input())
 
     def _no_input(self) -> str:
         return f"{type(self).__name__} has no input: call SetInputDataObject or SetInputConnection"
@@ -135,24 +133,15 @@ def accessors(
     sets: str,
     gets: str,
     check: Callable[[Any], Any] = lambda value: value,
-    *,
-    modifies: bool = True,
 ) -> tuple[Any, Any]:
     """Return VTK's pair of methods of a setting, ``Set<name>(<argument>)`` and ``Get<name>()``.
 
-    ``attribute`` says where its value is, with dots; ``check`` returns the value that is kept, or
-    raises. Another value calls ``Modified()``, if ``modifies``. ``sets`` and ``gets`` are the
+    ``check`` returns the value that ``attribute`` keeps, or raises; ``sets`` and ``gets`` are the
     methods' docstrings.
     """
-    path, _, last = attribute.rpartition(".")
-    owner = attrgetter(path) if path else lambda self: self
 
     def set_value(self: Any, value: Any) -> None:
-        value = check(value)
-        if getattr(owner(self), last) != value:
-            setattr(owner(self), last, value)
-            if modifies:
-                self.Modified()
+        self._change(attribute, check(value))
 
     return pair(name, argument, (set_value, sets), (attrgetter(attribute), gets))
 
@@ -222,19 +211,16 @@ def whole_extent(information: Any) -> tuple[int, ...] | None:
 
 
 def announce(
-    outputs: Any,
-    window_size: tuple[int, int],
-    scalars: tuple[int, int] = (VTK_UNSIGNED_INT, 1),
-    depth: int = 1,
+    outputs: Any, window_size: tuple[int, int], scalars: tuple[int, int] = (VTK_UNSIGNED_INT, 1)
 ) -> None:
-    """Tell the pipeline that an image of one point per pixel, or ``depth`` of them, will come.
+    """Tell the pipeline that an image of one point per pixel will come.
 
     ``scalars`` are VTK's number of a type, and components: those of the form of a VDI by default.
     VTK's filters of images write as many as they were told into what they allocate.
     """
     width, height = window_size
     information = outputs.GetInformationObject(0)
-    extent = (0, width - 1, 0, height - 1, 0, depth - 1)
+    extent = (0, width - 1, 0, height - 1, 0, 0)
     information.Set(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), extent, 6)
     information.Set(vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
     information.Set(vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)

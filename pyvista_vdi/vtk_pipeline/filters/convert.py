@@ -19,6 +19,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     with_article,
 )
+from pyvista_vdi.io.vdi_file.description import plain_number
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -151,7 +152,13 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
                 f"the volume has only one plane of points: its dimensions are {dimensions}, and "
                 "a volume needs at least two points along each axis"
             )
-        array = _at_points(image, array)
+        # Average the cells' values at the points, by the filter that add_volume uses
+        cells, to_points = vtkImageData(), vtkCellDataToPointData()
+        cells.CopyStructure(image)
+        cells.GetCellData().SetScalars(array)
+        to_points.SetInputData(cells)
+        to_points.Update()
+        array = to_points.GetOutput().GetPointData().GetScalars()
     extent = image.GetExtent()
     first: list[float] = [0.0, 0.0, 0.0]
     image.TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first)
@@ -249,17 +256,6 @@ def scalars_of(image: vtkImageData, name: str | None, preference: str = "point")
     raise UnknownArrayError(f"the volume has no array {name!r}: {hint} arrays are {names}")
 
 
-def _at_points(image: vtkImageData, array: vtkDataArray) -> vtkDataArray:
-    """Average cell values at the points, by the filter that ``add_volume`` uses."""
-    cells = vtkImageData()
-    cells.CopyStructure(image)
-    cells.GetCellData().SetScalars(array)
-    to_points = vtkCellDataToPointData()
-    to_points.SetInputData(cells)
-    to_points.Update()
-    return to_points.GetOutput().GetPointData().GetScalars()
-
-
 def as_numpy(array: vtkDataArray) -> NDArray[Any]:
     """Return the values of VTK's array, sharing its memory where they lie one after the other."""
     if not array.HasStandardMemoryLayout():  # implicit (constant, affine, ...), or by components
@@ -320,12 +316,7 @@ def vdi_to_image(vdi: VDI) -> vtkImageData:
     field = image.GetFieldData()
     for name in _RAGGED:
         field.AddArray(to_vtk(name, getattr(vdi, name)))
-    field.AddArray(description_of(DESCRIPTION, vdi))
-    return image
-
-
-def description_of(name: str, vdi: VDI) -> vtkStringArray:
-    """Return everything of a VDI that is not an array, as a field string of JSON."""
+    # Everything that is not an array, as a field string of JSON
     about = {
         "form_version": FORM_VERSION,
         "camera": vdi.camera.to_dict(),
@@ -334,35 +325,24 @@ def description_of(name: str, vdi: VDI) -> vtkStringArray:
         "metadata": vdi.metadata,
     }
     try:
-        text = json.dumps(about, default=_plain)  # NaN and infinity included, as Python reads them
+        text = json.dumps(about, default=plain_number)  # NaN and infinity, as Python reads them
     except (TypeError, ValueError, RecursionError) as error:
         raise InvalidVDIError(
             f"the VDI's metadata cannot be written: {error}; they may hold numbers, text, lists "
             "and dictionaries with text as keys"
         ) from error
     description = vtkStringArray()
-    description.SetName(name)
+    description.SetName(DESCRIPTION)
     description.InsertNextValue(text)
-    return description
-
-
-def _plain(value: Any) -> Any:
-    """Return NumPy's numbers and arrays as Python's."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"a value of type {type(value).__name__} is not JSON")
-
-
-def has_description(data: Any, name: str) -> bool:
-    """Whether a VTK object is an image with a field string of this name."""
-    return isinstance(data, vtkImageData) and isinstance(
-        data.GetFieldData().GetAbstractArray(name), vtkStringArray
-    )
+    field.AddArray(description)
+    return image
 
 
 def is_vdi_image(data: Any) -> bool:
     """Whether a VTK object is a VDI in its canonical form."""
-    return has_description(data, DESCRIPTION)
+    return isinstance(data, vtkImageData) and isinstance(
+        data.GetFieldData().GetAbstractArray(DESCRIPTION), vtkStringArray
+    )
 
 
 def vdi_from_image(image: Any) -> VDI:
@@ -388,19 +368,29 @@ def vdi_from_image(image: Any) -> VDI:
         kind = type(image).__name__
         raise InvalidVDIError(
             f"this {kind} is not a VDI: it has no field string {DESCRIPTION!r}; a volume becomes "
-            "a VDI by pyvista_vdi.generate or VDISource, and a dense form by vdi_from_dense_image"
+            "a VDI by pyvista_vdi.generate or VDISource"
         )
-    field = image.GetFieldData()
-    about = view_from_description(image, DESCRIPTION)
-    offsets = offsets_of(counts_of(image))
-    arrays: dict[str, Any] = {name: _ragged(field, name, int(offsets[-1])) for name in _RAGGED}
+    about = view_of_image(image)
+    # Where each list begins, and where the last one ends
+    counts = _counts_of(image)
+    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
+    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
+    arrays: dict[str, Any] = {}
+    for name, components in _RAGGED.items():
+        array = image.GetFieldData().GetArray(name)
+        if array is not None:
+            arrays[name] = as_numpy(array)
+        elif offsets[-1] == 0:  # VTK's XML files drop arrays without values
+            arrays[name] = np.zeros((0, 3) if components == 3 else 0, dtype=np.float32)
+        else:
+            raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
     return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
 
 
-def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
-    """Return what :func:`description_of` wrote: arguments of :class:`VDI`."""
+def view_of_image(image: vtkImageData) -> dict[str, Any]:
+    """Return what the description of a VDI's image says: arguments of :class:`VDI`."""
     try:
-        about = json.loads(image.GetFieldData().GetAbstractArray(name).GetValue(0))
+        about = json.loads(image.GetFieldData().GetAbstractArray(DESCRIPTION).GetValue(0))
         version = int(about["form_version"])
         if version <= FORM_VERSION:
             camera = Camera.from_dict(about["camera"])
@@ -417,14 +407,7 @@ def view_from_description(image: vtkImageData, name: str) -> dict[str, Any]:
     )
 
 
-def offsets_of(counts: NDArray[Any]) -> NDArray[np.uint64]:
-    """Return where each list begins, and where the last one ends."""
-    offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
-    np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
-    return offsets
-
-
-def counts_of(image: vtkImageData) -> NDArray[Any]:
+def _counts_of(image: vtkImageData) -> NDArray[Any]:
     """Return the supersegments of each list, checked; nothing is allocated for a window alone."""
     array = image.GetPointData().GetArray(COUNT)
     if array is None:
@@ -442,15 +425,6 @@ def counts_of(image: vtkImageData) -> NDArray[Any]:
             f"{counts.min() if counts.size else 'no value'}"
         )
     return counts
-
-
-def _ragged(field: Any, name: str, n: int) -> NDArray[Any]:
-    array = field.GetArray(name)
-    if array is None:
-        if n == 0:  # VTK's XML files drop arrays without values
-            return np.zeros((0, 3) if _RAGGED[name] == 3 else 0, dtype=np.float32)
-        raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
-    return as_numpy(array)
 
 
 def to_vtk(name: str, array: NDArray[Any]) -> vtkDataArray:

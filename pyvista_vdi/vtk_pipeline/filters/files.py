@@ -16,7 +16,6 @@ from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     Algorithm,
-    accessors,
     announce,
     announce_times,
     ask_for_all,
@@ -53,9 +52,13 @@ class VDIReader(Algorithm):
         self._series: VDISeries | None = None
         self._seen: Any = None
 
-    SetFileName, GetFileName = accessors(
-        "FileName", "_path", "path", "Set the file.", "Return the file.", _as_path
-    )
+    def SetFileName(self, path: str | os.PathLike[str] | None) -> None:
+        """Set the file."""
+        self._change("_path", _as_path(path))
+
+    def GetFileName(self) -> str | None:
+        """Return the file."""
+        return self._path
 
     def GetSeries(self) -> VDISeries:
         """Return the series of a ``.vdis`` file, with the steps that are finished by now.
@@ -144,38 +147,41 @@ class VDIWriter(Algorithm):
         """Set the VDI's canonical VTK form."""
         self.SetInputDataObject(image)
 
-    SetFileName, GetFileName = accessors(
-        "FileName",
-        "_path",
-        "path",
-        "Set the file; its name ends in ``.vdi``, ``.exr`` or ``.vdis``.",
-        "Return the file.",
-        _as_path,
-    )
-    SetPrecision, GetPrecision = accessors(
-        "Precision",
-        "_precision",
-        "precision",
-        'Set what a supersegment takes: ``"exact"``, ``"16-byte"`` or ``"8-byte"``.\n\n'
-        "By default, ``None``, steps of a ``.vdis`` take 8 bytes, and all else is exact, as with\n"
-        ":meth:`VDI.save`. ``.exr`` files are exact.",
-        "Return what a supersegment takes; ``None``: what is usual for the file.",
-        lambda precision: None if precision is None else check_precision(precision),
-    )
-    SetCompression, GetCompression = accessors(
-        "Compression",
-        "_compression",
-        "compression",
-        "Set the compression, as of :meth:`VDI.save`; ``None``, the default: the file's usual one.",
-        "Return the compression; ``None``: the file's usual one.",
-    )
-    SetTolerance, GetTolerance = accessors(
-        "Tolerance",
-        "_tolerance",
-        "tolerance",
-        "Set the loss that saves bytes of a ``.vdis`` file, as of :class:`SeriesWriter`: 0, none.",
-        "Return the tolerance of a ``.vdis`` file.",
-    )
+    def SetFileName(self, path: str | os.PathLike[str] | None) -> None:
+        """Set the file; its name ends in ``.vdi``, ``.exr`` or ``.vdis``."""
+        self._change("_path", _as_path(path))
+
+    def GetFileName(self) -> str | None:
+        """Return the file."""
+        return self._path
+
+    def SetPrecision(self, precision: str | None) -> None:
+        """Set what a supersegment takes: ``"exact"``, ``"16-byte"`` or ``"8-byte"``.
+
+        By default, ``None``, steps of a ``.vdis`` take 8 bytes, and all else is exact, as with
+        :meth:`VDI.save`. ``.exr`` files are exact.
+        """
+        self._change("_precision", None if precision is None else check_precision(precision))
+
+    def GetPrecision(self) -> str | None:
+        """Return what a supersegment takes; ``None``: what is usual for the file."""
+        return self._precision
+
+    def SetCompression(self, compression: str | None) -> None:
+        """Set the compression, as of :meth:`VDI.save`; ``None``: the file's usual one."""
+        self._change("_compression", compression)
+
+    def GetCompression(self) -> str | None:
+        """Return the compression; ``None``: the file's usual one."""
+        return self._compression
+
+    def SetTolerance(self, tolerance: float) -> None:
+        """Set the loss that saves bytes of a ``.vdis`` file, as of :class:`SeriesWriter`."""
+        self._change("_tolerance", tolerance)
+
+    def GetTolerance(self) -> float:
+        """Return the tolerance of a ``.vdis`` file."""
+        return self._tolerance
 
     def Write(self) -> None:
         """Write the file.

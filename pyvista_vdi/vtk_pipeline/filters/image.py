@@ -16,19 +16,16 @@ from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI, picture_size
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
-    DEVICE,
     Algorithm,
-    accessors,
     announce,
     ask_for_all,
     whole_extent,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import (
-    DESCRIPTION,
     is_vdi_image,
     to_vtk,
     vdi_from_image,
-    view_from_description,
+    view_of_image,
 )
 from pyvista_vdi.vtk_pipeline.filters.view import camera_of
 from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData
@@ -99,23 +96,29 @@ class VDIToImage(Algorithm):
         """Return the view before it is turned, or ``None`` for the generating view."""
         return self._camera
 
-    SetAzimuth, GetAzimuth = accessors(
-        "Azimuth",
-        "_azimuth",
-        "degrees",
-        "Turn the view about its up direction through the focal point, as VTK's ``Azimuth``.",
-        "Return by how much the view is turned, degrees.",
-        _checked_degrees,
-    )
-    SetElevation, GetElevation = accessors(
-        "Elevation",
-        "_elevation",
-        "degrees",
-        "Lift the view through the focal point, after turning it, as VTK's ``Elevation``.",
-        "Return by how much the view is lifted, degrees.",
-        _checked_degrees,
-    )
-    SetDevice, GetDevice = accessors("Device", "_device", "device", *DEVICE)
+    def SetAzimuth(self, degrees: float) -> None:
+        """Turn the view about its up direction through the focal point, as VTK's ``Azimuth``."""
+        self._change("_azimuth", _checked_degrees(degrees))
+
+    def GetAzimuth(self) -> float:
+        """Return by how much the view is turned, degrees."""
+        return self._azimuth
+
+    def SetElevation(self, degrees: float) -> None:
+        """Lift the view through the focal point, after turning it, as VTK's ``Elevation``."""
+        self._change("_elevation", _checked_degrees(degrees))
+
+    def GetElevation(self) -> float:
+        """Return by how much the view is lifted, degrees."""
+        return self._elevation
+
+    def SetDevice(self, device: Any) -> None:
+        """Choose the OpenCL device; ``None`` is the default one."""
+        self._change("_device", device)
+
+    def GetDevice(self) -> Any:
+        """Return the device as it was set."""
+        return self._device
 
     def SetWindowSize(self, *size: Any) -> None:
         """Set the picture's width and height in pixels.
@@ -153,7 +156,7 @@ class VDIToImage(Algorithm):
         image = vtkImageData.GetData(inputs[0], 0)
         if is_vdi_image(image):
             with contextlib.suppress(InvalidVDIError):  # _execute says it
-                metadata = view_from_description(image, DESCRIPTION)["metadata"]
+                metadata = view_of_image(image)["metadata"]
                 return picture_size(image.GetDimensions()[:2], metadata)
         whole = whole_extent(inputs[0].GetInformationObject(0))
         return (whole[1] - whole[0] + 1, whole[3] - whole[2] + 1) if whole else None

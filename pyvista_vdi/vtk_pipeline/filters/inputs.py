@@ -66,7 +66,7 @@ class Input:
         return False
 
     def watch(self, changed: Callable[..., Any] | None) -> None:
-        """Have this called when what is before it may be another; ``None`` ends it."""
+        """Call this when what is before it may be another; ``None`` ends it."""
 
     def rest(self) -> None:
         """End what goes on behind the frames, which may begin anew."""
@@ -230,12 +230,12 @@ class SourceInput(Input):
         self._camera = self._size = None
 
     def take_camera(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
-        """Have the next VDI made from the renderer's view."""
+        """Set the renderer's view as that of the next VDI."""
         self.source.SetCamera(renderer.GetActiveCamera(), model_transform)
         self._camera = self.source.GetCamera()
 
     def take_size(self, renderer: Any) -> None:
-        """Have the next VDI made for the renderer's window."""
+        """Set the renderer's window as that of the next VDI."""
         self.source.SetWindowSize(_size(renderer))
         self._size = self.source.GetWindowSize()
 

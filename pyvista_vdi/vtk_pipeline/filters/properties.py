@@ -181,16 +181,10 @@ def _gradient_opacity(prop: vtkVolumeProperty, volume: Any) -> dict[str, Any]:
 class _Function:
     """A colour or an opacity function of VTK's.
 
-    Attributes
-    ----------
-    name : str
-        What it is called in messages.
-    x, values : numpy.ndarray
-        Its nodes' scalars, (n,), and what is there, (n, 1), or (n, 3) in RGB.
-    ends : bool
-        Whether it ends with its nodes: beyond them it is something else.
-    linear : bool
-        Whether it is linear between its nodes, within 0 to 1 and does not end.
+    ``name``: what it is called in messages. ``x``, ``values``: its nodes' scalars, (n,), and what
+    is there, (n, 1), or (n, 3) in RGB. ``ends``: whether it ends with its nodes: beyond them it is
+    something else. ``linear``: whether it is linear between its nodes, within 0 to 1 and does not
+    end.
     """
 
     def __init__(self, name: str, function: Any) -> None:

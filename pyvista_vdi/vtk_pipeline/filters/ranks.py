@@ -65,10 +65,7 @@ def communicator() -> Any:
 
     To be called first where all ranks are: it waits for all.
 
-    Raises
-    ------
-    MissingDependencyError
-        If there are several ranks and mpi4py is missing.
+    Raises MissingDependencyError if there are several ranks and mpi4py is missing.
     """
     # A copy: VTK's own messages do not meet ours
     return mpi().COMM_WORLD.Dup() if are_several() else None
@@ -84,18 +81,9 @@ def is_first_rank() -> bool:
 class Part:
     """A rank's own points of a grid, in place of a :class:`~pyvista_vdi.Volume`.
 
-    Attributes
-    ----------
-    array : numpy.ndarray, shape (nz, ny, nx)
-        The points' scalars.
-    first : (int, int, int)
-        Index x, y, z of the first of them.
-    grid : Grid
-        The whole grid.
-    name : str
-        What the scalars are called.
-    ends : (float, float)
-        The least and the largest finite scalar of all ranks.
+    ``array`` (shape (nz, ny, nx)): the points' scalars. ``first``: index x, y, z of the first of
+    them. ``grid``: the whole grid. ``name``: what the scalars are called. ``ends``: the least and
+    the largest finite scalar of all ranks.
     """
 
     array: NDArray[Any]
@@ -259,10 +247,7 @@ class RanksVDISource(VDISource):
 def _boxes(points: Any, ranks: int) -> list[Box]:
     """Return each rank's own points of a grid, a product of cuts along z, y and x.
 
-    Raises
-    ------
-    InvalidVolumeError
-        If there are too few points for so many ranks.
+    Raises InvalidVolumeError if there are too few points for so many ranks.
     """
     counts = [1, 1, 1]
     longest_first = sorted(range(3), key=lambda axis: -int(points[axis]))

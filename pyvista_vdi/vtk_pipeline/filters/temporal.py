@@ -15,15 +15,8 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkCompositeDataSet
 def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
     """Return the steps of a source as a sequence of VTK's data, and their times.
 
-    Parameters
-    ----------
-    source : vtkAlgorithm or pyvista.TimeReader
-        What announces times (``TIME_STEPS``), or is a reader of PyVista with ``time_values``.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If it has no times.
+    ``source``: what announces times (``TIME_STEPS``), or is a reader of PyVista with
+    ``time_values``. Raises InvalidArgumentError if it has no times.
     """
     read: Callable[[int], Any]
     if hasattr(source, "time_values"):
@@ -43,12 +36,7 @@ def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
 class Steps(Sequence[Any]):
     """What a function returns for each step; called by one thread at a time: there is one source.
 
-    Parameters
-    ----------
-    read : callable
-        Gets the step's index.
-    n : int
-        How many there are.
+    ``read``: gets the step's index. ``n``: how many there are.
     """
 
     def __init__(self, read: Callable[[int], Any], n: int) -> None:

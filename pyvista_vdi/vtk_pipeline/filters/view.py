@@ -23,7 +23,7 @@ def as_array(matrix: Any) -> NDArray[np.float64]:
 
 
 def aim(theirs: Any, camera: Camera) -> None:
-    """Give a ``vtkCamera`` a view; a model transform is the prop's."""
+    """Set a ``vtkCamera`` to a view; a model transform is the prop's."""
     theirs.SetPosition(camera.position)
     theirs.SetFocalPoint(camera.focal_point)
     theirs.SetViewUp(camera.view_up)

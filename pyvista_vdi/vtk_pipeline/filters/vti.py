@@ -21,8 +21,6 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_from_image,
     vdi_to_image,
 )
-from pyvista_vdi.vtk_pipeline.filters.dense import DESCRIPTION as DENSE_DESCRIPTION
-from pyvista_vdi.vtk_pipeline.filters.dense import is_dense_image, vdi_from_dense_image
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkOutputWindow,
     vtkStringOutputWindow,
@@ -67,10 +65,10 @@ def write(
 
 
 def read(path: str | os.PathLike[str]) -> VDI:
-    """Read a VDI from a ``.vti`` file that holds its canonical or its dense form."""
+    """Read a VDI from a ``.vti`` file that holds its canonical form."""
     image = _image(path)
     try:
-        return vdi_from_dense_image(image) if is_dense_image(image) else vdi_from_image(image)
+        return vdi_from_image(image)
     except InvalidVDIError as error:
         raise VDIFileError(f"{path}: {error}") from error
 
@@ -97,8 +95,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
 
 def holds_vdi(path: str | os.PathLike[str]) -> bool:
     """Whether a ``.vti`` file's header names the arrays of a VDI; False where there is no file."""
-    names = f"{DESCRIPTION}|{DENSE_DESCRIPTION}".encode()
-    wanted = re.compile(rb'<AppendedData|<Array type="String" Name="(?:%b)"' % names)
+    wanted = re.compile(rb'<AppendedData|<Array type="String" Name="%b"' % DESCRIPTION.encode())
     try:
         # Not read: it may be a volume of any size
         with Path(path).open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
@@ -117,19 +114,7 @@ def _image(path: Any) -> Any:
         raise VDIFileError(
             f"{path} cannot be read: {getattr(error, 'strerror', None) or error}"
         ) from error
-    _check_header(content, file)
-    reader = vtkXMLImageDataReader()
-    reader.ReadFromInputStringOn()
-    reader.SetInputString(content)
-    with _messages() as messages:
-        reader.Update()
-    if messages.GetOutput() or reader.GetErrorCode():
-        raise VDIFileError(f"{file} is damaged: {_first_line(messages)}")
-    return reader.GetOutput()
-
-
-def _check_header(content: bytes, file: Path) -> None:
-    """Refuse what is no VTK image, or declares more than its bytes could hold: VTK believes it."""
+    # Refuse what is no VTK image, or declares more than its bytes could hold: VTK believes it
     head = content.partition(b"<AppendedData")[0]
     if not re.search(rb"<VTKFile[^>]*type=[\"']ImageData[\"']", head):
         raise VDIFileError(f"{file} is not a VTK image file (.vti): it has no such header")
@@ -143,6 +128,14 @@ def _check_header(content: bytes, file: Path) -> None:
             f"{file} is damaged: {len(content)} bytes cannot hold the {max(declared)} values that "
             "they declare"
         )
+    reader = vtkXMLImageDataReader()
+    reader.ReadFromInputStringOn()
+    reader.SetInputString(content)
+    with _messages() as messages:
+        reader.Update()
+    if messages.GetOutput() or reader.GetErrorCode():
+        raise VDIFileError(f"{file} is damaged: {_first_line(messages)}")
+    return reader.GetOutput()
 
 
 def _codec(file: Path) -> str:

@@ -12,7 +12,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundGeneration
-from pyvista_vdi.quality.when_anew import (
+from pyvista_vdi.quality.regeneration_policy import (
     AT_HOME,
     OUT_OF_DATE,
     REGENERATE_BELOW,

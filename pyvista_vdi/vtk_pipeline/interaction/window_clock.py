@@ -12,14 +12,14 @@ from typing import Any, Literal, TypeVar
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.quality.frame_rate import FrameRateController
-from pyvista_vdi.quality.ways import Way
+from pyvista_vdi.quality.render_mode import RenderMode
 from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGL2PSHelper, vtkWeakReference
 
 T = TypeVar("T")
 
 #: What a ray's cost is known by: the way, or a VDI of every second list.
-Cost = Way | Literal["few lists"]
+Cost = RenderMode | Literal["few lists"]
 
 #: Shares of the pixels below which previews take every second list, and above which all again.
 #: docs/decisions/any_view.md: at a quarter of the pixels half the lists lose .0024 of SSIM and half

@@ -16,8 +16,8 @@ from real_data import require_data
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.list_subsampling import lists_crossed
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.model.thinned import lists_crossed
 from pyvista_vdi.model.vdi import VDI
 
 #: See above.

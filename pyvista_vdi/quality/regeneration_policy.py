@@ -1,4 +1,4 @@
-"""When a view needs a VDI of its own: the bounds that a window and a server keep to.
+"""The regeneration policy: from which error or turn on a view needs a VDI of its own.
 
 Distances between views are those of :meth:`pyvista_vdi.model.view.View.distance`: about radians,
 for a volume that fills the picture.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.quality.ways import Ways, checked_draw
+from pyvista_vdi.quality.render_mode import RenderModeChooser, checked_draw
 
 pytestmark = pytest.mark.fast
 
@@ -19,14 +19,14 @@ VDI, VOLUME = 20.0, 200.0
 
 
 def used(vdi=VDI, volume=VOLUME):
-    ways = Ways()
+    ways = RenderModeChooser()
     ways.took("vdi", 0.0, PIXELS, vdi / 1e3)
     ways.took("volume", 0.0, PIXELS, volume / 1e3)
     return ways
 
 
 def test_the_vdi_until_both_are_known():
-    ways = Ways()
+    ways = RenderModeChooser()
     assert ways.choose(90.0, PIXELS, TARGET) == "vdi"
     ways.took("volume", 0.0, PIXELS, 1e-3)
     assert ways.choose(90.0, PIXELS, TARGET) == "vdi"

@@ -1,4 +1,4 @@
-"""A VDI of every second list: what a picture of few pixels from the side needs."""
+"""List subsampling: a VDI of every k-th list, for pictures of few pixels from the side."""
 
 from __future__ import annotations
 
@@ -19,30 +19,18 @@ from pyvista_vdi.model.vdi import VDI
 _INNER = 0.5
 
 
-def thinned(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
+def subsampled_lists(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     """Return a VDI of every k-th list along each edge: the same lists, of the same rays.
 
     A list stands for its neighbours, too. From the side a ray crosses a k-th of the lists, which
     is about what it costs. docs/decisions/any_view.md says what that loses.
 
-    Parameters
-    ----------
-    vdi : VDI
-        Of any precision, which stays.
-    along_x, along_y : int
-        Every how-manieth list is taken along the window's width and height.
-
-    Returns
-    -------
-    VDI
-        Without metadata. Its view is that of ``vdi``, stretched by its model transform, so that
-        the middles of the pixels are those of the lists that were taken. Of the window's right
-        and upper edge it may leave out less than half of one of its lists.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a step is not a whole number from 1 to the window's edge.
+    ``vdi``: of any precision, which stays. ``along_x``, ``along_y``: every how many lists one is
+    taken along the window's width and height. Returns: Without metadata. Its view is that of
+    ``vdi``, stretched by its model transform, so that the middles of the pixels are those of the
+    lists that were taken. Of the window's right and upper edge it may leave out less than half of
+    one of its lists. Raises InvalidArgumentError if a step is not a whole number from 1 to the
+    window's edge.
     """
     camera = vdi.camera
     for step, edge in zip((along_x, along_y), vdi.window_size, strict=True):

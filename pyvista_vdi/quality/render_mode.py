@@ -1,4 +1,4 @@
-"""Which way gives the better frame in the time there is: the VDI, or the volume; pure Python."""
+"""The render mode of a frame: VDI or volume, whichever is better in the time there is."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError
 
-#: The ways by which a frame can be drawn.
-Way = Literal["vdi", "volume"]
+#: What a frame is raycast from.
+RenderMode = Literal["vdi", "volume"]
 
 #: SSIM lost by drawing every k-th pixel along each edge and interpolating linearly: medians over
-#: six volumes x soft and steep, 640 x 360 pixels, 30 degrees from V_O (docs/decisions/ways.md).
+#: six volumes x soft and steep, 640 x 360 pixels, 30 degrees from V_O
+#: (docs/decisions/render_mode.md).
 _STEPS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 _LOST = (0.0, 0.0105, 0.013, 0.0188, 0.0319, 0.0445)
 
@@ -40,7 +41,7 @@ def checked_draw(draw: Any) -> Literal["auto", "vdi", "volume"]:
     raise InvalidArgumentError(f"draw must be 'auto', 'vdi' or 'volume'; got {draw!r}")
 
 
-class Ways:
+class RenderModeChooser:
     """Chooses between VDI and volume for each frame, from what frames have taken before.
 
     A VDI's rays are cheapest at V_O and dearer from there on, the volume's take the same from
@@ -51,26 +52,18 @@ class Ways:
     def __init__(self) -> None:
         self._at_v_o: dict[int, float] = {}  # seconds per pixel, as if at V_O, by neighbourhood
         self._volume: float | None = None  # seconds per pixel
-        self._way: Way = "vdi"
+        self._way: RenderMode = "vdi"
 
     @property
-    def way(self) -> Way:
+    def way(self) -> RenderMode:
         """What was chosen last."""
         return self._way
 
-    def took(self, way: Way, angle: float, pixels: float, seconds: float) -> None:
+    def took(self, way: RenderMode, angle: float, pixels: float, seconds: float) -> None:
         """Note what a frame's rays have taken.
 
-        Parameters
-        ----------
-        way : {"vdi", "volume"}
-            What was drawn.
-        angle : float
-            Between the view and V_O, degrees.
-        pixels : float
-            Rays that may meet the volume.
-        seconds : float
-            What they took.
+        ``way`` ("vdi", "volume"): what was drawn. ``angle``: between the view and V_O, degrees.
+        ``pixels``: rays that may meet the volume. ``seconds``: what they took.
         """
         if not (pixels >= 1 and seconds > 0):
             return
@@ -81,7 +74,7 @@ class Ways:
             near = round(angle / _NEIGHBOURS)
             self._at_v_o[near] = _mean(self._at_v_o.get(near), each / rise(angle))
 
-    def seconds_per_pixel(self, way: Way, angle: float) -> float | None:
+    def seconds_per_pixel(self, way: RenderMode, angle: float) -> float | None:
         """Return what a ray is expected to take; ``None`` where no frame has told."""
         if way == "volume":
             return self._volume
@@ -97,28 +90,15 @@ class Ways:
         seconds: float | None,
         ssim: float | None = None,
         bound: float = 0.0,
-    ) -> Way:
+    ) -> RenderMode:
         """Return how the next frame is to be drawn.
 
-        Parameters
-        ----------
-        angle : float
-            Between the view and V_O, degrees.
-        pixels : float
-            Rays of the full frame that may meet the volume.
-        seconds : float or None
-            What its rays may take; ``None`` at rest, where all pixels are drawn.
-        ssim : float, optional
-            Estimate for the VDI from this view.
-        bound : float
-            Least SSIM that does at rest.
-
-        Returns
-        -------
-        {"vdi", "volume"}
-            The VDI until both have told what they take; afterwards the better picture, or at rest
-            the one that is there sooner. What was drawn last stays unless the other is better by
-            more than predictions are wrong by.
+        ``angle``: between the view and V_O, degrees. ``pixels``: rays of the full frame that may
+        meet the volume. ``seconds``: what its rays may take; ``None`` at rest, where all pixels are
+        drawn. ``ssim``: estimate for the VDI from this view. ``bound``: least SSIM that does at
+        rest. Returns: the VDI until both have told what they take; afterwards the
+        better picture, or at rest the one that is there sooner. What was drawn last stays unless
+        the other is better by more than predictions are wrong by.
         """
         own = _loss_of_vdi(angle, ssim)
         if seconds is None and own > 1 - bound:
@@ -127,7 +107,7 @@ class Ways:
         costs = {way: self.seconds_per_pixel(way, angle) for way in ("vdi", "volume")}  # type: ignore[arg-type]
         if None in costs.values():
             return "vdi"
-        other: Way = "volume" if self._way == "vdi" else "vdi"
+        other: RenderMode = "volume" if self._way == "vdi" else "vdi"
         times = {way: cost * max(pixels, 1.0) for way, cost in costs.items() if cost is not None}
         if seconds is None:
             changes = times[other] < (1 - _SAVING) * times[self._way]
