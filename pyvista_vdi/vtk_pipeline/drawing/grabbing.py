@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import Met
+from pyvista_vdi.vtk_pipeline.interaction.window import Met
 from pyvista_vdi.vtk_pipeline.vtk import numpy_to_vtk
 
 _STYLES = ("vtkInteractorStyleTrackballActor", "vtkInteractorStyleJoystickActor")
@@ -23,17 +23,17 @@ _BEFORE, _AFTER = 1.0, -1.0
 
 
 class Grabbing:
-    """What can be taken hold of in a window: ``clock.shared(Grabbing)``."""
+    """What can be taken hold of in a window: ``window.shared(Grabbing)``."""
 
     def __init__(self) -> None:
-        self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._drivers: weakref.WeakSet[Any] = weakref.WeakSet()
         self._watched = Met()
         self._transparent: list[tuple[Any, Any]] = []  # point data and scalars of solid proxies
 
-    def join(self, painter: Any, interactor: Any) -> None:
-        """Note that a painter draws in the window; called in each of its frames."""
-        self._painters.add(painter)
-        if interactor is None or not self._watched.is_new(interactor):
+    def join(self, driver: Any, interactor: Any) -> None:
+        """Note that a driver draws in the window; called in each of its frames."""
+        self._drivers.add(driver)
+        if not self._watched.is_new(interactor):
             return
         weak = weakref.ref(self)
 
@@ -60,11 +60,11 @@ class Grabbing:
             return
         x, y = interactor.GetEventPosition()
         renderer = interactor.FindPokedRenderer(x, y)
-        there = [p for p in list(self._painters) if renderer in p.renderers()]
+        there = [p for p in list(self._drivers) if renderer in p.renderers()]
         hit = [p for p in there if p.actor.pick(x, y, renderer=renderer) is not None]
-        for painter in hit:  # after the picks, which draw
-            data = painter.proxy.GetPointData()
-            solid = np.full((8, data.GetScalars().GetNumberOfComponents()), _opaque(painter.actor))
+        for driver in hit:  # after the picks, which draw
+            data = driver.proxy.GetPointData()
+            solid = np.full((8, data.GetScalars().GetNumberOfComponents()), _opaque(driver.actor))
             self._transparent.append((data, data.GetScalars()))
             data.SetScalars(numpy_to_vtk(solid, deep=True))
 

@@ -24,7 +24,7 @@ class PlayingMethods:
     @series.setter
     def series(self: Any, series: VDISeries) -> None:
         mapper = self._mapper_for(" that could show a series")
-        before = None if mapper.painter.upkeep.player is None else self.time
+        before = None if mapper.driver.player is None else self.time
         mapper.SetSeries(series)
         if before is not None:
             self.time = before
@@ -60,7 +60,7 @@ class PlayingMethods:
     def playing(self: Any) -> bool:
         """Whether one step is shown after the other."""
         mapper = self.GetMapper()
-        player = None if mapper is None else mapper.painter.upkeep.player
+        player = None if mapper is None else mapper.driver.player
         return player is not None and player.playing
 
     def play(
@@ -93,11 +93,12 @@ class PlayingMethods:
             If no series is shown, the rate is none, or the limit no number of bytes.
         """
         self._player().play(rate, loop=loop, memory_limit=memory_limit)
-        upkeep, renderer = self.GetMapper().painter.upkeep, self.GetMapper().painter.renderer()
+        driver = self.GetMapper().driver
+        renderer = driver.renderer()
         window = None if renderer is None else renderer.GetRenderWindow()
         # Before the first frame there is nothing to look at, and that frame looks itself
         if window is not None and not window.GetNeverRendered():
-            upkeep.tick(window)
+            driver.follow(window)
 
     def pause(self: Any) -> None:
         """Stay at the step that is shown.
@@ -110,7 +111,7 @@ class PlayingMethods:
         self._player().pause()
 
     def _player(self: Any) -> Player:
-        player = self._mapper_for(" that could show a series").painter.upkeep.player
+        player = self._mapper_for(" that could show a series").driver.player
         if player is None:
             raise InvalidArgumentError(
                 "this actor shows no series, which alone has times: add one (plotter.add_vdi("

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,13 +11,14 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.quality.frame_rate import FrameRateController
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volume
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 
+_numbers = itertools.count()
 
-class StandIn:
+
+class VolumePicture:
     """Volume and look of a request, raycast as generation samples them, in the VDI's light.
 
     It is right from every view. The voxels go to the device once, for it and for the generation,
@@ -25,16 +28,18 @@ class StandIn:
     ----------
     request : Request
         What the VDI is being made of.
-    rate : FrameRateController
-        Knows what rays have cost before, and learns what these do.
-    lasting : bool
-        Whether it is drawn for its own sake, and not until a VDI has been made.
+    placeholder : bool
+        Whether it is drawn until a VDI has been made, and not for its own sake.
     in_bricks : bool
         Whether it may be brick by brick, where the device cannot hold it in one piece: a person
         would wait too long for such a picture.
 
     Attributes
     ----------
+    number : int
+        By which it is known.
+    bounds : tuple of float
+        The volume's, model frame.
     pictures : int
         How many were drawn.
 
@@ -45,17 +50,13 @@ class StandIn:
     """
 
     def __init__(
-        self,
-        request: Request,
-        rate: FrameRateController,
-        *,
-        lasting: bool = False,
-        in_bricks: bool = False,
+        self, request: Request, *, placeholder: bool = False, in_bricks: bool = False
     ) -> None:
         self.request = request
-        self.lasting = lasting
+        self.placeholder = placeholder
+        self.number = next(_numbers)
+        self.bounds = request.volume.bounds
         self.pictures = 0
-        self._rate = rate
         volume, sampling = request.volume, request.options
         room = picture_room(
             request.screen.size, sampling.memory_limit, sampling.occlusion_bytes(volume)
@@ -70,32 +71,16 @@ class StandIn:
                 if not in_bricks:
                     raise DeviceMemoryError(f"the volume {volume.name!r} is held brick by brick")
 
-    @property
-    def bounds(self) -> tuple[float, ...]:
-        """The volume's, model frame."""
-        return self.request.volume.bounds
-
-    def share(self, target: float, pixels: int) -> float:
-        """Return the share of its pixels, 0 to 1, at which a picture keeps a rate; 0: not known."""
-        if not self._rate.seconds_per_sample:
-            return 0.0
-        self._rate.target_fps = target
-        return self._rate.choose(pixels) / pixels
-
     def picture(self, frame: FrameRequest, lit_from: Camera | None = None) -> NDArray[np.float32]:
         """Return the picture, premultiplied RGBA, float32 (H, W, 4), top row first.
 
         ``lit_from`` is the view whose light falls on it, in place of the VDI's; brick by brick it
         is the picture's own.
         """
+        self.pictures += 1
         if self._medium is None:
             made = self.request
             return raycast_volume(
                 made.volume, made.transfer_function, frame.replace(device=made.device), made.options
             )
         return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.generating[0])
-
-    def took(self, pixels: int, seconds: float) -> None:
-        """Note what a picture has taken."""
-        self.pictures += 1
-        self._rate.record(pixels, seconds, seconds)
