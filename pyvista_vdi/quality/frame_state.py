@@ -104,32 +104,16 @@ class Settings:
 
 @dataclass(frozen=True)
 class Sight:
-    """A VDI that is there, as a view shows it.
+    """A VDI that is there, as a view shows it; see :mod:`pyvista_vdi.quality.view_error`."""
 
-    Attributes
-    ----------
-    vdi : int
-        Its number.
-    bounds : tuple of float
-        Those of the volume, model frame.
-    request : Request or None
-        What it was made of, where that is known.
-    angle, magnification, coverage : float
-        Of the view, see :mod:`pyvista_vdi.quality.view_error`.
-    pixels : float
-        In which it may be seen.
-    options
-        How it is drawn (clipping planes in world coordinates), compared by ``==``.
-    """
-
-    vdi: int
-    bounds: tuple[float, ...]
-    request: Request | None = None
+    vdi: int  # its number
+    bounds: tuple[float, ...]  # of the volume, model frame
+    request: Request | None = None  # what it was made of, where that is known
     angle: float = 0.0
     magnification: float = 1.0
     coverage: float = 1.0
-    pixels: float = 0.0
-    options: Any = None
+    pixels: float = 0.0  # in which it may be seen
+    options: Any = None  # how it is drawn (clipping planes in world coordinates), compared by ==
 
 
 @dataclass(frozen=True)
@@ -175,54 +159,27 @@ class Pictures:
 
 @dataclass(frozen=True)
 class FrameState:
-    """All that decides which picture a mapper's next frame shows.
-
-    Attributes
-    ----------
-    settings : Settings
-        What the user has set.
-    making : Making or None
-        The VDI that is being made behind the frames; there is one at most.
-    estimating : bool
-        Whether the error of a view is being estimated behind them.
-    estimate : Estimate or None
-        The last of those.
-    stamp, view, moving, moved_at, by_vdi
-        What the last frame was looked at: time stamp of all that it depends on, view, whether a
-        hand moved, since when (seconds), and whether the VDI was drawn.
-    estimated_at : float
-        When the last estimate began, seconds.
-    behind : bool
-        Whether VDIs are made behind the frames, because somebody watches.
-    number
-        Of the frame that was looked at.
-    failed, failed_in_frame
-        Stamps of which no VDI could be made, behind the frames or in one.
-    refused
-        Content of which the device cannot draw the volume itself.
-    costs : Costs
-        What rays take.
-    pictures : Pictures
-        What off-screen pictures have told.
-    placeholder : FrameRate
-        What volumes have taken that were drawn until a VDI was made.
-    """
+    """All that decides which picture a mapper's next frame shows."""
 
     settings: Settings = field(default_factory=Settings)
+    # Behind the frames: the one VDI that is being made, if any, and estimates of errors of views
     making: Making | None = None
     estimating: bool = False
-    estimate: Estimate | None = None
-    stamp: Any = None
+    estimate: Estimate | None = None  # the last one
+    estimated_at: float = -math.inf  # when it was begun, seconds
+    # What the last frame was looked at
+    behind: bool = False  # whether VDIs are made behind the frames, because somebody watches
+    number: Any = None  # of the frame
+    stamp: Any = None  # of all that it depends on
     view: View | None = None
-    moving: bool = False
-    moved_at: float = 0.0
-    by_vdi: bool = True
-    estimated_at: float = -math.inf
-    behind: bool = False
-    number: Any = None
+    moving: bool = False  # whether a hand moves
+    moved_at: float = 0.0  # since when the view is that, seconds
+    by_vdi: bool = True  # whether the VDI was drawn
+    # What is not tried again: stamps, of VDIs behind the frames and in one, and a volume's content
     failed: Any = None
     failed_in_frame: Any = None
     refused: Any = None
+    # What frames have told: of rays' costs, off-screen, and of volumes until a VDI is made
     costs: Costs = field(default_factory=Costs)
     pictures: Pictures = field(default_factory=Pictures)
     placeholder: FrameRate = field(default_factory=FrameRate)
@@ -233,57 +190,28 @@ class FrameState:
 
 @dataclass(frozen=True)
 class FrameAsked:
-    """A renderer is about to show what comes from a volume.
+    """A renderer is about to show what comes from a volume."""
 
-    Attributes
-    ----------
-    now : float
-        Seconds.
-    number
-        Of the window's frame, equal for both eyes and all viewports.
-    view : View
-        What the renderer shows, between the eyes.
-    stamp
-        Changes whenever it is worth trying again to make a VDI.
-    wanted : Request or None
-        What the next VDI would be made of; ``None`` where that cannot be said, for ``trouble``.
-    trouble : Exception or None
-        As above.
-    seen : Sight or None
-        The VDI that was made last.
-    watched, one_view, joint, whole, own_pixels : bool
-        Whether somebody watches the window; no other renderer or mapper shows the VDI; another
-        volume overlaps it in the picture; the frame is no tile of a picture; and its pixels are
-        the view's.
-    moving, previews : bool
-        Whether a hand moves, and whether the frame may have fewer rays for it.
-    seconds : float
-        What a frame of a motion may take.
-    look, answer, judged, refused
-        What was found out about this very frame: whether it is a whole picture that was not looked
-        at before, what a policy said, the estimate that was made (False if none could
-        be), and of what contents the device cannot draw the volume.
-    """
-
-    now: float
-    number: Any
-    view: View
-    stamp: Any
-    wanted: Any = None
+    now: float  # seconds
+    number: Any  # of the window's frame, equal for both eyes and all viewports
+    view: View  # between the eyes
+    stamp: Any  # changes whenever it is worth trying again to make a VDI
+    wanted: Any = None  # what the next VDI would be made of: a Request, unless there is trouble
     trouble: Exception | None = None
-    seen: Sight | None = None
-    watched: bool = False
-    one_view: bool = True
-    joint: bool = False
-    whole: bool = True
-    own_pixels: bool = True
+    seen: Sight | None = None  # the VDI that was made last
+    watched: bool = False  # whether somebody watches the window
+    one_view: bool = True  # whether no other renderer or mapper shows the VDI
+    joint: bool = False  # whether another volume overlaps it in the picture
+    whole: bool = True  # whether it is no tile of a picture
+    own_pixels: bool = True  # whether its pixels are the view's
     moving: bool = False
-    previews: bool = False
-    seconds: float = math.inf
-    look: bool | None = None
-    answer: bool | None = None
-    judged: Estimate | Literal[False] | None = None
-    refused: tuple[Any, ...] = ()
+    previews: bool = False  # whether it may have fewer rays because a hand moves
+    seconds: float = math.inf  # what a frame of a motion may take
+    # What was found out about this very frame
+    look: bool | None = None  # whether it is a whole picture that was not looked at before
+    answer: bool | None = None  # what a policy said
+    judged: Estimate | Literal[False] | None = None  # the estimate that was made, if one could be
+    refused: tuple[Any, ...] = ()  # contents whose volume the device cannot draw
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 from pathlib import Path
@@ -322,3 +323,22 @@ def test_the_page_has_these_events():
     page = (CHECKOUT / "docs" / "window_events.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (.+?) \|", page, re.MULTILINE)
     assert [each for each in rows if each not in ("event", "---")] == list(EVENTS)
+
+
+#: Where there may be threads, locks, clocks and weak references: what drives the frames of a mapper
+#: and a window, and what VTK's or trame's objects must not be kept alive by.
+DRIVING = {
+    "drawing": {"deciding", "driver", "mapper"},
+    "interaction": {"behind", "browser", "status", "timer", "window"},
+}
+
+
+@pytest.mark.parametrize("room", DRIVING)
+def test_nothing_but_the_driver_has_threads_locks_clocks_or_weak_references(room):
+    for path in sorted((CHECKOUT / "pyvista_vdi" / "vtk_pipeline" / room).glob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        imports = [n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
+        names = {each.name for node in imports for each in node.names}
+        names |= {str(node.module) for node in imports if isinstance(node, ast.ImportFrom)}
+        driving = {"time", "threading", "weakref", "asyncio", "vtkWeakReference", "Worker"}
+        assert path.stem in DRIVING[room] or not names & driving, path.name

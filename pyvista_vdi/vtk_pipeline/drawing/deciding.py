@@ -11,52 +11,27 @@ import math
 import weakref
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal
+from functools import partial
+from typing import Any, Literal, TypeAlias
 
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
 from pyvista_vdi.extensions.series.player import Player
 from pyvista_vdi.extensions.sets.shower import SetShower
-from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.background import TRIAL_SIZE
+from pyvista_vdi.quality import frame_state as fs
 from pyvista_vdi.quality.decide import busy, decide
-from pyvista_vdi.quality.frame_rate import FLOOR
-from pyvista_vdi.quality.frame_state import (
-    AskAgain,
-    AskPolicy,
-    Closed,
-    Complain,
-    Do,
-    Estimate,
-    EstimateError,
-    Event,
-    Failed,
-    FrameAsked,
-    FrameState,
-    FrameTook,
-    Generate,
-    InputChanged,
-    Interrupted,
-    Judge,
-    Raise,
-    Show,
-    Sight,
-    StoredAsked,
-    StoredSeen,
-    TimePassed,
-    VDIAsked,
-    ViewPicked,
-    Warn,
-)
-from pyvista_vdi.quality.pace import reduced
 from pyvista_vdi.quality.view_error import (
     angle_from_generating_view,
     coverage,
     magnification,
 )
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
-from pyvista_vdi.vtk_pipeline.drawing.volume_picture import VolumePicture
+from pyvista_vdi.vtk_pipeline.drawing.volume_picture import (
+    VolumePicture,
+    VolumePictures,
+    prepared,
+)
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SeriesInput, SetInput, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View
@@ -72,23 +47,23 @@ _log = logging.getLogger(__name__)
 _VIEW_CONE = 60.0
 #: What two equal sizes of pixels differ by at most.
 _ROUNDING = 1e-6
-#: Pictures that tell what a volume's rays cost, of which the fastest counts: what disturbs one by
-#: milliseconds has the volume seem too dear to be drawn, which no frame would ever correct.
-_TRIALS = 5
+
+
+#: What a frame can show.
+Shown: TypeAlias = VDI | VolumePicture | None
 
 
 class Deciding:
     """What a :class:`Driver` decides by, and does between frames."""
 
     def __init__(self) -> None:
-        self.state = FrameState()
+        self.state = fs.FrameState()
         self.device: Any = None
         self.input: Input | None = None
         self.texts = CornerTexts()
         self._warnings = Warnings()
         self._window: Callable[[], Window | None] = lambda: None  # of the last frame
-        self._volume: VolumePicture | None = None  # drawn for its own sake
-        self._placeholder: VolumePicture | None = None
+        self._volumes = VolumePictures()
         self._request: tuple[Any, Request] | None = None  # what the next VDI is made of, and when
         self._numbered: Callable[[], VDI | None] = lambda: None
         self._number = 0
@@ -125,13 +100,8 @@ class Deciding:
         """Return the device that raycasts."""
         return get_runtime(self.device)
 
-    def renderers(self) -> list[Any]:
-        """Return all renderers that show the actor."""
-        raise NotImplementedError
-
-    def status(self) -> VDIStatus:
-        """Return how the last frame was drawn, and what goes on."""
-        raise NotImplementedError
+    renderers: Callable[[], list[Any]]  # that show the actor
+    status: Callable[[], VDIStatus]
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI."""
@@ -139,11 +109,11 @@ class Deciding:
             self.input.watch(None)
             self.input.rest()
         self.input, self._request = source, None
-        self.tell(InputChanged())
+        self.tell(fs.InputChanged())
 
     def retry(self) -> None:
         """Try again what failed before, and give up what is being made in the background."""
-        self.tell(InputChanged(another=False))
+        self.tell(fs.InputChanged(another=False))
         self._warnings.forget()
 
     def release(self) -> None:
@@ -151,7 +121,7 @@ class Deciding:
         self._timer.stop()
         if self.input is not None:
             self.input.rest()
-        self.tell(Closed())
+        self.tell(fs.Closed())
         self._behind.close()
 
     def vdi_asked_for(self) -> VDI | None:
@@ -163,7 +133,7 @@ class Deciding:
         if not isinstance(source, SourceInput):
             return None if source is None else source.last()
         if source.source.GetCamera() is not None and source.source.GetWindowSize() is not None:
-            self.tell(VDIAsked(source.last() is not None, source.stamp()))
+            self.tell(fs.VDIAsked(source.last() is not None, source.stamp()))
         return source.last()
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
@@ -173,13 +143,13 @@ class Deciding:
         """
         vdi, view = self.vdi_asked_for(), frame.view
         if vdi is not None and view is not None and isinstance(self.input, SourceInput):
-            shown = self.tell(ViewPicked(coverage(vdi, view.camera, view.size)), frame)
+            shown = self.tell(fs.ViewPicked(coverage(vdi, view.camera, view.size)), frame)
             return shown if isinstance(shown, VDI) else vdi
         return vdi
 
     # What a frame shows
 
-    def decided(self, frame: Frame, *, joint: bool) -> VDI | VolumePicture | None:
+    def decided(self, frame: Frame, *, joint: bool) -> Shown:
         """Return what a frame is to show: the VDI, brought up to date, or the volume."""
         source, settings = self.input, self.state.settings
         if source is None:
@@ -191,8 +161,8 @@ class Deciding:
                 return self.tell(self._asked(source, frame, joint=joint), frame)
             return self._stored(source, frame)
         except Cancelled as error:
-            shown = self._volume is not None or source.last() is not None
-            return self.tell(Interrupted(error, shown), frame)
+            shown = self._volumes.lasting is not None or source.last() is not None
+            return self.tell(fs.Interrupted(error, shown), frame)
 
     def _number_of(self, vdi: VDI) -> int:
         """Return the number of a VDI, another one than that of the VDI before."""
@@ -201,7 +171,7 @@ class Deciding:
             self._number += 1
         return self._number
 
-    def _asked(self, source: SourceInput, frame: Frame, *, joint: bool) -> FrameAsked:
+    def _asked(self, source: SourceInput, frame: Frame, *, joint: bool) -> fs.FrameAsked:
         """Look at all that decides what the frame of a volume shows."""
         window, settings, view = self.window, self.state.settings, frame.view
         assert view is not None
@@ -210,7 +180,7 @@ class Deciding:
         moving, previews = window.moving(settings), window.previews(settings)
         stamp, watched = source.stamp(), one_view and window.watched_behind(settings)
         wanted, trouble = self._wanted(source, stamp, None if watched else view)
-        return FrameAsked(
+        return fs.FrameAsked(
             now(),
             (window.number, id(window)),
             view,
@@ -250,7 +220,7 @@ class Deciding:
         self._request = stamp, request
         return request, None
 
-    def _sight(self, source: SourceInput, frame: Frame) -> Sight | None:
+    def _sight(self, source: SourceInput, frame: Frame) -> fs.Sight | None:
         """Return the VDI made last as the frame's view shows it."""
         vdi, made = source.last(), source.source.GetCurrentRequest()
         if vdi is None or made is None or frame.view is None:
@@ -264,7 +234,7 @@ class Deciding:
             covered = coverage(vdi, view.camera, view.size)
         pixels = shown.covered(vdi.bounds)
         of = (shown.angle, detail, covered, pixels, self._options)
-        return Sight(number, vdi.bounds, made, *of)
+        return fs.Sight(number, vdi.bounds, made, *of)
 
     def _stored(self, source: Input, frame: Frame) -> VDI | None:
         """Return the VDI of a frame that has no volume, and say what it lacks."""
@@ -275,7 +245,7 @@ class Deciding:
         elif isinstance(source, SetInput):
             source.shower.device = self.device
             source.shower.look(view.camera)
-        event = StoredAsked(
+        event = fs.StoredAsked(
             source.stamp(),
             isinstance(source, SetInput),
             window.moving(settings),
@@ -284,7 +254,7 @@ class Deciding:
         vdi = self.tell(event, frame)
         if isinstance(vdi, VDI):
             cone = vdi.metadata.get("view_cone")
-            seen = Sight(
+            seen = fs.Sight(
                 self._number_of(vdi),
                 vdi.bounds,
                 angle=angle_from_generating_view(vdi, view.camera),
@@ -297,18 +267,18 @@ class Deciding:
                 else "actor.regenerate() makes this step anew"
             )
             cone = cone if isinstance(cone, int | float) else _VIEW_CONE
-            self.tell(StoredSeen(seen, cone, remedy), frame)
+            self.tell(fs.StoredSeen(seen, cone, remedy), frame)
         return vdi  # type: ignore[return-value]
 
-    def tell(self, event: Event | None, frame: Frame | None = None) -> VDI | VolumePicture | None:
+    def tell(self, event: fs.Event | None, frame: Frame | None = None) -> Shown:
         """Have decided what follows from an event, and do it; return what a frame is to show."""
-        shown: VDI | VolumePicture | None = None
+        shown: Shown = None
         while event is not None:
             self.state, actions = decide(self.state, event)
             event = None
             for action in actions:
                 match action:
-                    case Show():
+                    case fs.Show():
                         try:
                             shown = self._shown(action, frame)
                         except VDIError as unable:
@@ -317,31 +287,31 @@ class Deciding:
                             _log.debug("the volume cannot be drawn itself", exc_info=unable)
                             refused = (*action.asked.refused, action.content)
                             event = replace(action.asked, refused=refused)
-                    case Do(what):
+                    case fs.Do(what):
                         self._do(what, frame)
-                    case Generate(screen):
+                    case fs.Generate(screen):
                         self._generate(screen)
-                    case EstimateError(number, view, options):
+                    case fs.EstimateError(number, view, options):
                         vdi, made = self._made()
                         if vdi is not None and made is not None:
                             self._behind.estimate(number, vdi, made, view, options)
-                    case AskPolicy(asked):
+                    case fs.AskPolicy(asked):
                         event = replace(asked, answer=self._policy_says())
-                    case Judge(asked):
+                    case fs.Judge(asked):
                         event = replace(asked, judged=self._judged(frame))
-                    case AskAgain(asked):
+                    case fs.AskAgain(asked):
                         assert frame is not None
                         assert isinstance(self.input, SourceInput)
                         again = self._asked(self.input, frame, joint=asked.joint)
                         event = replace(again, look=asked.look, answer=asked.answer)
-                    case Warn(message, cause):
+                    case fs.Warn(message, cause):
                         vdi = None if self.input is None else self.input.last()
                         # Once for all VDIs of one V_O, such as the steps of a series
                         of = None if vdi is None else (vdi.camera, vdi.window_size)
                         self._warnings.warn(message, cause=(cause, of))
-                    case Complain(error):
+                    case fs.Complain(error):
                         self._complain(error)
-                    case Raise(error):
+                    case fs.Raise(error):
                         raise error
         return shown
 
@@ -353,42 +323,29 @@ class Deciding:
             return None, None
         return self.input.last(), self.input.source.GetCurrentRequest()
 
-    def _of(self, show: Show, frame: Frame | None) -> Request:
-        """Return what is to be shown the volume of."""
-        assert isinstance(self.input, SourceInput)
-        source, made = self.input.source, self.input.source.GetCurrentRequest()
-        if show.what == "making" and self._behind.request is not None:
-            return self._behind.request
-        if show.what == "made" and made is not None:
-            return made
-        if show.in_bricks and frame is not None:  # for pictures of that size
-            return source.MakeRequest(frame.view)
-        return self._request[1] if self._request is not None else source.MakeRequest()
-
-    def _shown(self, show: Show, frame: Frame | None) -> VDI | VolumePicture | None:
+    def _shown(self, show: fs.Show, frame: Frame | None) -> Shown:
         """Return what is to be shown, made where it has to be; VDIError is raised if it cannot."""
         source = self.input
         assert source is not None
         if show.what == "last":
             return source.last()
         if show.what == "before":
-            return self._volume or source.last()
-        if show.what == "this view":
-            assert isinstance(source, SourceInput)
-            assert frame is not None
+            return self._volumes.lasting or source.last()
+        assert isinstance(source, SourceInput)
+        making, made = self._behind.request, source.source.GetCurrentRequest()
+        if show.what == "making" and making is not None:
+            return self._volumes.wait_by(making)
+        if show.what == "this view" and frame is not None:
             return self._of_this_view(source, frame)
-        if show.what == "making":
-            wanted = self._of(show, frame)
-            if self._placeholder is None or self._placeholder.request is not wanted:
-                self._placeholder = None  # its buffers go before others are taken
-                self._placeholder = VolumePicture(wanted, placeholder=True)
-            return self._placeholder
-        self._placeholder = None
-        content = show.content
-        if self._volume is None or self._volume.request.content != content:
-            self._volume = None
-            self._volume = VolumePicture(self._of(show, frame), in_bricks=show.in_bricks)
-        return self._volume
+
+        def wanted() -> Request:
+            if show.what == "made" and made is not None:
+                return made
+            if show.in_bricks and frame is not None:  # for pictures of that size
+                return source.source.MakeRequest(frame.view)
+            return self._request[1] if self._request is not None else source.source.MakeRequest()
+
+        return self._volumes.get(show.content, wanted, in_bricks=show.in_bricks)
 
     def _of_this_view(self, source: SourceInput, frame: Frame) -> VDI:
         """Return a VDI of exactly the frame's view, made now; of a tile it is not kept."""
@@ -416,11 +373,11 @@ class Deciding:
         match what:
             case "drop vdi":
                 self._behind.drop_vdi()
-                self._placeholder = None
+                self._volumes.placeholder = None
             case "drop estimate":
                 self._behind.drop_estimate()
             case "forget volume":
-                self._volume = self._placeholder = None
+                self._volumes = VolumePictures()
                 self._estimators = Estimators()
                 self._behind.forget_volume()
             case "update" if source is not None:
@@ -432,7 +389,7 @@ class Deciding:
                     if not source.has_what_it_had():
                         raise  # else as VTK's mappers, which draw the data that are there
                 except BaseException as error:
-                    self.tell(Failed(error, source.stamp(), in_frame=True))
+                    self.tell(fs.Failed(error, source.stamp(), in_frame=True))
                     raise
             case "forget view" if source is not None:
                 source.forget_view()
@@ -445,9 +402,12 @@ class Deciding:
                 vdi, request = self._behind.vdi, self._behind.request
                 if vdi is not None and request is not None:
                     source.source.TakeVDI(vdi, request)
-                    self._placeholder, self._swapped = None, True
-            case "prepare":
-                self._prepare()
+                    self._volumes.placeholder, self._swapped = None, True
+            case "prepare":  # what the first change would wait for
+                made = self._made()[1] or (None if self._request is None else self._request[1])
+                time = self.state.settings.draw == "auto"
+                if made is not None:
+                    self._behind.prepare(made, partial(prepared, request=made, time=time))
             case "grow" if shower is not None:
                 shower.grow()
             case "grow now" if shower is not None:
@@ -460,30 +420,7 @@ class Deciding:
         try:
             self._behind.generate(self.input.source.MakeRequest(screen))
         except Exception as error:  # what is shown can still be drawn
-            self.tell(Failed(error))
-
-    def _prepare(self) -> None:
-        """Have compiled, behind the frames, what the first change would wait for."""
-        made = self._made()[1] or (None if self._request is None else self._request[1])
-        times = self.state.settings.draw == "auto"
-        if made is None:
-            return
-
-        def draw_some(runtime: Runtime) -> FrameTook | None:
-            camera, volume = made.screen.camera, VolumePicture(made)
-            volume.picture(FrameRequest(camera, (TRIAL_SIZE, TRIAL_SIZE)))
-            if not times:
-                return None
-            # What a ray costs, by pictures of as many as a preview has at least
-            trial = Frame.of(camera, reduced(made.screen.size, FLOOR))
-            taken = []
-            for _ in range(_TRIALS):
-                began = runtime.clock()
-                volume.picture(FrameRequest(camera, trial.size))
-                taken.append(runtime.clock() - began)
-            return FrameTook("volume", 0.0, trial.covered(volume.bounds), min(taken))
-
-        self._behind.prepare(made, draw_some)
+            self.tell(fs.Failed(error))
 
     def _policy_says(self) -> bool:
         """Return what the user's function says of the frame's view."""
@@ -494,17 +431,15 @@ class Deciding:
             self._complain(error)
             return False
 
-    def _judged(self, frame: Frame | None) -> Estimate | Literal[False]:
+    def _judged(self, frame: Frame | None) -> fs.Estimate | Literal[False]:
         """Estimate the error of the VDI in the frame's view now; False if it cannot be."""
         vdi, made = self._made()
-        assert vdi is not None
-        assert made is not None
-        assert frame is not None
-        assert frame.view is not None
+        assert vdi is not None and made is not None  # noqa: PT018
+        assert frame is not None and frame.view is not None  # noqa: PT018
         of, options = (self._number_of(vdi), frame.view), self._options
         detail = magnification(vdi, frame.camera, frame.full_size)
         if made.screen == frame.view and detail <= 1 + _ROUNDING:
-            return Estimate(*of, ssim=1.0, options=options)
+            return fs.Estimate(*of, ssim=1.0, options=options)
         runtime, background = get_runtime(made.device), frame.renderer.GetBackground()
         try:
             error = self._estimators.estimate(
@@ -513,15 +448,15 @@ class Deciding:
         except VDIError:  # no memory for it, say: the volume's picture is right
             _log.debug("the error of a view cannot be estimated", exc_info=True)
             return False
-        return Estimate(*of, ssim=error.ssim, contrast=error.contrast, options=options)
+        return fs.Estimate(*of, ssim=error.ssim, contrast=error.contrast, options=options)
 
     def _complain(self, error: BaseException) -> None:
-        said = f"{type(error).__name__}: {error}"
+        if self.player is not None:
+            self._warnings.warn(f"a step is left out: {type(error).__name__}: {error}", error)
+            return
         self._warnings.warn(
-            f"a step is left out: {said}"
-            if self.player is not None
-            else f"the VDI cannot be made anew: {said}; what was shown stays, and "
-            "actor.regenerate() tries again",
+            f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
+            "and actor.regenerate() tries again",
             error,
         )
 
@@ -541,8 +476,8 @@ class Deciding:
         vdi, made = self._made()
         if not self._swapped and self.state.behind and self.input is not None:
             of = None if vdi is None or made is None else (self._number_of(vdi), vdi.bounds, made)
-            seen = None if of is None else Sight(*of, options=self._options)
-            self.tell(TimePassed(now(), seen, self.input.stamp()))
+            seen = None if of is None else fs.Sight(*of, options=self._options)
+            self.tell(fs.TimePassed(now(), seen, self.input.stamp()))
         return self._swapped
 
     @property

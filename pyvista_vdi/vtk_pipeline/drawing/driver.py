@@ -146,7 +146,8 @@ class Driver(Deciding):
         if self.box.components != components:
             self.box.give_components(components)
         window = renderer.GetRenderWindow()
-        self._window = weakref.ref(Window.of(window))
+        of_window = Window.of(window)
+        self._window = weakref.ref(of_window)
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
             return
@@ -157,9 +158,9 @@ class Driver(Deciding):
         with suppress(VDIError):  # which what is drawn says
             self.box.Update()
         drawn = self._last = self._guarded(self._paint, mapper, renderer) or self._last
-        self.window.pace = self.window.pace.showed(drawn.preview)
+        of_window.pace = of_window.pace.showed(drawn.preview)
         if window.GetInteractor() is not None:
-            self.window.shared(Grabbing).join(self, window.GetInteractor())
+            of_window.listen(window.GetInteractor(), Grabbing)
         unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
         place_image(actor, unit, *viewport(renderer))
         self._no_depth.show(window, mapper)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from pyvista_vdi.quality.frame_state import RenderMode
 from pyvista_vdi.quality.pace import Cost
 from pyvista_vdi.quality.render_mode import rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
-from pyvista_vdi.vtk_pipeline.drawing.volume_picture import VolumePicture
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array
 from pyvista_vdi.vtk_pipeline.interaction.window import Window
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -31,6 +30,9 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkPropCollection,
     vtkTextureObject,
 )
+
+if TYPE_CHECKING:
+    from pyvista_vdi.vtk_pipeline.drawing.volume_picture import VolumePicture
 
 T = TypeVar("T")
 
@@ -169,7 +171,7 @@ class Frame:
             transmittance_cutoff=settings.transmittance_cutoff,
         )
         known: dict[str, Any] = {"number": number, "bounds": seen.bounds, "options": options}
-        if isinstance(seen, VolumePicture):
+        if not isinstance(seen, VDI):
             return replace(self, volume=seen, **known)
         assert self.view is not None
         angle = angle_from_generating_view(seen, self.view.camera)

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import get_runtime
+from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.quality.background import TRIAL_SIZE
+from pyvista_vdi.quality.frame_rate import FLOOR
+from pyvista_vdi.quality.frame_state import FrameTook
+from pyvista_vdi.quality.pace import reduced
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volume
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.filters.source import Request
+
+#: Pictures that tell what a volume's rays cost, of which the fastest counts: what disturbs one by
+#: milliseconds has the volume seem too dear to be drawn, which no frame would ever correct.
+_TRIALS = 5
 
 _numbers = itertools.count()
 
@@ -84,3 +95,45 @@ class VolumePicture:
                 made.volume, made.transfer_function, frame.replace(device=made.device), made.options
             )
         return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.generating[0])
+
+
+class VolumePictures:
+    """The volumes that a mapper draws: for their own sake, and until a VDI is made."""
+
+    def __init__(self) -> None:
+        self.lasting: VolumePicture | None = None
+        self.placeholder: VolumePicture | None = None
+
+    def wait_by(self, wanted: Request) -> VolumePicture:
+        """Return the volume of what a VDI is being made of; VDIError is raised if there is none."""
+        if self.placeholder is None or self.placeholder.request is not wanted:
+            self.placeholder = None  # its buffers go before others are taken
+            self.placeholder = VolumePicture(wanted, placeholder=True)
+        return self.placeholder
+
+    def get(
+        self, content: Any, request: Callable[[], Request], *, in_bricks: bool
+    ) -> VolumePicture:
+        """Return the volume of a content, made of the request; VDIError is raised if it cannot."""
+        self.placeholder = None
+        if self.lasting is None or self.lasting.request.content != content:
+            self.lasting = None
+            self.lasting = VolumePicture(request(), in_bricks=in_bricks)
+        return self.lasting
+
+
+def prepared(runtime: Runtime, request: Request, *, time: bool) -> FrameTook | None:
+    """Draw a volume in vain, so that all is compiled; return what a ray takes, if that is asked.
+
+    By pictures of as many pixels as a preview has at least.
+    """
+    camera, volume = request.screen.camera, VolumePicture(request)
+    volume.picture(FrameRequest(camera, (TRIAL_SIZE, TRIAL_SIZE)))
+    if not time:
+        return None
+    trial, taken = Frame.of(camera, reduced(request.screen.size, FLOOR)), []
+    for _ in range(_TRIALS):
+        began = runtime.clock()
+        volume.picture(FrameRequest(camera, trial.size))
+        taken.append(runtime.clock() - began)
+    return FrameTook("volume", 0.0, trial.covered(volume.bounds), min(taken))

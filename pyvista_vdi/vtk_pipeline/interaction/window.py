@@ -21,6 +21,10 @@ T = TypeVar("T")
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
 
+_BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressEvent")
+#: Priorities of observers before and after the style's, which is 0.
+_BEFORE, _AFTER = 1.0, -1.0
+
 #: By the windows' addresses; without callbacks, as ``drawing.mapper._drivers`` explains.
 _windows: dict[str, weakref.ref[Window]] = {}
 
@@ -107,6 +111,26 @@ class Window:
                     window._camera_changed()
 
             renderer.AddObserver("ActiveCameraEvent", camera_changed)
+
+    def listen(self, interactor: Any, kind: type[Any]) -> None:
+        """Have what is shared of a kind begin and end around what a style does at a press."""
+        if not self._watched.is_new(interactor):
+            return
+        weak = weakref.ref(self)
+
+        def pressed(caller: Any, _: str) -> None:
+            window = weak()
+            if window is not None:
+                window.shared(kind).begin(list(window._drivers), caller)
+
+        def taken(*_: Any) -> None:
+            window = weak()
+            if window is not None:
+                window.shared(kind).end()
+
+        for event in _BUTTONS:
+            interactor.AddObserver(event, pressed, _BEFORE)
+            interactor.AddObserver(event, taken, _AFTER)
 
     @property
     def single(self) -> bool:
