@@ -124,29 +124,6 @@ class Deciding:
         self.tell(fs.Closed())
         self._behind.close()
 
-    def vdi_asked_for(self) -> VDI | None:
-        """Return the VDI, made now where pictures have been drawn without one or of other data.
-
-        It is of the view that the first picture had, or that somebody chose; ``None`` before.
-        """
-        source = self.input
-        if not isinstance(source, SourceInput):
-            return None if source is None else source.last()
-        if source.source.GetCamera() is not None and source.source.GetWindowSize() is not None:
-            self.tell(fs.VDIAsked(source.last() is not None, source.stamp()))
-        return source.last()
-
-    def vdi_to_pick(self, frame: Frame) -> VDI | None:
-        """Return a VDI that has all of what a view shows; without the volume, that which is there.
-
-        ``None`` where no picture was drawn yet.
-        """
-        vdi, view = self.vdi_asked_for(), frame.view
-        if vdi is not None and view is not None and isinstance(self.input, SourceInput):
-            shown = self.tell(fs.ViewPicked(coverage(vdi, view.camera, view.size)), frame)
-            return shown if isinstance(shown, VDI) else vdi
-        return vdi
-
     # What a frame shows
 
     def decided(self, frame: Frame, *, joint: bool) -> Shown:

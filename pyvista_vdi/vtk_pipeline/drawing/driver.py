@@ -13,12 +13,10 @@ from dataclasses import replace
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.decide import placeholder_share, ssim_of
-from pyvista_vdi.quality.frame_state import (
-    FrameTook,
-    PlaceholderTook,
-)
+from pyvista_vdi.quality.frame_state import FrameTook, PlaceholderTook, VDIAsked, ViewPicked
 from pyvista_vdi.quality.pace import reduced
 from pyvista_vdi.quality.render_mode import seconds_per_pixel
 from pyvista_vdi.quality.view_error import (
@@ -39,7 +37,7 @@ from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
 from pyvista_vdi.vtk_pipeline.drawing.volume_picture import VolumePicture
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window, now
@@ -351,6 +349,29 @@ class Driver(Deciding):
             # Gone before the frame begins: freeing hundreds of megabytes takes its time
             self._images.clear()
         return swapped
+
+    def vdi_asked_for(self) -> VDI | None:
+        """Return the VDI, made now where pictures have been drawn without one or of other data.
+
+        It is of the view that the first picture had, or that somebody chose; ``None`` before.
+        """
+        source = self.input
+        if not isinstance(source, SourceInput):
+            return None if source is None else source.last()
+        if source.source.GetCamera() is not None and source.source.GetWindowSize() is not None:
+            self.tell(VDIAsked(source.last() is not None, source.stamp()))
+        return source.last()
+
+    def vdi_to_pick(self, frame: Frame) -> VDI | None:
+        """Return a VDI that has all of what a view shows; without the volume, that which is there.
+
+        ``None`` where no picture was drawn yet.
+        """
+        vdi, view = self.vdi_asked_for(), frame.view
+        if vdi is not None and view is not None and isinstance(self.input, SourceInput):
+            shown = self.tell(ViewPicked(coverage(vdi, view.camera, view.size)), frame)
+            return shown if isinstance(shown, VDI) else vdi
+        return vdi
 
     def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
         """Return what of an actor's VDI a renderer shows at a place of the window, in pixels."""
