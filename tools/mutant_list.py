@@ -712,7 +712,7 @@ PYTHON_MUTANTS = (
     _m(
         "pictures: a VDI of which the view shows more than it has",
         PICTURES,
-        " or coverage(vdi, view.camera, view.size) < 1:",
+        " or seen.coverage < 1:",
         ":",
         ("quality",),
     ),
@@ -726,22 +726,22 @@ PYTHON_MUTANTS = (
     _m(
         "pictures: an estimate holds whatever else changed",
         PICTURES,
-        "if shown == options",
+        "if each.options == seen.options",
         "if True",
         ("quality",),
     ),
     _m(
         "pictures: lists as coarse as one likes",
         PICTURES,
-        "if bound is None and detail > FINE_ENOUGH:",
+        "if bound is None and seen.magnification > FINE_ENOUGH:",
         "if False:",
         ("quality",),
     ),
     _m(
         "pictures: what failed is asked about again",
         PICTURES,
-        "self._poor_from = angle",
-        "pass",
+        "poor_from=seen.angle, in_vain=in_vain",
+        "in_vain=in_vain",
         ("quality",),
     ),
     _m(

@@ -383,6 +383,26 @@ def test_what_failed_is_tried_again_when_something_changes():
     assert world.making.content == 2
 
 
+@pytest.mark.parametrize("policy", ["auto", bool])
+def test_a_view_whose_vdi_failed_is_not_tried_again(policy):
+    world = with_vdi(draw="vdi", regenerate=policy)
+    world.answer, world.ssim = True, 0.5
+    at_rest(world, 30)
+    world.finish()
+    world.frame()
+    if policy == "auto":
+        assert world.making is not None
+        world.failing = 1
+        world.finish()
+    else:
+        world.tell(Failed(RuntimeError("no more")))
+        world.making = None
+    for _ in range(3):
+        world.now += 1
+        world.frame()
+        assert world.making is None
+
+
 @pytest.mark.parametrize(("policy", "degrees"), [("auto", 30), ("never", 0), (bool, 30)])
 def test_a_change_is_made_for_the_view_of_the_moment_or_as_before(policy, degrees):
     world = with_vdi(draw="vdi", regenerate=policy)

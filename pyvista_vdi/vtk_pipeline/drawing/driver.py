@@ -182,13 +182,14 @@ class Driver(Deciding):
             part = self.window.shared(Overlaps).part(frame, _frames)
             if part is not None:
                 return part
-        frame = replace(frame, depth=self.window.shared(OpaqueDepths).read([frame]))
+        window = self.window
+        frame = replace(frame, depth=window.shared(OpaqueDepths).read([frame]))
         at_rest = reduced(frame.full_size, 1 / self.state.settings.image_distance**2)
         frame = frame.coarser(at_rest)
         drawn = self._images.get(frame)
         if drawn is not None:
             return drawn  # however the frame is to be: where it is there, full costs nothing
-        few, window = frame, self.window
+        few = frame
         many = window.pace.few_lists and window.single and window.previews(self.state.settings)
         if many and frame.vdi is not None and frame.view is not None:
             of = (frame.number, frame.vdi, frame.view.camera, self.device)
@@ -246,11 +247,11 @@ class Driver(Deciding):
 
     def _raycast(self, frame: Frame) -> Drawn:
         """Return the image, and tell what it took."""
-        lit_from, parts, volume = None, [], frame.volume
+        lit_from, parts, volume, window = None, [], frame.volume, self.window
         if volume is not None and not volume.placeholder and frame.view is not None:
             # In a window the VDI's light, so that nothing jumps
             settings = self.state.settings
-            if settings.draw == "volume" or not self.window.watched_behind(settings):
+            if settings.draw == "volume" or not window.watched_behind(settings):
                 lit_from = frame.view.camera
         elif self.shower is not None:
             parts = self.shower.parts()
@@ -262,7 +263,7 @@ class Driver(Deciding):
             self.tell(PlaceholderTook(math.prod(frame.size), seconds))
         else:
             took = (frame.size, frame.full_size, seconds, frame.cost, frame.effort)
-            self.window.pace = self.window.pace.drawn(*took)
+            window.pace = window.pace.drawn(*took)
         # A volume's first picture has kernels compiled and voxels sent to the device
         if frame.few_lists is None and (volume is None or volume.pictures > 1):
             self.tell(FrameTook(frame.way, frame.angle, frame.covered(frame.bounds), seconds))

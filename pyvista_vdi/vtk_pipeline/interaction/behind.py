@@ -94,10 +94,10 @@ class Behind:
 
     def finished(self) -> Iterator[Event]:
         """Yield what was finished, or has failed, since the last time."""
-        took = self._taken(self._preparation)
+        took = None if self._preparation.job is None else self._taken(self._preparation)
         if isinstance(took, FrameTook):
             yield took
-        made = self._taken(self._estimation)
+        made = None if self._estimation.job is None else self._taken(self._estimation)
         if made is not None:
             yield Failed(made) if isinstance(made, BaseException) else EstimateReady(made)
         vdi = None if self._generation is None else self._taken(self._generation)
@@ -108,6 +108,7 @@ class Behind:
 
     @staticmethod
     def _taken(worker: Any) -> Any:
+        """Return what was made, or why not; None where nothing is ready."""
         try:
             return worker.take()
         except Exception as error:
