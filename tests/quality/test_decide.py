@@ -355,6 +355,18 @@ def test_a_view_gets_a_vdi_where_the_estimate_is_poor_and_one_at_a_time():
     assert world.making is None, "the view has come back"
 
 
+def test_the_event_loop_is_needed_until_the_view_rests():
+    world = with_vdi(draw="vdi")
+    world.ssim = 0.99
+    at_rest(world, 30)
+    world.finish()
+    world.frame()
+    world.angle = 30.1  # too little for another estimate
+    world.frame()
+    assert busy(world.state, world.now)
+    assert not busy(world.state, world.now + 0.2)
+
+
 def test_in_motion_more_is_borne_and_less_is_asked():
     world = with_vdi(draw="vdi")
     world.moving, world.ssim, world.angle = True, 0.92, 30.0
@@ -414,6 +426,30 @@ def test_a_change_is_made_for_the_view_of_the_moment_or_as_before(policy, degree
     world.content = 0
     assert world.frame() == ("vdi", 0), "taken back"
     assert world.making is None
+
+
+def test_a_policy_is_asked_once_for_both_eyes_of_a_frame():
+    world = with_vdi(draw="vdi", regenerate=bool)
+    world.frame()
+    world.tell(world.ask())
+    assert sum(isinstance(each, AskPolicy) for each in world.log) == 1
+
+
+def test_off_screen_a_film_of_nearly_one_view_gets_a_vdi():
+    world, ways = World(watched=False), []
+    world.ssim = 0.99
+    for number in range(20):
+        world.angle = 0.1 * number
+        ways.append(world.frame()[0])
+    assert ways == ["volume"] * 12 + ["vdi"] * 8
+    assert world.made == 1
+
+
+def test_what_overlaps_is_drawn_by_vdis_whatever_was_chosen():
+    world = World(watched=False, draw="volume")
+    assert world.frame()[0] == "volume"
+    world.joint = True
+    assert world.frame()[0] == "vdi"
 
 
 def test_what_the_device_cannot_draw_is_tried_once_for_each_content():
