@@ -18,6 +18,7 @@ from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
 from pyvista_vdi.extensions.series.player import Player
 from pyvista_vdi.extensions.sets.shower import SetShower
+from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality import frame_state as fs
 from pyvista_vdi.quality.decide import busy, decide
@@ -67,7 +68,7 @@ class Deciding:
         self._request: tuple[Any, Request] | None = None  # what the next VDI is made of, and when
         self._numbered: Callable[[], VDI | None] = lambda: None
         self._number = 0
-        self._options: Any = None  # how the last frame's VDI is drawn
+        self._options = RenderOptions()  # how the last frame's VDI is drawn
         self._behind, self._estimators = Behind(), Estimators()
         self._swapped = False
         self._timer = Timer(self._tick)

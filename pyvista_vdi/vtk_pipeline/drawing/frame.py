@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +30,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkPropCollection,
     vtkTextureObject,
 )
-
-if TYPE_CHECKING:
-    from pyvista_vdi.vtk_pipeline.drawing.volume_picture import VolumePicture
 
 T = TypeVar("T")
 
@@ -59,69 +56,31 @@ _PLANE_SLACK = 1e-9
 class Frame:
     """What a renderer's frame asks of a VDI. It lives no longer than the frame: it holds VTK's.
 
-    Attributes
-    ----------
-    size : (int, int)
-        Width and height of the image in pixels, from OpenGL's viewport: under SSAA it is larger
-        than the window's, in a tiled screenshot it is the tile's.
-    origin : (int, int)
-        The viewport's lower left corner in the framebuffer, pixels.
-    camera : Camera
-        The frame's view; its world is ``to_view @ world``, its model transform includes the
-        actor's matrix.
-    to_view : numpy.ndarray
-        World coordinates to that camera's world (eye at the origin, looking along -z), (4, 4).
-    projection : numpy.ndarray
-        Rows 2 and 3 of the projection matrix: view space to normalised depth and its
-        denominator, (2, 4).
-    renderer, actor, mapper
-        Whose frame it is, and of which VDI.
-    full_size : (int, int)
-        Width and height of the viewport in pixels; the image of a preview is smaller.
-    view : View or None
-        The renderer's view, between the two eyes of a stereo pair if there are; that of a mapper.
-    model_transform : numpy.ndarray
-        The actor's matrix, (4, 4).
-    vdi : VDI or None
-        What is seen: see :meth:`showing`.
-    volume : VolumePicture or None
-        What is seen in place of a VDI.
-    number : int
-        By which what is seen is known: a VDI is not held for it.
-    angle : float
-        Between the view and that of the VDI, degrees; 0 for a volume.
-    effort : float
-        What a ray is expected to take over one from the VDI's own view.
-    few_lists : VDI or None
-        What is raycast in place of the VDI in a preview: every second of its lists.
-    bounds : tuple of float
-        Those of what is seen, model frame.
-    options : RenderOptions
-        How it looks; clipping planes are in the camera's world.
-    depth : numpy.ndarray or None
-        View depth at which rays end, float32 (H, W), top row first.
+    Its camera's world is ``to_view @ world``: the eye is at the origin and looks along -z. Sizes
+    are width and height in pixels, from OpenGL's viewport: under SSAA it is larger than the
+    window's, in a tiled screenshot it is the tile's.
     """
 
-    size: tuple[int, int]
-    origin: tuple[int, int]
-    camera: Camera
-    to_view: Matrix
-    projection: Matrix
+    size: tuple[int, int]  # of the image
+    origin: tuple[int, int]  # the viewport's lower left corner in the framebuffer, pixels
+    camera: Camera  # its model transform includes the actor's matrix
+    to_view: Matrix  # world coordinates to that camera's world, (4, 4)
+    projection: Matrix  # its rows 2 and 3: view space to depth and denominator, (2, 4)
     renderer: Any = None
     actor: Any = None
     mapper: Any = None
-    full_size: tuple[int, int] = (0, 0)
-    view: View | None = None
-    model_transform: Any = None
-    vdi: VDI | None = None
-    volume: VolumePicture | None = None
-    number: int = 0
-    angle: float = 0.0
-    effort: float = 1.0
-    few_lists: VDI | None = None
-    bounds: tuple[float, ...] = ()
-    options: RenderOptions = field(default_factory=RenderOptions)
-    depth: Image | None = None
+    full_size: tuple[int, int] = (0, 0)  # of the viewport; the image of a preview is smaller
+    view: View | None = None  # the renderer's, between the two eyes of a stereo pair
+    model_transform: Any = None  # the actor's matrix, (4, 4)
+    vdi: VDI | None = None  # what is seen: see showing()
+    volume: Any = None  # the VolumePicture that is seen in place of a VDI
+    number: int = 0  # by which what is seen is known: a VDI is not held for it
+    angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
+    effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
+    few_lists: VDI | None = None  # raycast in place of the VDI in a preview: every second list
+    bounds: tuple[float, ...] = ()  # of what is seen, model frame
+    options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
+    depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
 
     @classmethod
     def current(cls, renderer: Any, actor: Any, mapper: Any) -> Frame:
@@ -161,8 +120,8 @@ class Frame:
         """The window that it is a frame of."""
         return self.mapper.driver.window  # type: ignore[no-any-return]
 
-    def showing(self, seen: VDI | VolumePicture, number: int) -> Frame:
-        """Return the frame of this VDI, with all that its mapper says of its looks."""
+    def showing(self, seen: Any, number: int) -> Frame:
+        """Return the frame of this VDI, or volume, with all that its mapper says of its looks."""
         settings = self.mapper.driver.state.settings
         options = RenderOptions(
             clipping_planes=self._clipping_planes(seen.bounds),
