@@ -30,13 +30,11 @@ from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import TARGET_ANGLE, Dial, refuse_settings
+from pyvista_vdi.quality.frame_state import Policy, checked_draw, checked_policy, checked_rate
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW, checked_bound
-from pyvista_vdi.quality.render_mode import checked_draw
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
-from pyvista_vdi.vtk_pipeline.interaction.regeneration import Policy, checked_policy
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_rate
 from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet, vtkVolume, vtkWeakReference
 
 #: ``add_volume``'s aliases.
@@ -464,7 +462,7 @@ class AddVDI(Component):
         for weak in self._actors:
             actor = weak.Get()
             if actor is not None and actor.mapper is not None:
-                actor.mapper.painter.release()
+                actor.mapper.driver.release()
         self._actors.clear()
 
     def __plotter_deep_clean__(self) -> None:
