@@ -145,7 +145,8 @@ def test_kernels_keep_to_what_every_compiler_takes():
     """OpenCL C has no macros of any number of arguments; NVIDIA's compiler refuses them."""
     folder = resources.files("pyvista_vdi.opencl")
     kernels = [path for room in folder.iterdir() if room.is_dir() for path in room.iterdir()]
-    texts = {path.name: path.read_text() for path in kernels if path.name.endswith(".cl")}
+    files = [path for path in kernels if path.name.endswith(".cl")]
+    texts = {path.name: re.sub("//.*", "", path.read_text()) for path in files}
     assert len(texts) > 40
     assert not [name for name, text in texts.items() if re.search(r"\.\.\.\)|__VA_ARGS__", text)]
 
