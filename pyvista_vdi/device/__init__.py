@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from pyvista_vdi.device.buffers import (
     DeviceBuffer,
-    LocalMemory,
     bytes_text,
     kept_together,
 )
@@ -29,7 +28,6 @@ __all__ = [
     "KernelDeclaration",
     "KernelTime",
     "Launch",
-    "LocalMemory",
     "Profile",
     "Runtime",
     "Struct",

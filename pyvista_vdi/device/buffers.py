@@ -7,7 +7,6 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
@@ -18,19 +17,6 @@ from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 
 #: Page-locked host memory that a device may have, and the least worth it, bytes.
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
-
-
-@dataclass(frozen=True)
-class LocalMemory:
-    """Local memory of a work-group, as a kernel argument.
-
-    Attributes
-    ----------
-    nbytes : int
-        Bytes for each work-group.
-    """
-
-    nbytes: int
 
 
 def bytes_text(nbytes: int) -> str:

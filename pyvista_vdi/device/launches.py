@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.device.buffers import DeviceBuffer, LocalMemory
+from pyvista_vdi.device.buffers import DeviceBuffer
 from pyvista_vdi.device.declarations import Parameter
 from pyvista_vdi.device.programs import Kernel
 from pyvista_vdi.device.queues import Queues
@@ -91,9 +91,7 @@ class Launch:
                     if given != value and given.dtype.kind != "f":
                         raise TypeError
                 else:
-                    given = _given(parameter, value)
-                    if isinstance(given, LocalMemory):
-                        given = queues.cl.LocalMemory(given.nbytes)
+                    given = _given(queues.cl, parameter, value)
                 self._object.set_arg(parameter.index, given)
             except (AttributeError, OverflowError, TypeError, ValueError) as exc:
                 raise TypeError(
@@ -105,43 +103,6 @@ class Launch:
                 raise queues.failure(exc, doing) from exc
             self._buffers[name] = buffer
             self._missing.pop(name, None)
-
-    def set_in_order(self, *arguments: Any) -> None:
-        """Set all arguments of a kernel that nobody declared, by the types that NumPy gives them.
-
-        A small array is passed by value, as a vector or a structure; None is a null pointer.
-        TypeError if one has no device type, such as a Python number.
-        """
-        kernel, queues = self._kernel, self._queues
-        if len(arguments) != kernel.argument_count:
-            raise InvalidArgumentError(
-                f"kernel {kernel.name!r} of {kernel.path} takes {kernel.argument_count} "
-                f"arguments, {len(arguments)} were given"
-            )
-        for index, value in enumerate(arguments):
-            given, buffer = value, None
-            if isinstance(value, DeviceBuffer):
-                given, buffer = value.memory, value
-                if given is None:
-                    raise DeviceError(_RELEASED.format(value.name))
-            elif value is None:
-                given = _NULL
-            elif isinstance(value, LocalMemory):
-                given = queues.cl.LocalMemory(value.nbytes)
-            elif isinstance(value, (np.generic, np.ndarray)) and value.dtype != np.bool_:
-                given = np.ascontiguousarray(value)
-            else:
-                raise TypeError(
-                    f"argument {index} of kernel {kernel.name!r} is {value!r} of type "
-                    f"{type(value).__name__}; give a DeviceBuffer, LocalMemory, None, or a NumPy "
-                    "number or array of the kernel's own type, such as np.float32(...)"
-                )
-            try:
-                self._object.set_arg(index, given)
-            except queues.cl.Error as exc:
-                doing = f"setting argument {index} of {kernel.name!r} of {kernel.path}"
-                raise queues.failure(exc, doing) from exc
-            self._buffers[str(index)] = buffer
 
     def __call__(self, size: Size, group: Size | None = None, /, **arguments: Any) -> None:
         """Set the arguments that change, and enqueue the kernel.
@@ -239,12 +200,12 @@ class Launch:
             done += rows_now
 
 
-def _given(parameter: Parameter, value: Any) -> Any:
+def _given(cl: Any, parameter: Parameter, value: Any) -> Any:
     """Return local memory, a null pointer, a structure or a vector as the driver takes it."""
     kind, number, count = parameter.kind, parameter.number, parameter.count
     if kind.startswith("local "):
         assert number is not None
-        return LocalMemory(operator.index(value) * count * number.itemsize)
+        return cl.LocalMemory(operator.index(value) * count * number.itemsize)
     if kind.endswith("*"):
         if value is not None:
             raise TypeError

@@ -9,7 +9,7 @@ from typing import Any
 
 from pyvista_vdi.device.declarations import Define, KernelDeclaration
 from pyvista_vdi.device.devices import Candidate
-from pyvista_vdi.device.launches import Launch, Size
+from pyvista_vdi.device.launches import Launch
 from pyvista_vdi.device.programs import Kernel, ProgramCache
 from pyvista_vdi.device.transfers import Transfers
 
@@ -91,29 +91,14 @@ class Runtime(Transfers):
         name: str,
         defines: Mapping[str, Define] | None = None,
     ) -> Kernel:
-        """Return a kernel that nobody declared, compiled when first asked for and kept.
+        """Return a kernel, compiled when first asked for and kept; threads may share it.
 
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            A file of ``pyvista_vdi.opencl`` (``"raycasting/raycast.cl"``), or any file on disk as
-            a Path.
-        name : str
-            The kernel function.
-        defines : mapping of str to str, int, float, bool or None, optional
-            ``-D`` names: what changes the code's shape. Floats become exact float32 literals.
-
-        Returns
-        -------
-        Kernel
-            For :meth:`launch`; threads may share it.
+        Parameters are those of a :class:`KernelDeclaration` and of :meth:`bind`.
 
         Raises
         ------
         KernelBuildError
             If it cannot be assembled or compiled; carries log, options and source.
-        InvalidArgumentError
-            If a define cannot be written as an option.
         """
         defines = defines or {}
         # Numbers that are equal are written otherwise as others' types
@@ -126,12 +111,3 @@ class Runtime(Transfers):
         with self.aside() if background else contextlib.nullcontext():
             known[key] = self._programs.kernel(path, name, defines)
         return known[key]
-
-    def launch(self, kernel: Kernel, size: Size, group: Size | None, *arguments: Any) -> None:
-        """Enqueue a kernel that nobody declared, with its arguments in order.
-
-        The parameters and errors are those of :class:`Launch` and its method ``set_in_order``.
-        """
-        launch = Launch(self, kernel)
-        launch.set_in_order(*arguments)
-        launch(size, group)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, Indices
 from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task, light_entering
@@ -18,6 +17,7 @@ from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.chunked import ChunkedArray, Ranges
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume

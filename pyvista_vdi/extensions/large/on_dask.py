@@ -24,7 +24,6 @@ from distributed import (
 )
 from numpy.typing import NDArray
 
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import (
     DeviceError,
     InvalidVolumeError,
@@ -48,6 +47,7 @@ from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.generation.generate import Progress, report
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.store_identity import StoreIdentity
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI

@@ -11,7 +11,6 @@ from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_o
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Shading, TransferFunction, Volume
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError
 from pyvista_vdi.extensions.large.blocks import Blocks, Halo
 from pyvista_vdi.extensions.large.generate import generate_chunked, task_of
@@ -19,6 +18,7 @@ from pyvista_vdi.extensions.large.passes import Piece, light_entering
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA, GenerationOptions
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.quality.probe import turned
 
 HALOS = [Halo(0, 1), Halo(1, 3)]
