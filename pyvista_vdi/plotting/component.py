@@ -458,7 +458,7 @@ class AddVDI(Component):
         return actor
 
     def __plotter_close__(self) -> None:
-        """Let go of images and textures, even where the user keeps an actor."""
+        """Release images and textures, even where the user keeps an actor."""
         for weak in self._actors:
             actor = weak.Get()
             if actor is not None and actor.mapper is not None:

@@ -343,14 +343,14 @@ def _regenerate(state: FrameState, now: float, seen: Sight | None) -> Decision:
 def _start(
     state: FrameState, of: Any, screen: View | None = None, *, for_view: bool = False
 ) -> Decision:
-    """Have a VDI made of a view, or of the source's own, in place of what is being made."""
+    """Start a VDI of a view, or of the source's own, in place of what is being made."""
     making = Making(of.content, of.screen if screen is None else screen, for_view)
     state = replace(state, making=making, estimating=False)
     return state, (Do("drop estimate"), Generate(screen))
 
 
 def _drop_if_left_behind(state: FrameState, seen: Sight | None) -> Decision:
-    """Give up a VDI that is made for a view which the hand has left behind."""
+    """Cancel a VDI that is made for a view which the hand has left behind."""
     making = state.making
     if making is None or not making.for_view or seen is None or seen.request is None:
         return state, ()
@@ -361,7 +361,7 @@ def _drop_if_left_behind(state: FrameState, seen: Sight | None) -> Decision:
 
 
 def _nothing_goes_on(state: FrameState) -> Decision:
-    """Give up what goes on, and forget what failed."""
+    """Cancel what goes on, and forget what failed."""
     state = replace(state, making=None, estimating=False, failed=None)
     return state, (Do("drop vdi"), Do("drop estimate"))
 
@@ -439,7 +439,7 @@ def _stored(state: FrameState, asked: StoredAsked) -> tuple[Action, ...]:
 
 
 def _lacking(of: StoredSeen) -> tuple[Action, ...]:
-    """Say what a VDI without its volume lacks where it is seen from."""
+    """Return warnings of what a VDI without its volume lacks where it is seen from."""
     seen, lacking = of.seen, []
     if seen.angle > of.cone:
         what = (

@@ -415,14 +415,14 @@ class Do:
 
 @dataclass(frozen=True)
 class Complain:
-    """Say once that a VDI cannot be made anew."""
+    """Warn once that a VDI cannot be made anew."""
 
     error: BaseException
 
 
 @dataclass(frozen=True)
 class Warn:
-    """Say something once for each cause."""
+    """Warn once for each cause."""
 
     message: str
     cause: str

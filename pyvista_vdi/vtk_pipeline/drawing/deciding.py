@@ -220,7 +220,7 @@ class Deciding:
         return vdi  # type: ignore[return-value]
 
     def tell(self, event: fs.Event | None, frame: Frame | None = None) -> Shown:
-        """Have decided what follows from an event, and do it; return what a frame is to show."""
+        """Decide what follows from an event, and do it; return what a frame is to show."""
         shown: Shown = None
         while event is not None:
             self.state, actions = decide(self.state, event)
@@ -433,7 +433,7 @@ class Deciding:
         return self._timer.running
 
     def follow(self, window: Any) -> None:
-        """Have the event loop look at what goes on, if something does and no hand moves."""
+        """Start the event loop's timer, if something goes on and no hand moves."""
         if self._goes_on and not Window.of(window).moving(self.state.settings):
             period = PERIOD if self.input is None else self.input.period or PERIOD
             in_loop = browser.watches(window)

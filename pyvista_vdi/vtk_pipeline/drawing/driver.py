@@ -300,7 +300,7 @@ class Driver(Deciding):
     # Picks, neighbours, exports and status
 
     def say_not_exported(self) -> None:
-        """Say once that a scene which is written for another renderer lacks the VDI.
+        """Warn once that a scene which is written for another renderer lacks the VDI.
 
         Not yet where trame has the scene at hand, and shows the pictures that are drawn here.
         """

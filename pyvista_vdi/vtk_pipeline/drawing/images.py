@@ -77,6 +77,6 @@ class Images:
         return bool(self._kept)
 
     def clear(self) -> None:
-        """Let go of all."""
+        """Drop all."""
         self._kept.clear()
         self._free = None

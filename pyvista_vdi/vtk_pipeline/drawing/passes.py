@@ -36,7 +36,7 @@ PEELED = (
 
 
 def tell_effects(renderer: Any, warn: Callable[[str], None]) -> tuple[bool, bool]:
-    """Say what a renderer's passes do to a VDI.
+    """Look at what a renderer's passes do to a VDI, and warn of it.
 
     Returns whether one of them is of ambient occlusion, and whether volumes may be drawn between
     translucent layers.

@@ -131,7 +131,7 @@ class Behind:
         )
 
     def drop_vdi(self) -> None:
-        """Give up the VDI that is being made."""
+        """Cancel the VDI that is being made."""
         if self._generation is not None:
             self._generation.cancel()
         self.request = None
@@ -149,11 +149,11 @@ class Behind:
         self._estimation.put(Job(judge, request.device))
 
     def drop_estimate(self) -> None:
-        """Give up the estimate that is being made."""
+        """Cancel the estimate that is being made."""
         self._estimation.clear()
 
     def prepare(self, request: Request, draw: Callable[[Runtime], FrameTook | None]) -> None:
-        """Have something drawn in vain, once for each volume and look."""
+        """Draw something in vain, once for each volume and look."""
         if self._prepared is None or self._prepared != request.content:
             self._prepared = request.content
             self._preparation.put(Job(lambda runtime, _: draw(runtime) or True, request.device))
@@ -195,12 +195,12 @@ class Behind:
         return self._few.get((x, y))
 
     def forget_volume(self) -> None:
-        """Let go of volumes on the device."""
+        """Drop volumes on the device."""
         self._estimators = Estimators()
         self._prepared = None
 
     def close(self) -> None:
-        """Give up everything, and leave no thread."""
+        """Cancel everything, and leave no thread."""
         if self._generation is not None:
             self._generation.close()
             self._generation = None

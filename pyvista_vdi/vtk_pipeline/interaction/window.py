@@ -113,7 +113,7 @@ class Window:
             renderer.AddObserver("ActiveCameraEvent", camera_changed)
 
     def listen(self, interactor: Any, kind: type[Any]) -> None:
-        """Have what is shared of a kind begin and end around what a style does at a press."""
+        """Begin and end what is shared of a kind around what a style does at a press."""
         if not self._watched.is_new(interactor):
             return
         weak = weakref.ref(self)
@@ -143,7 +143,7 @@ class Window:
         return self._started is not None
 
     def render(self) -> None:
-        """Have the window drawn, as from its event loop."""
+        """Draw the window, as from its event loop."""
         window = self._window.Get()
         if window is not None and browser.push(window):
             return
