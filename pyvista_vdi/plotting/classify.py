@@ -191,7 +191,7 @@ def transfer_function_from_arguments(
 
 
 def note_mapper(mapper: str) -> None:
-    """Say that a name of VTK's mappers means nothing here, and refuse another."""
+    """Warn that a name of VTK's mappers means nothing here; refuse another name."""
     if mapper not in _MAPPERS:
         raise InvalidArgumentTypeError(
             f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "

@@ -345,7 +345,7 @@ class SourceSettings(Algorithm):
         max_bytes: int | None = None,
         target_angle: float = TARGET_ANGLE,
     ) -> None:
-        """Have settings chosen by what the VDI is to reach; without arguments, no longer.
+        """Choose settings by what the VDI is to reach; without arguments, no longer.
 
         It chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to
         have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata["dial"]`` says what it
@@ -386,7 +386,7 @@ class SourceSettings(Algorithm):
             self._given.watch(Algorithm.Modified if self._track else None)
 
     def _observe_property(self) -> None:
-        """Let changes to the property or its functions reach this algorithm's time stamp."""
+        """Forward changes of the property or its functions to this algorithm's time stamp."""
         for watched, tag in self._observed:
             watched.get().RemoveObserver(tag)
         self._observed = []
