@@ -294,7 +294,7 @@ class Choice:
 
 
 def describe(metadata: dict[str, Any]) -> str | None:
-    """Say in one line what the dial chose for a VDI with such metadata; ``None`` without one."""
+    """Return, in one line, what the dial chose for a VDI with such metadata; ``None`` without one."""
     dial: Any = metadata.get("dial")
     try:
         chosen, predicted = dial["chosen"], dial["predicted"]
@@ -311,7 +311,7 @@ def describe(metadata: dict[str, Any]) -> str | None:
 
 
 def warn_missed(vdi: VDI) -> None:
-    """Give a VDIWarning for what the dial of a VDI could not reach."""
+    """Warn of what the dial of a VDI could not reach."""
     for missed in vdi.metadata.get("dial", {}).get("missed", ()):
         warn_external(missed)
 
