@@ -137,7 +137,7 @@ def _show(
             warnings.filterwarnings("ignore", "the VDI cannot be drawn", VDIWarning)
             warnings.filterwarnings("ignore", "generating the VDI was interrupted", VDIWarning)
             picture = plotter.screenshot(return_img=True)
-        actor.mapper.painter.raise_trouble()
+        actor.mapper.driver.raise_trouble()
         write_png(np.asarray(picture), screenshot)
     finally:
         plotter.close()

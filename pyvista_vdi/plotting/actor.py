@@ -127,11 +127,11 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
         if source is not None and prop is not source.GetVolumeProperty():
-            shown = mapper.painter.input
+            shown = mapper.driver.input
             mine = shown if shown.alone else shown.separate()
             mine.source.SetVolumeProperty(prop)
             if mine is not shown:
-                mapper.painter.set_input(mine)
+                mapper.driver.set_input(mine)
         super().SetProperty(prop)
 
     def add_time_slider(self, plotter: Any, **options: Any) -> Any:

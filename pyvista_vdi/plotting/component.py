@@ -327,7 +327,7 @@ class AddVDI(Component):
         for weak in self._actors:
             actor = weak.Get()
             if actor is not None and actor.mapper is not None:
-                actor.mapper.painter.release()
+                actor.mapper.driver.release()
         self._actors.clear()
 
     def __plotter_deep_clean__(self) -> None:

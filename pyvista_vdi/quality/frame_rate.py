@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections import deque
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from pyvista_vdi.errors import InvalidArgumentError
@@ -55,6 +55,125 @@ class _Cost(NamedTuple):
 
     def of(self, samples: float) -> float:
         return self.overhead + self.per_sample * samples
+
+
+@dataclass(frozen=True)
+class FrameRate:
+    """What frames have told, and how many samples were chosen by it.
+
+    See :class:`FrameRateController`, whose arguments it has unchecked.
+    """
+
+    target_fps: float = 30.0
+    threshold: float = 0.1
+    floor: float = FLOOR
+    durations: tuple[float, ...] = ()  # seconds, stalls included
+    frames: tuple[_FrameTimes, ...] = ()  # what the estimate is made of, oldest first
+    doubtful: _FrameTimes | None = None  # set aside until the next frame
+    choice: int | None = None  # None: full
+    full_excess: float = 1.0  # cost of a full frame's sample over that of a reduced one's
+    cost_before_full: float = math.inf  # per sample, seconds, when full quality was last taken
+    trial: int = 0  # frames for which a return to full quality is still on trial
+
+    @property
+    def fps(self) -> float:
+        """Mean rate of the last five frames of this interaction; 0 before the first."""
+        return len(self.durations) / sum(self.durations) if self.durations else 0.0
+
+    @property
+    def seconds_per_sample(self) -> float:
+        """What a sample is expected to cost, seconds; 0 before the first frame."""
+        return self.cost().per_sample if self.frames else 0.0
+
+    def choose(self, full: int) -> FrameRate:
+        """Return the same with the samples chosen that the next frame gets."""
+        if not self.frames:
+            return self
+        cost = self.cost()
+        aim = self._aim(cost)
+        if self.choice is None:
+            # Leave full quality if it misses the aim
+            if cost.of(full) <= aim + self._slack(cost, full):
+                return self
+            excess, trial = self.full_excess, self.trial
+            if trial:
+                # It had seemed to fit. Each failure raises the bar, so that there are few
+                raised = excess * (1 + _DEAD_BAND * self.threshold)
+                excess, trial = max(raised, cost.per_sample / self.cost_before_full), 0
+            return replace(self, choice=self._reduced(cost, full), full_excess=excess, trial=trial)
+        # Go back to full quality if it fits; change a reduced choice if it misses the aim
+        dear = full * self.full_excess
+        if cost.of(dear) + cost.error * dear <= aim:
+            return replace(self, choice=None, trial=_TRIAL, cost_before_full=cost.per_sample)
+        if abs(cost.of(self.choice) - aim) > self._slack(cost, self.choice):
+            return replace(self, choice=self._reduced(cost, full))
+        return replace(self, choice=self._within(self.choice, full))
+
+    def chosen(self, full: int) -> int:
+        """Return the samples that were chosen, of a frame that has so many in full quality."""
+        return full if self.choice is None else self.choice
+
+    def record(self, samples: int, work: float, seconds: float) -> FrameRate:
+        """Return the same after a frame of so many samples, which took so many seconds."""
+        least, most = _DURATIONS
+        if not (least <= work <= most and least <= seconds <= most):
+            return self
+        durations = (*self.durations, max(work, seconds))[-RECENT_FRAMES:]
+        after = replace(self, durations=durations, trial=max(0, self.trial - 1))
+        frame = _FrameTimes(samples, work, max(0.0, seconds - work))
+        # Set a stall aside until the next frame confirms it
+        if self.frames:
+            expected = self.cost().of(samples)
+            if not 1 / _STALL <= frame.seconds / expected <= _STALL:
+                before = self.doubtful
+                after = replace(after, doubtful=frame)
+                if before is None or (before.seconds > expected) != (frame.seconds > expected):
+                    return after
+                after = replace(after, frames=(before,))
+        return replace(after, doubtful=None, frames=(*after.frames, frame)[-_MEMORY:])
+
+    def rest(self) -> FrameRate:
+        """Return the same after the end of an interaction."""
+        return replace(self, durations=(), doubtful=None, full_excess=1.0, trial=0)
+
+    def cost(self) -> _Cost:
+        """Return what the next frame is expected to cost: a line's next point if there is one."""
+        n = len(self.frames)
+        overhead = statistics.fmean(frame.overhead for frame in self.frames)
+        costs = [frame.work / frame.samples for frame in self.frames]
+        mean = statistics.fmean(costs)
+        if n < RECENT_FRAMES:
+            return _Cost(overhead, mean)
+        # Least squares; times are in frames from the mean time
+        times = [i - (n - 1) / 2 for i in range(n)]
+        squares = sum(t * t for t in times)
+        slope = sum(t * c for t, c in zip(times, costs, strict=True)) / squares
+        residuals = [c - mean - slope * t for t, c in zip(times, costs, strict=True)]
+        deviation = math.sqrt(sum(r * r for r in residuals) / (n - 2))
+        error = deviation / math.sqrt(n)
+        if abs(slope) * math.sqrt(squares) <= _TREND * deviation:
+            return _Cost(overhead, mean, error)
+        # A falling line ends above zero. One frame on, the standard error of a line is about twice
+        # that of the mean.
+        ahead = mean + slope * (n + 1) / 2
+        return _Cost(overhead, max(ahead, mean / _STALL), 2 * error)
+
+    def _aim(self, cost: _Cost) -> float:
+        """Return the time that the next frame shall take, seconds."""
+        return max(1 / self.target_fps, (1 + self.threshold) * cost.overhead)
+
+    def _slack(self, cost: _Cost, samples: float) -> float:
+        """Return by how much the time may miss the aim before something changes, seconds."""
+        # Whole samples come no closer than one of them
+        band = max(_DEAD_BAND * self.threshold * self._aim(cost), cost.per_sample)
+        return band + cost.error * samples
+
+    def _reduced(self, cost: _Cost, full: int) -> int:
+        """Return the samples that meet the aim, fewer than a full frame's."""
+        return self._within((self._aim(cost) - cost.overhead) / cost.per_sample, full)
+
+    def _within(self, samples: float, full: int) -> int:
+        return max(math.ceil(self.floor * full), int(min(samples, full - 1)))
 
 
 class FrameRateController:
@@ -110,25 +229,19 @@ class FrameRateController:
     def __init__(
         self, target_fps: float = 30.0, *, threshold: float = 0.1, floor: float = FLOOR
     ) -> None:
-        self.target_fps = target_fps
-        self.threshold = threshold
-        self._floor = as_float(floor)
-        if not 0 < self._floor <= 1:
+        share = as_float(floor)
+        if not 0 < share <= 1:
             raise InvalidArgumentError(
                 f"floor must be a share of the full frame, above 0 and at most 1; got {floor!r}"
             )
-        self._durations: deque[float] = deque(maxlen=RECENT_FRAMES)  # seconds, stalls included
-        self._frames: list[_FrameTimes] = []  # what the estimate is made of, oldest first
-        self._doubtful: _FrameTimes | None = None  # set aside until the next frame
-        self._choice: int | None = None  # None: full
-        self._full_excess = 1.0  # cost of a full frame's sample over that of a reduced one's
-        self._cost_before_full = math.inf  # per sample, seconds, when full quality was last taken
-        self._trial = 0  # frames for which a return to full quality is still on trial
+        self._rate = FrameRate(floor=share)
+        self.target_fps = target_fps
+        self.threshold = threshold
 
     @property
     def target_fps(self) -> float:
         """Frames per second to be kept; what was learned stays when it is set."""
-        return self._target_fps
+        return self._rate.target_fps
 
     @target_fps.setter
     def target_fps(self, value: float) -> None:
@@ -137,12 +250,12 @@ class FrameRateController:
             raise InvalidArgumentError(
                 f"target_fps must be a number of frames per second above 0; got {value!r}"
             )
-        self._target_fps = rate
+        self._rate = replace(self._rate, target_fps=rate)
 
     @property
     def threshold(self) -> float:
         """Relative deviation from the target that frames should keep within."""
-        return self._threshold
+        return self._rate.threshold
 
     @threshold.setter
     def threshold(self, value: float) -> None:
@@ -152,17 +265,17 @@ class FrameRateController:
                 "threshold must be a relative deviation between 0 and 1, both excluded, such as "
                 f"0.1; got {value!r}"
             )
-        self._threshold = share
+        self._rate = replace(self._rate, threshold=share)
 
     @property
     def fps(self) -> float:
         """Mean rate of the last five frames of this interaction; 0 before the first."""
-        return len(self._durations) / sum(self._durations) if self._durations else 0.0
+        return self._rate.fps
 
     @property
     def seconds_per_sample(self) -> float:
         """What a sample is expected to cost, seconds; 0 before the first frame."""
-        return self._cost().per_sample if self._frames else 0.0
+        return self._rate.seconds_per_sample
 
     def choose(self, full: int) -> int:
         """Return how many samples the next frame gets.
@@ -184,22 +297,8 @@ class FrameRateController:
             If `full` is not at least 1.
         """
         full = _samples("full", full)
-        if not self._frames:
-            return full
-        if self._choice is None:
-            self._leave_full(full)
-        else:
-            # Go back to full quality if it fits; change a reduced choice if it misses the aim
-            choice = self._choice
-            cost = self._cost()
-            aim, dear = self._aim(cost), full * self._full_excess
-            if cost.of(dear) + cost.error * dear <= aim:
-                self._choice, self._trial, self._cost_before_full = None, _TRIAL, cost.per_sample
-            elif abs(cost.of(choice) - aim) > self._slack(cost, choice):
-                self._choice = self._reduced(full)
-            else:
-                self._choice = self._within(choice, full)
-        return full if self._choice is None else self._choice
+        self._rate = self._rate.choose(full)
+        return self._rate.chosen(full)
 
     def record(self, samples: int, work_seconds: float, frame_seconds: float) -> None:
         """Take note of a frame of the interaction.
@@ -226,81 +325,11 @@ class FrameRateController:
         well; then that interaction need not begin with a frame in full quality.
         """
         samples = _samples("samples", samples)
-        work, seconds = as_float(work_seconds), as_float(frame_seconds)
-        least, most = _DURATIONS
-        if not (least <= work <= most and least <= seconds <= most):
-            return
-        self._durations.append(max(work, seconds))
-        self._trial = max(0, self._trial - 1)
-        frame = _FrameTimes(samples, work, max(0.0, seconds - work))
-        # Set a stall aside until the next frame confirms it
-        if self._frames:
-            expected = self._cost().of(samples)
-            if not 1 / _STALL <= frame.seconds / expected <= _STALL:
-                before, self._doubtful = self._doubtful, frame
-                if before is None or (before.seconds > expected) != (frame.seconds > expected):
-                    return
-                self._frames = [before]
-        self._doubtful = None
-        self._frames = [*self._frames, frame][-_MEMORY:]
+        self._rate = self._rate.record(samples, as_float(work_seconds), as_float(frame_seconds))
 
     def rest(self) -> None:
         """End the interaction: its rate is forgotten, what samples cost and the choice are not."""
-        self._durations.clear()
-        self._doubtful = None
-        self._full_excess, self._trial = 1.0, 0
-
-    def _cost(self) -> _Cost:
-        """Return what the next frame is expected to cost: a line's next point if there is one."""
-        n = len(self._frames)
-        overhead = statistics.fmean(frame.overhead for frame in self._frames)
-        costs = [frame.work / frame.samples for frame in self._frames]
-        mean = statistics.fmean(costs)
-        if n < RECENT_FRAMES:
-            return _Cost(overhead, mean)
-        # Least squares; times are in frames from the mean time
-        times = [i - (n - 1) / 2 for i in range(n)]
-        squares = sum(t * t for t in times)
-        slope = sum(t * c for t, c in zip(times, costs, strict=True)) / squares
-        residuals = [c - mean - slope * t for t, c in zip(times, costs, strict=True)]
-        deviation = math.sqrt(sum(r * r for r in residuals) / (n - 2))
-        error = deviation / math.sqrt(n)
-        if abs(slope) * math.sqrt(squares) <= _TREND * deviation:
-            return _Cost(overhead, mean, error)
-        # A falling line ends above zero. One frame on, the standard error of a line is about twice
-        # that of the mean.
-        ahead = mean + slope * (n + 1) / 2
-        return _Cost(overhead, max(ahead, mean / _STALL), 2 * error)
-
-    def _aim(self, cost: _Cost) -> float:
-        """Return the time that the next frame shall take, seconds."""
-        return max(1 / self._target_fps, (1 + self._threshold) * cost.overhead)
-
-    def _slack(self, cost: _Cost, samples: float) -> float:
-        """Return by how much the time may miss the aim before something changes, seconds."""
-        # Whole samples come no closer than one of them
-        band = max(_DEAD_BAND * self._threshold * self._aim(cost), cost.per_sample)
-        return band + cost.error * samples
-
-    def _leave_full(self, full: int) -> None:
-        """Leave full quality if it misses the aim."""
-        cost = self._cost()
-        if cost.of(full) <= self._aim(cost) + self._slack(cost, full):
-            return
-        if self._trial:
-            # It had seemed to fit. Each failure raises the bar, so that there are few
-            raised = self._full_excess * (1 + _DEAD_BAND * self._threshold)
-            self._full_excess = max(raised, cost.per_sample / self._cost_before_full)
-            self._trial = 0
-        self._choice = self._reduced(full)
-
-    def _reduced(self, full: int) -> int:
-        """Return the samples that meet the aim, fewer than a full frame's."""
-        cost = self._cost()
-        return self._within((self._aim(cost) - cost.overhead) / cost.per_sample, full)
-
-    def _within(self, samples: float, full: int) -> int:
-        return max(math.ceil(self._floor * full), int(min(samples, full - 1)))
+        self._rate = self._rate.rest()
 
 
 def _samples(name: str, value: Any) -> int:

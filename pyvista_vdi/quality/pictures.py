@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import weakref
-from collections import deque
-from collections.abc import Callable
-from typing import Any
+import math
+from dataclasses import replace
 
-from pyvista_vdi.model.coverage import coverage
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.view_error import ViewError, angle_from_generating_view
+from pyvista_vdi.quality.frame_state import FrameAsked, Pictures, Sight
 
 #: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn where the volume is at
 #: hand, and by what share the contrast within 4 x 4 pixels may differ, where nobody said otherwise.
@@ -19,89 +15,60 @@ SIMILAR, _SAME_CONTRAST = 0.98, 0.1
 FINE_ENOUGH = 1.25
 #: Degrees from V_O beyond which the volume's picture takes no longer than the VDI's.
 _FASTER_WITHIN = 10.0
-
 #: Pictures by the volume, as near to the view at hand as this (about radians), that make a VDI of
 #: the view worth while: about as many as it takes the time of, so that what is made in vain at most
 #: doubles the cost.
 _NEAR, _WORTH_A_VDI = 0.09, 12
 #: Pictures by the volume, and estimates, that are remembered.
 _PICTURES, _ESTIMATES = 2 * _WORTH_A_VDI, 64
-#: An estimate holds for views as near as this to its own (about radians).
-_ANOTHER_ESTIMATE = 0.02
+#: An estimate holds for pictures of views as near as this to its own (about radians).
+_ANOTHER_JUDGEMENT = 0.02
 
 
-class Pictures:
-    """Chooses for each picture between a VDI and the volume, the same in every run.
+def serves(
+    pictures: Pictures, seen: Sight, f: FrameAsked, bound: float | None
+) -> tuple[Pictures, bool | None]:
+    """Return whether a VDI's picture of a view does; ``None`` where an estimate has to tell."""
+    if pictures.vdi != seen.vdi:
+        pictures = replace(pictures, vdi=seen.vdi, judged=(), poor_from=math.inf)
+    if bound is None and seen.magnification > FINE_ENOUGH:
+        return pictures, False
+    # What fails near V_O fails farther away: the loss comes with the first degrees
+    within = 180.0 if f.joint else _FASTER_WITHIN
+    if seen.angle > within or seen.angle >= pictures.poor_from or seen.coverage < 1:
+        return pictures, False
+    if f.judged is False:
+        return pictures, False
+    if f.judged is not None and f.judged not in pictures.judged:
+        pictures = replace(pictures, judged=(*pictures.judged[1 - _ESTIMATES :], f.judged))
+    apart, error = min(
+        (
+            (f.view.distance(each.view, seen.bounds), each)
+            for each in pictures.judged
+            if each.options == seen.options
+        ),
+        key=lambda found: found[0],
+        default=(math.inf, None),
+    )
+    if error is None or apart > _ANOTHER_JUDGEMENT:
+        return pictures, None
+    does = error.ssim >= (SIMILAR if bound is None else bound)
+    if bound is None:
+        does = does and abs(error.contrast - 1) <= _SAME_CONTRAST
+    if not does and seen.magnification <= FINE_ENOUGH:
+        in_vain = pictures.in_vain or seen.angle <= _FASTER_WITHIN
+        pictures = replace(pictures, poor_from=seen.angle, in_vain=in_vain)
+    return pictures, does
 
-    A VDI is drawn where it has all that the view shows, at its detail, and where an estimate says
-    that the picture is like the volume's; beyond some degrees from V_O the volume is as fast.
-    """
 
-    def __init__(self) -> None:
-        self._by_volume: deque[View] = deque(maxlen=_PICTURES)
-        self._judged: list[tuple[View, Any, ViewError]] = []
-        self._of: Callable[[], VDI | None] = lambda: None  # a weak reference
-        self._poor_from = float("inf")  # degrees from V_O, of the nearest view that the VDI fails
-        self._in_vain = False  # whether a VDI was too poor near its own view
+def drawn_by_volume(pictures: Pictures, view: View) -> Pictures:
+    """Note a picture that the volume drew; the same one once more costs nothing."""
+    if pictures.by_volume and pictures.by_volume[-1] == view:
+        return pictures
+    return replace(pictures, by_volume=(*pictures.by_volume[1 - _PICTURES :], view))
 
-    def serves(
-        self,
-        vdi: VDI,
-        view: View,
-        *,
-        detail: float,
-        bound: float | None,
-        options: Any,
-        estimate: Callable[[], ViewError],
-        within: float = _FASTER_WITHIN,
-    ) -> bool:
-        """Whether a VDI's picture of a view does.
 
-        ``vdi``: of what the volume is now. ``view``: of the whole picture. ``detail``:
-        magnification of the picture's own pixels, see
-        :func:`~pyvista_vdi.quality.view_error.magnification`. ``bound``: least SSIM that does;
-        ``None``: :data:`SIMILAR`, and as much contrast and detail. ``options``: what else an
-        estimate depends on, compared by ``==``. ``estimate``: makes an estimate for this view,
-        where no former one tells. ``within``: degrees from V_O.
-        """
-        if self._of() is not vdi:
-            self._of, self._judged, self._poor_from = weakref.ref(vdi), [], float("inf")
-        if bound is None and detail > FINE_ENOUGH:
-            return False
-        angle = angle_from_generating_view(vdi, view.camera)
-        # What fails near V_O fails farther away: the loss comes with the first degrees
-        if angle > within or angle >= self._poor_from or coverage(vdi, view.camera, view.size) < 1:
-            return False
-        nearest, error = min(
-            (
-                (view.distance(other, vdi.bounds), error)
-                for other, shown, error in self._judged
-                if shown == options
-            ),
-            key=lambda found: found[0],
-            default=(float("inf"), None),
-        )
-        if error is None or nearest > _ANOTHER_ESTIMATE:
-            error = estimate()
-            self._judged = [*self._judged[1 - _ESTIMATES :], (view, options, error)]
-        does = error.ssim >= (SIMILAR if bound is None else bound)
-        if bound is None:
-            does = does and abs(error.contrast - 1) <= _SAME_CONTRAST
-        if not does and detail <= FINE_ENOUGH:
-            self._poor_from = angle
-            self._in_vain = self._in_vain or angle <= _FASTER_WITHIN
-        return does
-
-    def error(self, view: View) -> ViewError | None:
-        """Return the estimate that was made for exactly this view; ``None`` if none was."""
-        return next((e for other, _, e in reversed(self._judged) if other == view), None)
-
-    def drawn_by_volume(self, view: View) -> None:
-        """Note a picture that the volume drew; the same one once more costs nothing."""
-        if not self._by_volume or self._by_volume[-1] != view:
-            self._by_volume.append(view)
-
-    def deserves_vdi(self, view: View, bounds: tuple[float, ...]) -> bool:
-        """Whether so many pictures were drawn near this view that a VDI of it is worth while."""
-        near = sum(view.distance(other, bounds) <= _NEAR for other in self._by_volume)
-        return not self._in_vain and near >= _WORTH_A_VDI
+def deserves_vdi(pictures: Pictures, view: View, bounds: tuple[float, ...]) -> bool:
+    """Whether so many pictures were drawn near this view that a VDI of it is worth while."""
+    near = sum(view.distance(other, bounds) <= _NEAR for other in pictures.by_volume)
+    return not pictures.in_vain and near >= _WORTH_A_VDI

@@ -15,7 +15,7 @@ from watched_windows import small_vdi
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidVolumeError, VDIWarning
 from pyvista_vdi.plotting.progress import DelayedBar, progress_callback
-from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.vtk_pipeline.drawing import images
 from pyvista_vdi.vtk_pipeline.filters import source as source_module
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, vtkWeakReference
@@ -38,7 +38,7 @@ def calls(monkeypatch):
         monkeypatch.setattr(module, function, call)
 
     count("generate", source_module, "generate_vdi")
-    count("render", painter_module, "render_vdi")
+    count("render", images, "render_vdi")
     return counted
 
 
@@ -423,7 +423,7 @@ def test_nothing_is_left(no_leaks, end):
         actor,
         actor.mapper,
         actor.mapper.GetSource(),
-        actor.mapper.painter.proxy,
+        actor.mapper.driver.proxy,
         actor.prop,
     ):
         alive[type(thing).__name__] = weak = vtkWeakReference()
@@ -440,8 +440,8 @@ def test_nothing_is_left(no_leaks, end):
 
 def test_actor_that_outlives_its_plotter_holds_no_image():
     plotter, actor = exercise()
-    painter = actor.mapper.painter
+    driver = actor.mapper.driver
+    assert driver.holds_images
     plotter.close()
-    assert not painter._images
-    assert painter._texture._texture is None
+    assert not driver.holds_images
     assert actor.vdi is not None

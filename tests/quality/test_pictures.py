@@ -8,9 +8,10 @@ import pytest
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.pictures import SIMILAR, Pictures
+from pyvista_vdi.quality.frame_state import Estimate, FrameAsked, Pictures, Sight
+from pyvista_vdi.quality.pictures import SIMILAR, deserves_vdi, drawn_by_volume, serves
 from pyvista_vdi.quality.tiles import contrast_ratio
-from pyvista_vdi.quality.view_error import ViewError
+from pyvista_vdi.quality.view_error import angle_from_generating_view
 
 SIZE = (64, 64)
 BOUNDS = (-1.0, 1.0) * 3
@@ -76,25 +77,34 @@ class Judge:
     def __init__(self, ssim=1.0, contrast=1.0):
         self.ssim, self.contrast, self.asked = ssim, contrast, 0
 
-    def __call__(self):
-        self.asked += 1
-        return ViewError(self.ssim, 0.0, 0.0, 1.0, 16, self.contrast)
-
 
 def view(angle):
     return View(along_z(1.5).azimuth(angle), SIZE)
 
 
+class Asked:
+    """Pictures in a row, of VDIs of one volume."""
+
+    def __init__(self, vdi):
+        self.pictures, self.vdi = Pictures(), vdi
+
+    def __call__(self, angle, judge, *, detail=1.0, bound=None, options=None, seen_from=None):
+        shown = view(angle) if seen_from is None else seen_from
+        of = (angle_from_generating_view(self.vdi, shown.camera), detail)
+        seen = Sight(1, BOUNDS, None, *of, coverage(self.vdi, shown.camera, SIZE), options=options)
+        frame = FrameAsked(0.0, 1, shown, 1)
+        self.pictures, does = serves(self.pictures, seen, frame, bound)
+        if does is None:
+            judge.asked += 1
+            found = Estimate(1, shown, judge.ssim, judge.contrast, options)
+            frame = FrameAsked(0.0, 1, shown, 1, judged=found)
+            self.pictures, does = serves(self.pictures, seen, frame, bound)
+        return does
+
+
 @pytest.fixture
 def ask():
-    pictures, vdi = Pictures(), vdi_of(along_z(1.5))
-
-    def asked(angle, judge, *, detail=1.0, bound=None, options=None):
-        how = {"detail": detail, "bound": bound, "options": options, "estimate": judge}
-        return pictures.serves(vdi, view(angle), **how)
-
-    asked.pictures = pictures
-    return asked
+    return Asked(vdi_of(along_z(1.5)))
 
 
 def test_a_vdi_draws_what_it_shows_as_the_volume_does(ask):
@@ -109,12 +119,11 @@ def test_a_vdi_draws_what_it_shows_as_the_volume_does(ask):
     assert judge.asked == 2
 
 
-def test_what_lies_beside_v_o_is_not_left_out(ask):
+def test_what_lies_beside_v_o_is_not_left_out():
     """However well the rest is drawn: an estimate compares what both show."""
-    zoomed = vdi_of(along_z(0.5))
-    how = {"detail": 1.0, "bound": None, "options": None, "estimate": Judge()}
-    assert not ask.pictures.serves(zoomed, View(along_z(1.5), SIZE), **how)
-    assert ask.pictures.serves(zoomed, View(along_z(0.4), SIZE), **how)
+    zoomed = Asked(vdi_of(along_z(0.5)))
+    assert not zoomed(0, Judge(), seen_from=View(along_z(1.5), SIZE))
+    assert zoomed(0, Judge(), seen_from=View(along_z(0.4), SIZE))
 
 
 @pytest.mark.parametrize("judge", [Judge(SIMILAR - 0.001), Judge(1.0, 0.89), Judge(1.0, 1.11)])
@@ -124,8 +133,8 @@ def test_what_fails_near_its_view_is_not_asked_about_farther_away(ask, judge):
     assert not ask(6, judge)
     assert judge.asked == asked + 1
     for angle in range(20):
-        ask.pictures.drawn_by_volume(view(3 + 0.01 * angle))
-    assert not ask.pictures.deserves_vdi(view(3), BOUNDS)
+        ask.pictures = drawn_by_volume(ask.pictures, view(3 + 0.01 * angle))
+    assert not deserves_vdi(ask.pictures, view(3), BOUNDS)
 
 
 def test_a_bound_that_was_given_takes_the_place_of_detail(ask):
@@ -137,11 +146,11 @@ def test_a_vdi_is_worth_while_after_as_many_pictures_as_it_costs():
     pictures = Pictures()
     for number in range(40):
         angle = 0.3 * number
-        deserved = pictures.deserves_vdi(view(angle), BOUNDS)
+        deserved = deserves_vdi(pictures, view(angle), BOUNDS)
         assert deserved == (number >= 12)
         for _ in range(3):  # the same picture once more costs nothing
-            pictures.drawn_by_volume(view(angle))
+            pictures = drawn_by_volume(pictures, view(angle))
     apart = Pictures()
     for number in range(40):
-        apart.drawn_by_volume(view(20 * number))
-    assert not apart.deserves_vdi(view(0), BOUNDS)
+        apart = drawn_by_volume(apart, view(20 * number))
+    assert not deserves_vdi(apart, view(0), BOUNDS)

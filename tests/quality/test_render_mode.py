@@ -9,7 +9,8 @@ import pytest
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.drawing_options import checked_draw
-from pyvista_vdi.quality.render_mode import RenderModeChooser
+from pyvista_vdi.quality import render_mode
+from pyvista_vdi.quality.frame_state import Costs, FrameTook
 
 pytestmark = pytest.mark.fast
 
@@ -19,15 +20,32 @@ TARGET = 1 / 30  # seconds
 VDI, VOLUME = 20.0, 200.0
 
 
+class Costing:
+    """What frames have taken so far, and what is chosen by it."""
+
+    def __init__(self):
+        self.costs = Costs()
+
+    def took(self, *frame):
+        self.costs = render_mode.took(self.costs, FrameTook(*frame))
+
+    def choose(self, *view, **options):
+        self.costs, way = render_mode.choose(self.costs, *view, **options)
+        return way
+
+    def seconds_per_pixel(self, way, angle):
+        return render_mode.seconds_per_pixel(self.costs, way, angle)
+
+
 def used(vdi=VDI, volume=VOLUME):
-    ways = RenderModeChooser()
+    ways = Costing()
     ways.took("vdi", 0.0, PIXELS, vdi / 1e3)
     ways.took("volume", 0.0, PIXELS, volume / 1e3)
     return ways
 
 
 def test_the_vdi_until_both_are_known():
-    ways = RenderModeChooser()
+    ways = Costing()
     assert ways.choose(90.0, PIXELS, TARGET) == "vdi"
     ways.took("volume", 0.0, PIXELS, 1e-3)
     assert ways.choose(90.0, PIXELS, TARGET) == "vdi"

@@ -158,7 +158,7 @@ def new_vdi_appears_by_itself():
     assert actor.vdi is not old
     assert actor.status.angle < 1e-6
     assert plotter.camera.position == turned
-    wait(plotter, lambda: not actor.mapper.painter.upkeep._ticker.running)
+    wait(plotter, lambda: not actor.mapper.driver.following)
     plotter.close()
 
 
@@ -169,19 +169,18 @@ def held_still_nothing_turns_and_moving_shows_the_new_vdi():
     hand = Hand(plotter)
     plotter.camera.Azimuth(10)
     plotter.render()
-    assert actor.mapper.painter.upkeep._ticker.running
+    assert actor.mapper.driver.following
     hand.press(100, 100)
-    assert not actor.mapper.painter.upkeep._ticker.running
+    assert not actor.mapper.driver.following
     hand.move(95, 100)  # away from the VDI's view
     held = plotter.camera.position
-    background = actor.mapper.painter.upkeep.regeneration._background
-    wait(plotter, lambda: not background.running)
+    wait(plotter, lambda: actor.status.progress is None)
     assert plotter.camera.position == held
     assert actor.status.generation == 1
     hand.move(94, 100)
     assert actor.status.generation == 2
     hand.release(94, 100)
-    wait(plotter, lambda: not actor.mapper.painter.upkeep._ticker.running)
+    wait(plotter, lambda: not actor.mapper.driver.following)
     plotter.close()
 
 
@@ -280,14 +279,14 @@ def a_series_plays_by_itself_and_goes_on_after_a_turn():
     wait(plotter, lambda: seen.setdefault(actor.step) or len(seen) == 3)
     hand = Hand(plotter)
     hand.press(100, 100)
-    assert not actor.mapper.painter.upkeep._ticker.running
+    assert not actor.mapper.driver.following
     for x in (105, 110, 115):
         hand.move(x, 100)
     hand.release(115, 100)
     seen.clear()
     wait(plotter, lambda: seen.setdefault(actor.step) or len(seen) == 3)
     actor.pause()
-    wait(plotter, lambda: not actor.mapper.painter.upkeep._ticker.running)
+    wait(plotter, lambda: not actor.mapper.driver.following)
     plotter.close()
 
 

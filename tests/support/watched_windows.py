@@ -12,10 +12,10 @@ from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.quality import background
-from pyvista_vdi.quality.frame_rate import FrameRateController
-from pyvista_vdi.vtk_pipeline.drawing import overlap
-from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
-from pyvista_vdi.vtk_pipeline.interaction import estimation, regeneration, window_clock
+from pyvista_vdi.quality.frame_rate import FrameRate
+from pyvista_vdi.quality.view_error import ViewError
+from pyvista_vdi.vtk_pipeline.drawing import images
+from pyvista_vdi.vtk_pipeline.interaction import behind, window
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 
 #: Odd, so that no smaller image divides it.
@@ -54,7 +54,7 @@ def gate(monkeypatch):
 @pytest.fixture
 def coarsest(monkeypatch):
     """Every preview is as coarse as it may be, whatever frames take."""
-    monkeypatch.setattr(FrameRateController, "choose", lambda controller, full: 1)
+    monkeypatch.setattr(FrameRate, "chosen", lambda rate, full: 1)
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def counted(monkeypatch):
             return self.now
 
     clock = Clock()
-    render_vdi = painter_module.render_vdi
+    render_vdi = images.render_vdi
 
     def timed(vdi, request):
         clock.windows.append(vdi.window_size)
@@ -81,9 +81,8 @@ def counted(monkeypatch):
         clock.now += clock.dear * 1e-6 * request.size[0] * request.size[1] * lists
         return render_vdi(vdi, request)
 
-    monkeypatch.setattr(painter_module, "render_vdi", timed)
-    for module in (window_clock, painter_module, overlap, regeneration):
-        monkeypatch.setattr(module, "time", clock)
+    monkeypatch.setattr(images, "render_vdi", timed)
+    monkeypatch.setattr(window, "time", clock)
     return clock
 
 
@@ -104,9 +103,9 @@ def no_estimates(monkeypatch):
         def estimate(self, vdi, camera, size, **shown):
             answer.asked += 1
             answer.camera, answer.shown = camera, shown
-            return estimation.ViewError(answer.ssim, 0.0, 0.0, 1.0, 1)
+            return ViewError(answer.ssim, 0.0, 0.0, 1.0, 1)
 
-    monkeypatch.setattr(estimation, "ViewErrorEstimator", Estimator)
+    monkeypatch.setattr(behind, "ViewErrorEstimator", Estimator)
     return answer
 
 

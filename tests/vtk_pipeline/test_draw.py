@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -10,9 +12,9 @@ from skimage.metrics import structural_similarity
 from watched_windows import MOVING, WINDOW, finish, frame, frames_until, small_vdi, watched
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.quality.render_mode import RenderModeChooser
-from pyvista_vdi.vtk_pipeline.interaction import regeneration
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM
+from pyvista_vdi.quality import decide
+from pyvista_vdi.quality.frame_state import FrameTook
+from pyvista_vdi.quality.pace import HEADROOM
 
 pytestmark = pytest.mark.gl
 
@@ -79,12 +81,11 @@ def chosen(monkeypatch):
         way = "volume"
         asked = ()
 
-    def choose(self, angle, pixels, seconds, ssim=None, bound=0.0):
+    def choose(costs, angle, pixels, seconds, ssim=None, bound=0.0):
         Chosen.asked = angle, pixels, seconds
-        self._way = Chosen.way
-        return Chosen.way
+        return replace(costs, way=Chosen.way), Chosen.way
 
-    monkeypatch.setattr(RenderModeChooser, "choose", choose)
+    monkeypatch.setattr(decide, "choose", choose)
     return Chosen
 
 
@@ -117,7 +118,7 @@ def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, chosen
 def test_in_motion_errors_are_estimated_of_vdis_that_are_drawn(
     plotter, chosen, monkeypatch, no_estimates
 ):
-    monkeypatch.setattr(regeneration, "_ESTIMATE_PERIOD_IN_MOTION", 0.0)
+    monkeypatch.setattr(decide, "ESTIMATE_PERIOD_IN_MOTION", 0.0)
     no_estimates.ssim = 0.99
     actor = watched(plotter, draw="auto", regenerate="auto")
     frames_until(plotter, lambda: actor.mapper.GetVDI() is not None)
@@ -142,9 +143,7 @@ def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_t
     actor = watched(plotter, draw="vdi")
     finish("stand-in")
     actor.mapper.SetDraw("auto")
-    each = RenderModeChooser()
-    each.took("volume", 0.0, 1.0, 1e-3)  # a millisecond per ray
-    actor.mapper.painter.upkeep.ways = each
+    actor.mapper.driver.tell(FrameTook("volume", 0.0, 1.0, 1e-3))  # a millisecond per ray
     plotter.camera.azimuth = 40
     frame(plotter, MOVING)
     assert actor.status.drawn == "volume"
@@ -153,12 +152,13 @@ def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_t
 
 def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
     """Clocks are set: a VDI's rays cost a thousand times a volume's, far from V_O."""
-    took = RenderModeChooser.took
+    took = decide.took
 
-    def dear(self, way, angle, pixels, seconds):
-        took(self, way, angle, pixels, 1e-9 * pixels * (1000 if way == "vdi" else 1))
+    def dear(costs, frame):
+        seconds = 1e-9 * frame.pixels * (1000 if frame.way == "vdi" else 1)
+        return took(costs, replace(frame, seconds=seconds))
 
-    monkeypatch.setattr(RenderModeChooser, "took", dear)
+    monkeypatch.setattr(decide, "took", dear)
     actor = watched(plotter, draw="auto")
     finish("stand-in")  # pictures of the volume tell what its rays take
     plotter.camera.azimuth = 60

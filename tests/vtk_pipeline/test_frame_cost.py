@@ -8,11 +8,11 @@ import pyvista as pv
 from plugin_scenes import LOOKS, opaque_sphere, shown, soft_ball
 
 from pyvista_vdi.device import get_runtime
+from pyvista_vdi.vtk_pipeline.drawing import driver, images
 from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
-from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
 from pyvista_vdi.vtk_pipeline.drawing import texture as texture_module
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import WindowClock
+from pyvista_vdi.vtk_pipeline.interaction.window import Window
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkTextureObject
 
 pytestmark = pytest.mark.gl
@@ -37,8 +37,8 @@ class Counts(dict):
 def counts(monkeypatch):
     """Raycasts, uploads, readings of depth, and allocations of images."""
     found = Counts()
-    found.watch(monkeypatch, painter_module, "render_vdi")
-    found.watch(monkeypatch, painter_module, "aligned_empty")
+    found.watch(monkeypatch, images, "render_vdi")
+    found.watch(monkeypatch, images, "aligned_empty")
     found.watch(monkeypatch, frame_module.Frame, "opaque_z")
 
     class Texture(vtkTextureObject):
@@ -95,7 +95,7 @@ def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
 def test_the_volumes_of_the_scene_are_looked_for_once_a_frame(plotter, monkeypatch):
     plotter.show(auto_close=False)
     found = Counts()
-    found.watch(monkeypatch, painter_module, "volumes")
+    found.watch(monkeypatch, driver, "volumes")
     plotter.render()
     assert found == {"volumes": 1}
 
@@ -167,8 +167,8 @@ def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts):
         assert counts["opaque_z"] > reads, name
         assert (after != before).any(), f"{name} changes nothing"
         # Nothing is known any more, and all of it is read
-        WindowClock.of(plotter.render_window).shared(OpaqueDepths)._known.clear()
-        plotter.volume.mapper.painter.release()
+        Window.of(plotter.render_window).shared(OpaqueDepths)._known.clear()
+        plotter.volume.mapper.driver.release()
         np.testing.assert_array_equal(shown(plotter), after, err_msg=name)
         before = after
 
@@ -219,11 +219,11 @@ def test_a_prop_that_nobody_knows_is_always_read(plotter, counts):
 
 def test_vtk_copies_no_depth(plotter):
     plotter.show(auto_close=False)
-    painter = plotter.volume.mapper.painter
-    texture = painter._no_depth._texture
+    drawing = plotter.volume.mapper.driver
+    texture = drawing._no_depth._texture
     assert (texture.GetWidth(), texture.GetHeight()) == (1, 1)
     assert texture.GetReferenceCount() == 2  # ours, and the mapper's
-    painter.release()
+    drawing.release()
     assert texture.GetHandle() == 0
     plotter.render()
     assert texture.GetHandle() != 0
@@ -244,7 +244,7 @@ def test_cpu_devices_draw_where_vtk_uploads_from(plotter, monkeypatch):
         ),
     )
     plotter.show(auto_close=False)
-    images = [buffer for buffer in targets if buffer.name == "image"]  # others are of the new VDI
-    assert [buffer.host is not None for buffer in images] == [True]
-    assert images[0].host.base is not None
-    assert np.shares_memory(images[0].host, uploads[-1])
+    uploaded = [buffer for buffer in targets if buffer.name == "image"]  # others are of the new VDI
+    assert [buffer.host is not None for buffer in uploaded] == [True]
+    assert uploaded[0].host.base is not None
+    assert np.shares_memory(uploaded[0].host, uploads[-1])

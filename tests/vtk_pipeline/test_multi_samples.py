@@ -8,7 +8,7 @@ import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
 from watched_windows import MOVING, frame, on_screen, turned, watched
 
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM
+from pyvista_vdi.quality.pace import HEADROOM
 
 pytestmark = pytest.mark.gl
 
@@ -160,7 +160,7 @@ def test_a_frame_that_fails_gives_it_back(plotter, taken, monkeypatch):
     def fail(*_):
         raise RuntimeError("broken")
 
-    monkeypatch.setattr("pyvista_vdi.vtk_pipeline.drawing.painter.render_vdi", fail)
+    monkeypatch.setattr("pyvista_vdi.vtk_pipeline.drawing.images.render_vdi", fail)
     with pytest.warns(UserWarning, match="broken"):
         assert moved(plotter, taken, frames=1) == [0]
     assert plotter.render_window.GetMultiSamples() == SAMPLES

@@ -10,8 +10,7 @@ from plugin_scenes import add_ours, soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, VDIWarning
-from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
-from pyvista_vdi.vtk_pipeline.drawing import selection
+from pyvista_vdi.vtk_pipeline.drawing import images, selection
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkDataObject,
     vtkHardwarePicker,
@@ -321,10 +320,8 @@ def test_two_renderers(how):
 
 def test_the_picture_stays(no_leaks, monkeypatch):
     scene = Scene().show()
-    before, raycasts, render_vdi = screenshot(scene.plotter), [], painter_module.render_vdi
-    monkeypatch.setattr(
-        painter_module, "render_vdi", lambda *a: raycasts.append(1) or render_vdi(*a)
-    )
+    before, raycasts, render_vdi = screenshot(scene.plotter), [], images.render_vdi
+    monkeypatch.setattr(images, "render_vdi", lambda *a: raycasts.append(1) or render_vdi(*a))
     for picker in (vtkPropPicker, vtkHardwarePicker):
         scene.under(*CENTRE, picker)
         assert np.array_equal(screenshot(scene.plotter), before)

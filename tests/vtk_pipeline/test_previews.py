@@ -21,14 +21,14 @@ from watched_windows import (
 )
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.device.ray_forms import pixel_rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.ray_forms import pixel_rays
 from pyvista_vdi.quality import render_mode
-from pyvista_vdi.vtk_pipeline.drawing import few_lists
-from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module
+from pyvista_vdi.quality.pace import HEADROOM, reduced
+from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
-from pyvista_vdi.vtk_pipeline.interaction import window_clock
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import HEADROOM, Met, reduced
+from pyvista_vdi.vtk_pipeline.interaction import behind
+from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkGenericRenderWindowInteractor,
@@ -191,13 +191,13 @@ def test_off_screen_windows_and_pictures_are_always_full(plotter, coarsest):
 def test_movie_frames_and_vector_graphics_are_full(plotter, coarsest, tmp_path, monkeypatch):
     actor = watched(plotter)
     modes = []
-    begin = painter_module.Painter.begin
+    begin = Driver.begin
 
-    def noting(painter, mapper):
-        begin(painter, mapper)
-        modes.append(painter.status().mode)
+    def noting(driver, mapper):
+        begin(driver, mapper)
+        modes.append(driver.status().mode)
 
-    monkeypatch.setattr(painter_module.Painter, "begin", noting)
+    monkeypatch.setattr(Driver, "begin", noting)
     turned(plotter, 10, MOVING)
     assert modes.pop() == "preview"
     plotter.camera.Azimuth(10)
@@ -331,8 +331,7 @@ def test_few_frames_are_late_where_some_take_longer(plotter, counted):
         return np.array(seconds[-count:])
 
     def aim():
-        clock = window_clock.WindowClock.of(plotter.render_window)
-        return clock.aim(actor.mapper.painter.interaction)
+        return Window.of(plotter.render_window).pace.headroom * actor.mapper.GetTargetFrameRate()
 
     frames(100, 0.1)
     # 1 % is aimed at; binomial with 300 frames: a standard deviation of .6 %
@@ -395,13 +394,13 @@ def test_few_pixels_from_the_side_take_few_lists(plotter, counted):
 
 def test_frames_go_on_while_fewer_lists_are_made(plotter, counted, monkeypatch):
     drawn, waited = threading.Event(), []
-    subsampled = few_lists.subsampled_lists
+    subsampled = behind.subsampled_lists
 
     def slow(vdi, *steps):
         waited.append(drawn.wait(30))  # s; frames that waited for this would end the test here
         return subsampled(vdi, *steps)
 
-    monkeypatch.setattr(few_lists, "subsampled_lists", slow)
+    monkeypatch.setattr(behind, "subsampled_lists", slow)
     watched(plotter, target_fps=400.0)
     turned(plotter, 30)
     while not threads("few lists"):

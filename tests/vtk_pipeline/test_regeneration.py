@@ -26,9 +26,11 @@ from watched_windows import (
 )
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceError, VDIWarning
+from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.interaction.estimation import Estimation
+from pyvista_vdi.vtk_pipeline.interaction.behind import Estimators
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -195,26 +197,6 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     assert actor.vdi is old
 
 
-def test_an_estimate_that_ends_between_two_looks_is_not_asked_for_again(
-    plotter, no_estimates, monkeypatch
-):
-    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
-    take, missed = Estimation.take, []
-
-    def too_early(estimation):
-        if missed or not estimation.running:
-            return take(estimation)
-        finish("estimate")  # it ends right after this look
-        missed.append(estimation)
-        return None
-
-    monkeypatch.setattr(Estimation, "take", too_early)
-    plotter.camera.Azimuth(30)
-    frames_until(plotter, lambda: actor.status.ssim is not None)
-    assert len(missed) == 1
-    assert no_estimates.asked == 1
-
-
 def test_auto_bears_more_while_the_view_moves(plotter, no_estimates, gate):
     actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
     no_estimates.ssim = 0.85
@@ -237,11 +219,9 @@ def test_auto_with_the_real_estimate(plotter):
 def test_estimates_know_of_ambient_occlusion():
     """What is judged is the occluded VDI; so is then what it is judged by."""
     source = ready_source(AmbientOcclusion=pvdi.AmbientOcclusion(0.5, strength=1.0))
-    vdi, request, estimation = source.GetVDI(), source.GetCurrentRequest(), Estimation()
-    estimation.start(vdi, request, request.screen)
-    finish("estimate")
-    assert estimation.take().error.ssim > 0.9999
-    estimation.close()
+    vdi, request = source.GetVDI(), source.GetCurrentRequest()
+    error = Estimators().estimate(request, get_runtime(), vdi, request.screen, RenderOptions())
+    assert error.ssim > 0.9999
 
 
 def test_what_is_made_for_a_view_that_was_left_is_given_up(plotter, gate):

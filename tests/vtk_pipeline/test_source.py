@@ -352,7 +352,7 @@ def test_a_mapper_behind_a_file_keeps_its_reader(tmp_path):
 
     mapper = connected()
     gc.collect()
-    assert mapper.painter.input.stamp()[0] > 0
+    assert mapper.driver.input.stamp()[0] > 0
     assert mapper.GetVDI().equals(made)
     assert mapper.GetBounds() == pytest.approx(soft_ball(12).GetBounds())
 

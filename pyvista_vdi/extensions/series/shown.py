@@ -9,7 +9,7 @@ from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
-from pyvista_vdi.vtk_pipeline.interaction.ticker import period_of
+from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
 
 
 class SeriesInput(Input):
@@ -62,7 +62,7 @@ class SeriesInput(Input):
         """Show the step that is due; whether it is another one."""
         return self.player.advance()
 
-    def complaint(self, error: Exception) -> str:
+    def complaint(self, error: BaseException) -> str:
         """Return that a step is left out."""
         return f"a step is left out: {type(error).__name__}: {error}"
 

@@ -41,10 +41,10 @@ class VDIActorMethods(PlayingMethods):
                 "mapper goes behind a vtkVolume"
             )
         if mapper is not None:
-            mapper.painter.set_actor(self)
+            mapper.driver.set_actor(self)
         old = self.GetMapper()
         if isinstance(old, VDIMapperMethods) and old is not mapper:
-            old.painter.leave_actor(self)
+            old.driver.leave_actor(self)
         super().SetMapper(mapper)  # type: ignore[misc]
 
     def ShallowCopy(self: Any, other: Any) -> None:
@@ -80,7 +80,7 @@ class VDIActorMethods(PlayingMethods):
         frame on, and takes the place of what made the one before: a volume, which is let go of.
         """
         mapper = self.GetMapper()
-        return None if mapper is None else mapper.painter.upkeep.asked_for()  # type: ignore[no-any-return]
+        return None if mapper is None else mapper.driver.vdi_asked_for()  # type: ignore[no-any-return]
 
     @vdi.setter
     def vdi(self: Any, vdi: VDI) -> None:
@@ -110,7 +110,7 @@ class VDIActorMethods(PlayingMethods):
     def status(self: Any) -> VDIStatus:
         """How the VDI was drawn in the last frame, and what goes on behind it."""
         mapper = self._mapper_for(", so there is no status of it")
-        return mapper.painter.status()  # type: ignore[no-any-return]
+        return mapper.driver.status()  # type: ignore[no-any-return]
 
     @property
     def opacity_multiplier(self: Any) -> float:
@@ -154,13 +154,13 @@ class VDIActorMethods(PlayingMethods):
         """
         mapper = self.GetMapper()
         if renderer is None and mapper is not None:
-            renderer = mapper.painter.renderer()
+            renderer = mapper.driver.renderer()
         renderer = getattr(renderer, "renderer", renderer)  # a plotter's active one
         if mapper is None or renderer is None:
             raise InvalidArgumentError(
                 "nothing shows this actor yet: add it to a renderer first, or pass the renderer"
             )
-        return mapper.painter.texts.add(renderer, corner)
+        return mapper.driver.texts.add(renderer, corner)
 
     def pick(self: Any, x: float, y: float, *, renderer: Any = None) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
@@ -187,7 +187,7 @@ class VDIActorMethods(PlayingMethods):
             If no renderer of a window shows the actor.
         """
         mapper = self.GetMapper()
-        shown = [] if mapper is None else mapper.painter.renderers()
+        shown = [] if mapper is None else mapper.driver.renderers()
         shown = [r for r in shown if r.GetRenderWindow() is not None]
         if not shown:
             raise InvalidArgumentError(
@@ -196,7 +196,7 @@ class VDIActorMethods(PlayingMethods):
         if renderer is not None:
             shown = [r for r in shown if r is getattr(renderer, "renderer", renderer)]
         there = [r for r in shown if r.IsInViewport(int(x), int(y))]
-        return mapper.painter.selection.pick(self, there[0], x, y) if there else None
+        return mapper.driver.pick(self, there[0], x, y) if there else None
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now; of a series, the step that is shown.
@@ -223,8 +223,8 @@ class VDIActorMethods(PlayingMethods):
         """
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
-        if source is None and mapper is not None and mapper.painter.input is not None:
-            vdi = self._regenerated(mapper.painter, camera, window_size)
+        if source is None and mapper is not None and mapper.driver.input is not None:
+            vdi = self._regenerated(mapper.driver, camera, window_size)
             if vdi is not None:
                 mapper.Modified()
                 return vdi  # type: ignore[no-any-return]
@@ -233,9 +233,9 @@ class VDIActorMethods(PlayingMethods):
                 "this actor shows a VDI without its volume, which cannot be generated anew: add "
                 "the volume, or set another VDI (actor.vdi = another)"
             )
-        mapper.painter.upkeep.retry()
+        mapper.driver.retry()
         matrix = as_array(self.GetMatrix())
-        renderer, shown = mapper.painter.renderer(), mapper.painter.input
+        renderer, shown = mapper.driver.renderer(), mapper.driver.input
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
@@ -246,16 +246,16 @@ class VDIActorMethods(PlayingMethods):
             shown.take_size(renderer)
         return source.GetVDI()  # type: ignore[no-any-return]
 
-    def _regenerated(self: Any, painter: Any, camera: Any, window_size: Any) -> VDI | None:
+    def _regenerated(self: Any, driver: Any, camera: Any, window_size: Any) -> VDI | None:
         """Generate a VDI of several for a view, by default that of the renderer, if it can be."""
-        renderer = painter.renderer()
+        renderer = driver.renderer()
         if camera is None and renderer is not None:
             camera = renderer.GetActiveCamera()
         if window_size is None and renderer is not None and min(renderer.GetSize()) > 0:
             window_size = renderer.GetSize()
         if camera is not None:
             camera = camera_of(camera, as_array(self.GetMatrix()))
-        return painter.input.regenerated(camera, window_size)  # type: ignore[no-any-return]
+        return driver.input.regenerated(camera, window_size)  # type: ignore[no-any-return]
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

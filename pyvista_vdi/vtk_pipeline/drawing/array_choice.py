@@ -38,10 +38,10 @@ class ArrayChoiceMethods:
             raise UnsupportedError(
                 f"a VDI without its volume keeps {what}: generate another from the volume"
             )
-        shown = self.painter.input
+        shown = self.driver.input
         if not shown.alone:
             shown = shown.separate()
-            self.painter.set_input(shown)
+            self.driver.set_input(shown)
         return shown.source  # type: ignore[no-any-return]
 
     def SetScalarMode(self, mode: int) -> None:
@@ -135,7 +135,7 @@ class ArrayChoiceMethods:
             if self._added is not None:
                 self.own_source("its scalars").SetScalars(*self._added)
             return
-        if self.painter.input is None:
+        if self.driver.input is None:
             return
         source = self.own_source("its scalars")
         name = self.GetArrayName() or None

@@ -40,7 +40,7 @@ class _Reading:
 
 
 class OpaqueDepths:
-    """Depths of a window's renderers: ``clock.shared(OpaqueDepths)``."""
+    """Depths of a window's renderers: ``window.shared(OpaqueDepths)``."""
 
     def __init__(self) -> None:
         self._known: Recent[_Reading] = Recent()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,11 +16,12 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.render_mode import RenderMode, rise
+from pyvista_vdi.quality.frame_state import RenderMode
+from pyvista_vdi.quality.pace import Cost
+from pyvista_vdi.quality.render_mode import rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
-from pyvista_vdi.vtk_pipeline.drawing.stand_in import StandIn
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import Cost, WindowClock
+from pyvista_vdi.vtk_pipeline.interaction.window import Window
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTK_FLOAT,
     vtk_to_numpy,
@@ -56,54 +56,31 @@ _PLANE_SLACK = 1e-9
 class Frame:
     """What a renderer's frame asks of a VDI. It lives no longer than the frame: it holds VTK's.
 
-    Attributes
-    ----------
-    size : (int, int)
-        Width and height of the image in pixels, from OpenGL's viewport: under SSAA it is larger
-        than the window's, in a tiled screenshot it is the tile's.
-    origin : (int, int)
-        The viewport's lower left corner in the framebuffer, pixels.
-    camera : Camera
-        The frame's view; its world is ``to_view @ world``, its model transform includes the
-        actor's matrix.
-    to_view : numpy.ndarray
-        World coordinates to that camera's world (eye at the origin, looking along -z), (4, 4).
-    projection : numpy.ndarray
-        Rows 2 and 3 of the projection matrix: view space to normalised depth and its
-        denominator, (2, 4).
-    renderer, actor, mapper
-        Whose frame it is, and of which VDI.
-    full_size : (int, int)
-        Width and height of the viewport in pixels; the image of a preview is smaller.
-    vdi : VDI or None
-        What is seen: see :meth:`showing`.
-    stand_in : StandIn or None
-        What is seen in place of a VDI that is to come.
-    angle : float
-        Between the view and that of the VDI, degrees; 0 for a volume.
-    few_lists : VDI or None
-        What is raycast in place of the VDI in a preview: every second of its lists.
-    options : RenderOptions
-        How it looks; clipping planes are in the camera's world.
-    depth : numpy.ndarray or None
-        View depth at which rays end, float32 (H, W), top row first.
+    Its camera's world is ``to_view @ world``: the eye is at the origin and looks along -z. Sizes
+    are width and height in pixels, from OpenGL's viewport: under SSAA it is larger than the
+    window's, in a tiled screenshot it is the tile's.
     """
 
-    size: tuple[int, int]
-    origin: tuple[int, int]
-    camera: Camera
-    to_view: Matrix
-    projection: Matrix
+    size: tuple[int, int]  # of the image
+    origin: tuple[int, int]  # the viewport's lower left corner in the framebuffer, pixels
+    camera: Camera  # its model transform includes the actor's matrix
+    to_view: Matrix  # world coordinates to that camera's world, (4, 4)
+    projection: Matrix  # its rows 2 and 3: view space to depth and denominator, (2, 4)
     renderer: Any = None
     actor: Any = None
     mapper: Any = None
-    full_size: tuple[int, int] = (0, 0)
-    vdi: VDI | None = None
-    stand_in: StandIn | None = None
-    angle: float = 0.0
-    few_lists: VDI | None = None
-    options: RenderOptions = field(default_factory=RenderOptions)
-    depth: Image | None = None
+    full_size: tuple[int, int] = (0, 0)  # of the viewport; the image of a preview is smaller
+    view: View | None = None  # the renderer's, between the two eyes of a stereo pair
+    model_transform: Any = None  # the actor's matrix, (4, 4)
+    vdi: VDI | None = None  # what is seen: see showing()
+    volume: Any = None  # the VolumePicture that is seen in place of a VDI
+    number: int = 0  # by which what is seen is known: a VDI is not held for it
+    angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
+    effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
+    few_lists: VDI | None = None  # raycast in place of the VDI in a preview: every second list
+    bounds: tuple[float, ...] = ()  # of what is seen, model frame
+    options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
+    depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
 
     @classmethod
     def current(cls, renderer: Any, actor: Any, mapper: Any) -> Frame:
@@ -117,10 +94,16 @@ class Frame:
         scale = np.linalg.norm(model_view[2, :3])  # of the camera's model transform
         to_view, lens = view_of(projection @ model_view, width / height, model_view[2] / scale)
         projection[:, 2] *= scale
-        model_transform = to_view @ as_array(actor.GetMatrix())
-        camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=model_transform, **lens)
-        size = (width, height)
-        return cls(size, (x, y), camera, to_view, projection[2:], renderer, actor, mapper, size)
+        matrix = as_array(actor.GetMatrix())
+        camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=to_view @ matrix, **lens)
+        size, view = (width, height), None
+        if mapper is not None:
+            try:
+                view = renderer_view(renderer, matrix)
+            except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
+                view = View(camera, size)
+        of = (renderer, actor, mapper, size, view, matrix)
+        return cls(size, (x, y), camera, to_view, projection[2:], *of)
 
     @classmethod
     def of(cls, camera: Camera, size: tuple[int, int]) -> Frame:
@@ -128,40 +111,30 @@ class Frame:
         return cls(size, (0, 0), camera, np.eye(4), np.eye(4)[2:], full_size=size)
 
     @property
-    def painter(self) -> Any:
+    def driver(self) -> Any:
         """What draws the VDI."""
-        return self.mapper.painter
-
-    @cached_property
-    def clock(self) -> WindowClock:
-        """The window's."""
-        return WindowClock.of(self.renderer.GetRenderWindow())
+        return self.mapper.driver
 
     @property
-    def model_transform(self) -> Matrix:
-        """The actor's matrix."""
-        return as_array(self.actor.GetMatrix())
+    def window(self) -> Window:
+        """The window that it is a frame of."""
+        return self.mapper.driver.window  # type: ignore[no-any-return]
 
-    @cached_property
-    def view(self) -> View:
-        """The renderer's view, between the two eyes of a stereo pair if there are."""
-        try:
-            return renderer_view(self.renderer, self.model_transform)
-        except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
-            return View(self.camera, self.size)
-
-    def showing(self, seen: VDI | StandIn) -> Frame:
-        """Return the frame of this VDI, with all that its mapper says of its looks."""
+    def showing(self, seen: Any, number: int) -> Frame:
+        """Return the frame of this VDI, or volume, with all that its mapper says of its looks."""
+        settings = self.mapper.driver.state.settings
         options = RenderOptions(
             clipping_planes=self._clipping_planes(seen.bounds),
             cropping=self.mapper,
-            opacity_multiplier=self.painter.opacity_multiplier,
-            transmittance_cutoff=self.painter.transmittance_cutoff,
+            opacity_multiplier=settings.opacity_multiplier,
+            transmittance_cutoff=settings.transmittance_cutoff,
         )
-        if isinstance(seen, StandIn):
-            return replace(self, stand_in=seen, vdi=None, angle=0.0, options=options)
+        known: dict[str, Any] = {"number": number, "bounds": seen.bounds, "options": options}
+        if not isinstance(seen, VDI):
+            return replace(self, volume=seen, **known)
+        assert self.view is not None
         angle = angle_from_generating_view(seen, self.view.camera)
-        return replace(self, vdi=seen, stand_in=None, angle=angle, options=options)
+        return replace(self, vdi=seen, angle=angle, effort=rise(angle), **known)
 
     @property
     def key(self) -> Any:
@@ -176,24 +149,12 @@ class Frame:
     @property
     def way(self) -> RenderMode:
         """What is raycast."""
-        return "vdi" if self.stand_in is None else "volume"
+        return "vdi" if self.volume is None else "volume"
 
     @property
     def cost(self) -> Cost:
         """What tells how much a ray takes."""
         return self.way if self.few_lists is None else "few lists"
-
-    @property
-    def effort(self) -> float:
-        """What a ray is expected to take over one from the VDI's own view."""
-        return rise(self.angle)
-
-    @property
-    def bounds(self) -> tuple[float, ...]:
-        """Those of what is seen, model frame."""
-        seen = self.vdi or self.stand_in
-        assert seen is not None
-        return seen.bounds
 
     def coarser(self, size: tuple[int, int]) -> Frame:
         """Return the same view with fewer pixels, which fill the viewport just as exactly.
@@ -209,7 +170,7 @@ class Frame:
         camera = self.camera.replace(model_transform=stretch @ self.camera.model_transform)
         depth = None if self.depth is None else sampled(self.depth, size)
         frame = replace(self, size=size, camera=camera, to_view=stretch @ self.to_view, depth=depth)
-        if self.vdi is None and self.stand_in is None:
+        if not self.bounds:
             return frame
         planes = frame._clipping_planes(self.bounds)
         return replace(frame, options=self.options.replace(clipping_planes=planes))
@@ -337,7 +298,7 @@ class Drawn:
     depth: Image | None = None  # where its rays ended
     number: int | None = None  # by which an upload is known
     joint: bool = False  # a part of a picture that other actors show the rest of
-    stand_in: bool = False  # of the volume, until there is a VDI
+    placeholder: bool = False  # of the volume, until there is a VDI
     way: RenderMode = "vdi"  # what was raycast
     pixels: Image | None = None
 

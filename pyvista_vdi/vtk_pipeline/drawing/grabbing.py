@@ -7,52 +7,24 @@ in front of it considered, its proxy has a scalar that is opaque.
 
 from __future__ import annotations
 
-import weakref
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import Met
 from pyvista_vdi.vtk_pipeline.vtk import numpy_to_vtk
 
 _STYLES = ("vtkInteractorStyleTrackballActor", "vtkInteractorStyleJoystickActor")
-_BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressEvent")
-
-#: Priorities of observers before and after the style's, which is 0.
-_BEFORE, _AFTER = 1.0, -1.0
 
 
 class Grabbing:
-    """What can be taken hold of in a window: ``clock.shared(Grabbing)``."""
+    """What can be taken hold of in a window: ``window.shared(Grabbing)``."""
 
     def __init__(self) -> None:
-        self._painters: weakref.WeakSet[Any] = weakref.WeakSet()
-        self._watched = Met()
         self._transparent: list[tuple[Any, Any]] = []  # point data and scalars of solid proxies
 
-    def join(self, painter: Any, interactor: Any) -> None:
-        """Note that a painter draws in the window; called in each of its frames."""
-        self._painters.add(painter)
-        if interactor is None or not self._watched.is_new(interactor):
-            return
-        weak = weakref.ref(self)
-
-        def pressed(caller: Any, _: str) -> None:
-            grabbing = weak()
-            if grabbing is not None:
-                grabbing._begin(caller)
-
-        def taken(*_: Any) -> None:
-            grabbing = weak()
-            if grabbing is not None:
-                grabbing._end()
-
-        for event in _BUTTONS:
-            interactor.AddObserver(event, pressed, _BEFORE)
-            interactor.AddObserver(event, taken, _AFTER)
-
-    def _begin(self, interactor: Any) -> None:
-        self._end()  # another observer may have ended the last event before it came here
+    def begin(self, drivers: list[Any], interactor: Any) -> None:
+        """Make what is hit by one of the drivers solid: a button is pressed."""
+        self.end()  # another observer may have ended the last event before it came here
         style = interactor.GetInteractorStyle()
         if style is not None and style.IsA("vtkInteractorStyleSwitch"):
             style = style.GetCurrentStyle()
@@ -60,15 +32,16 @@ class Grabbing:
             return
         x, y = interactor.GetEventPosition()
         renderer = interactor.FindPokedRenderer(x, y)
-        there = [p for p in list(self._painters) if renderer in p.renderers()]
+        there = [p for p in drivers if renderer in p.renderers()]
         hit = [p for p in there if p.actor.pick(x, y, renderer=renderer) is not None]
-        for painter in hit:  # after the picks, which draw
-            data = painter.proxy.GetPointData()
-            solid = np.full((8, data.GetScalars().GetNumberOfComponents()), _opaque(painter.actor))
+        for driver in hit:  # after the picks, which draw
+            data = driver.proxy.GetPointData()
+            solid = np.full((8, data.GetScalars().GetNumberOfComponents()), _opaque(driver.actor))
             self._transparent.append((data, data.GetScalars()))
             data.SetScalars(numpy_to_vtk(solid, deep=True))
 
-    def _end(self) -> None:
+    def end(self) -> None:
+        """Make all transparent again."""
         for data, scalars in self._transparent:
             data.SetScalars(scalars)
         self._transparent.clear()

@@ -22,73 +22,73 @@ from pyvista_vdi.model.drawing_options import (
 )
 from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.frame_state import checked_image_distance
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
+from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
-from pyvista_vdi.vtk_pipeline.drawing.painter import Painter
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.interaction.window_clock import checked_image_distance
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, vtkWeakReference
 
-#: Painters, with their mappers held weakly. VTK's garbage collector deletes a mapper under a lock;
-#: Python code that ran then, such as callbacks of weak references to what a painter holds, would
-#: let another thread take the interpreter and wait for that lock. So a painter outlives its mapper
+#: Drivers, with their mappers held weakly. VTK's garbage collector deletes a mapper under a lock;
+#: Python code that ran then, such as callbacks of weak references to what a driver holds, would
+#: let another thread take the interpreter and wait for that lock. So a driver outlives its mapper
 #: until ordinary code, or Python's garbage collector, finds it here.
-_painters: dict[int, tuple[vtkWeakReference, Painter]] = {}
+_drivers: dict[int, tuple[vtkWeakReference, Driver]] = {}
 
 
-def _let_go_of_painters(*_: Any) -> None:
-    for key, (mapper, _painter) in list(_painters.items()):
+def _let_go_of_drivers(*_: Any) -> None:
+    for key, (mapper, _driver) in list(_drivers.items()):
         if mapper.Get() is None:
-            _painters.pop(key, None)
+            _drivers.pop(key, None)
 
 
-gc.callbacks.append(_let_go_of_painters)
+gc.callbacks.append(_let_go_of_drivers)
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
 COARSEST = 4.0
 
 
 def _on_start(mapper: Any, event: str) -> None:
-    mapper.painter.begin(mapper)
-    mapper.painter.box.begin()
-    mapper._far_box.begin(mapper.painter.actor, mapper.painter.proxy)
+    mapper.driver.begin(mapper)
+    mapper.driver.box.begin()
+    mapper._far_box.begin(mapper.driver.actor, mapper.driver.proxy)
 
 
 def _on_end(mapper: Any, event: str) -> None:
-    mapper.painter.end()
-    mapper._far_box.end(mapper.painter.proxy)
-    mapper.painter.box.end()
+    mapper.driver.end()
+    mapper._far_box.end(mapper.driver.proxy)
+    mapper.driver.box.end()
 
 
 @refusing(OF_MAPPERS)
 class VDIMapperMethods(ArrayChoiceMethods):
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
-    _painter: Painter | None = None
+    _driver: Driver | None = None
     _far_box: FarBox | None = None
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._painter, self._far_box, weak = Painter(), FarBox(), vtkWeakReference()
+        self._driver, self._far_box, weak = Driver(), FarBox(), vtkWeakReference()
         weak.Set(self)
-        _let_go_of_painters()
-        _painters[id(self._painter)] = weak, self._painter
+        _let_go_of_drivers()
+        _drivers[id(self._driver)] = weak, self._driver
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
-        super().SetInputConnection(self._painter.box.GetOutputPort())  # type: ignore[misc]
+        super().SetInputConnection(self._driver.box.GetOutputPort())  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
 
     @property
-    def painter(self) -> Painter:
+    def driver(self) -> Driver:
         """What draws; made with the mapper."""
-        assert self._painter is not None
-        return self._painter
+        assert self._driver is not None
+        return self._driver
 
     def SetInputConnection(self, *args: Any) -> None:
         """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
@@ -117,14 +117,14 @@ class VDIMapperMethods(ArrayChoiceMethods):
         Nothing that draws asks for it by this method; what writes the scene for another renderer
         does, and gets an empty box.
         """
-        self.painter.say_not_exported()
+        self.driver.say_not_exported()
         return super().GetInputDataObject(*args)  # type: ignore[misc]
 
     def GetDataSetInput(self) -> Any:
         """Return the volume that the VDI is made of; without one, the box of the VDI's bounds."""
         source = self.GetSource()
         volume = None if source is None else source.GetInputDataObject(0, 0)
-        return self.painter.proxy if volume is None else volume
+        return self.driver.proxy if volume is None else volume
 
     GetInput = GetDataObjectInput = GetDataSetInput
 
@@ -176,35 +176,35 @@ class VDIMapperMethods(ArrayChoiceMethods):
         return None if shown is None or shown.times is not None else shown
 
     def _collection(self) -> VDICollection | None:
-        return None if self.painter.input is None else self.painter.input.collection
+        return None if self.driver.input is None else self.driver.input.collection
 
     def GetVDI(self) -> VDI | None:
         """Return the VDI that was drawn last, or would be drawn; ``None`` before the first."""
-        source = self.painter.input
+        source = self.driver.input
         if source is None:
             return None
         return source.last() if isinstance(source, SourceInput) else source.vdi()
 
     def GetSource(self) -> VDISource | None:
         """Return the :class:`VDISource` at the input, if it is one."""
-        source = self.painter.input
+        source = self.driver.input
         return source.source if isinstance(source, SourceInput) else None
 
     def SetDevice(self, device: Any) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""
-        self.painter.device = device
+        self.driver.device = device
 
     def GetDevice(self) -> Any:
         """Return the device as it was set."""
-        return self.painter.device
+        return self.driver.device
 
     def SetAutomaticView(self, automatic: bool) -> None:
         """Take the view of the first frame for a source without camera (on by default)."""
-        self.painter.upkeep.automatic_view = bool(automatic)
+        self.driver.set(automatic_view=bool(automatic))
 
     def GetAutomaticView(self) -> bool:
         """Whether a source without camera gets the view of the first frame."""
-        return self.painter.upkeep.automatic_view
+        return self.driver.state.settings.automatic_view
 
     def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
         """Multiply the extinction of everything that is drawn; 1 by default.
@@ -214,14 +214,12 @@ class VDIMapperMethods(ArrayChoiceMethods):
         distance by it; changing that itself makes the VDI anew. ``InvalidArgumentError`` is raised
         if it is no finite number, or below 0.
         """
-        value = checked_opacity_multiplier(multiplier)
-        if self.painter.opacity_multiplier != value:
-            self.painter.opacity_multiplier = value
+        if self.driver.set(opacity_multiplier=checked_opacity_multiplier(multiplier)):
             self.Modified()
 
     def GetOpacityMultiplier(self) -> float:
         """Return the factor of the extinction."""
-        return self.painter.opacity_multiplier
+        return self.driver.state.settings.opacity_multiplier
 
     def SetTransmittanceCutoff(self: Any, cutoff: float) -> None:
         """End rays where less light than this is left; 10^-6 by default.
@@ -230,14 +228,12 @@ class VDIMapperMethods(ArrayChoiceMethods):
         1/255. VDIs that overlap are merged to the default, whatever is set here.
         ``InvalidArgumentError`` is raised if it is not from 0 to below 1.
         """
-        value = checked_transmittance_cutoff(cutoff)
-        if self.painter.transmittance_cutoff != value:
-            self.painter.transmittance_cutoff = value
+        if self.driver.set(transmittance_cutoff=checked_transmittance_cutoff(cutoff)):
             self.Modified()
 
     def GetTransmittanceCutoff(self) -> float:
         """Return the light below which rays end."""
-        return self.painter.transmittance_cutoff
+        return self.driver.state.settings.transmittance_cutoff
 
     def SetDraw(self: Any, draw: str) -> None:
         """Choose what is raycast where the volume is at hand.
@@ -260,14 +256,12 @@ class VDIMapperMethods(ArrayChoiceMethods):
         InvalidArgumentError
             If it is something else.
         """
-        value = checked_draw(draw)
-        if self.painter.upkeep.draw != value:
-            self.painter.upkeep.draw = value
+        if self.driver.set(draw=checked_draw(draw)):
             self.Modified()
 
     def GetDraw(self) -> str:
         """Return what is raycast where the volume is at hand."""
-        return self.painter.upkeep.draw
+        return self.driver.state.settings.draw
 
     def SetImageSampleDistance(self: Any, distance: float) -> None:
         """Cast a ray for every so many pixels along each edge; 1 by default.
@@ -275,14 +269,12 @@ class VDIMapperMethods(ArrayChoiceMethods):
         The picture is interpolated linearly, as by VTK's mappers. Previews have fewer rays where
         the frame rate asks for it. ``InvalidArgumentError`` is raised if it is not from 1 to 100.
         """
-        value = checked_image_distance(distance)
-        if self.painter.image_distance != value:
-            self.painter.image_distance = value
+        if self.driver.set(image_distance=checked_image_distance(distance)):
             self.Modified()
 
     def GetImageSampleDistance(self) -> float:
         """Return for how many pixels along each edge a ray is cast."""
-        return self.painter.image_distance
+        return self.driver.state.settings.image_distance
 
     # In VTK's GPU mapper the following would draw VTK's own volume into a smaller framebuffer, so
     # its own switch stays off and these methods, called from Python, keep ours.
@@ -294,12 +286,12 @@ class VDIMapperMethods(ArrayChoiceMethods):
         are interactive: the window's interactor sets that rate while its style turns, pans or
         zooms. Frames at rest, screenshots, exports and off-screen windows are always full.
         """
-        if self._painter is not None:  # PyVista's constructor turns VTK's own switch off
-            self._painter.interaction.adjust = bool(on)
+        if self._driver is not None:  # PyVista's constructor turns VTK's own switch off
+            self._driver.set(adjust=bool(on))
 
     def GetAutoAdjustSampleDistances(self) -> bool:
         """Whether previews are drawn."""
-        return self.painter.interaction.adjust
+        return self.driver.state.settings.adjust
 
     def AutoAdjustSampleDistancesOn(self) -> None:
         """Draw previews."""
@@ -317,22 +309,22 @@ class VDIMapperMethods(ArrayChoiceMethods):
         off-screen windows have the window's ``GetMultiSamples()``, which is left as it was set.
         With several VDIs in a window all of them must allow it.
         """
-        self.painter.interaction.adjust_multi_samples = bool(on)
+        self.driver.set(adjust_multi_samples=bool(on))
 
     def GetAutoAdjustMultiSamples(self) -> bool:
         """Whether previews may be drawn without multisampling."""
-        return self.painter.interaction.adjust_multi_samples
+        return self.driver.state.settings.adjust_multi_samples
 
     def SetInteractiveUpdateRate(self, rate: float) -> None:
         """Set the window's desired update rate from which on a frame is interactive, 1/s.
 
         1 by default, as in ``vtkSmartVolumeMapper``.
         """
-        self.painter.interaction.update_rate = checked_rate("the interactive update rate", rate)
+        self.driver.set(update_rate=checked_rate("the interactive update rate", rate))
 
     def GetInteractiveUpdateRate(self) -> float:
         """Return the desired update rate from which on a frame is interactive, 1/s."""
-        return self.painter.interaction.update_rate
+        return self.driver.state.settings.update_rate
 
     def SetTargetFrameRate(self, rate: float | None) -> None:
         """Set the frames per second that previews keep.
@@ -341,13 +333,12 @@ class VDIMapperMethods(ArrayChoiceMethods):
         (``SetDesiredUpdateRate``: 15 in VTK, 30 in PyVista); 0 means that no rate is to be kept,
         so that every frame is full. Several VDIs in a window keep the highest of their targets.
         """
-        self.painter.interaction.target = (
-            None if rate is None else checked_rate("the target frame rate", rate)
-        )
+        target = None if rate is None else checked_rate("the target frame rate", rate)
+        self.driver.set(target=target)
 
     def GetTargetFrameRate(self) -> float | None:
         """Return the frames per second that previews keep, as it was set."""
-        return self.painter.interaction.target
+        return self.driver.state.settings.target
 
     def SetRegenerate(self, policy: Any) -> None:
         """Choose what decides that a view needs a VDI of its own.
@@ -365,11 +356,11 @@ class VDIMapperMethods(ArrayChoiceMethods):
         InvalidArgumentError
             If it is something else.
         """
-        self.painter.upkeep.regeneration.policy = checked_policy(policy)
+        self.driver.set(regenerate=checked_policy(policy))
 
     def GetRegenerate(self) -> Any:
         """Return what decides that a view needs a VDI of its own."""
-        return self.painter.upkeep.regeneration.policy
+        return self.driver.state.settings.regenerate
 
     def SetRegenerateBelow(self, ssim: float | None) -> None:
         """Set the estimated SSIM below which a VDI does not do for a view.
@@ -380,11 +371,11 @@ class VDIMapperMethods(ArrayChoiceMethods):
         it is 0.98, contrast within 4 x 4 pixels that differs by a tenth at most, and lists no wider
         than 1.25 pixels.
         """
-        self.painter.upkeep.regeneration.bound = None if ssim is None else checked_bound(ssim)
+        self.driver.set(regenerate_below=None if ssim is None else checked_bound(ssim))
 
     def GetRegenerateBelow(self) -> float | None:
         """Return the estimated SSIM below which a VDI does not do for a view, as it was set."""
-        return self.painter.upkeep.regeneration.bound
+        return self.driver.state.settings.regenerate_below
 
     def SetInteractiveOffScreen(self, on: bool | None) -> None:
         """Treat off-screen windows as if somebody watched them, or not.
@@ -392,11 +383,11 @@ class VDIMapperMethods(ArrayChoiceMethods):
         By default, ``None``, those are that a browser shows through a remote view of trame, as in
         notebooks: previews are drawn, and VDIs are made in the background.
         """
-        self.painter.interaction.off_screen = None if on is None else bool(on)
+        self.driver.set(off_screen=None if on is None else bool(on))
 
     def GetInteractiveOffScreen(self) -> bool | None:
         """Whether off-screen windows are treated as watched; ``None`` where trame tells."""
-        return self.painter.interaction.off_screen
+        return self.driver.state.settings.off_screen
 
     def SetPickingOpacity(self, opacity: float) -> None:
         """Set the opacity that a ray must reach in the VDI to pick it.
@@ -404,19 +395,19 @@ class VDIMapperMethods(ArrayChoiceMethods):
         At least 0 and less than 1; 0.05 by default, as in VTK's pickers for volumes. What is
         compared says ``SetPickingAccumulated``; see :func:`pyvista_vdi.pick`.
         """
-        self.painter.selection.opacity = checked_opacity(opacity)
+        self.driver.set(picking_opacity=checked_opacity(opacity))
 
     def GetPickingOpacity(self) -> float:
         """Return the opacity that a ray must reach in the VDI to pick it."""
-        return self.painter.selection.opacity
+        return self.driver.state.settings.picking_opacity
 
     def SetPickingAccumulated(self, accumulated: bool) -> None:
         """Compare the opacity from the ray's beginning (the default), or each supersegment's."""
-        self.painter.selection.accumulated = bool(accumulated)
+        self.driver.set(picking_accumulated=bool(accumulated))
 
     def GetPickingAccumulated(self) -> bool:
         """Whether the opacity from the ray's beginning is compared."""
-        return self.painter.selection.accumulated
+        return self.driver.state.settings.picking_accumulated
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
@@ -432,11 +423,11 @@ class VDIMapperMethods(ArrayChoiceMethods):
                 "between its input and this mapper (SetInputConnection)"
             )
         theirs: Any = other
-        shown = other.painter.input
-        self.painter.set_input(None if shown is None else shown.shared())
+        shown = other.driver.input
+        self.driver.set_input(None if shown is None else shown.shared())
         self.take_array_choice(theirs)
         self.SetDevice(theirs.GetDevice())
-        self.painter.take_settings(other.painter)
+        self.driver.set(**vars(other.driver.state.settings))
         self.SetMaximumImageSampleDistance(theirs.GetMaximumImageSampleDistance())
         self.SetCropping(theirs.GetCropping())
         self.SetCroppingRegionPlanes(theirs.GetCroppingRegionPlanes())
@@ -451,7 +442,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
         return type(self)()
 
     def _set_input(self: Any, source: Input | None) -> None:
-        self.painter.set_input(source)
+        self.driver.set_input(source)
         self._added = None
         if self.GetSource() is not None:
             self.choose_array()  # which may have been named before

@@ -9,8 +9,6 @@ The others show nothing there. Which one it is cannot be seen.
 from __future__ import annotations
 
 import itertools
-import time
-import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -22,6 +20,7 @@ from pyvista_vdi.raycasting.multi_vdi import OwnedImage, owned_image
 from pyvista_vdi.raycasting.placed import PlacedVDI
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Image, Matrix, Recent, same_depth
+from pyvista_vdi.vtk_pipeline.interaction.window import now
 
 #: An actor's box must reach so far around a pixel's centre, in pixels along each axis, for the
 #: pixel to be surely drawn, whole, whatever the rasteriser's rounding and anti-aliasing: half a
@@ -62,7 +61,7 @@ class _Group:
 
 
 class Overlaps:
-    """The joint pictures of a window: ``clock.shared(Overlaps)``."""
+    """The joint pictures of a window: ``window.shared(Overlaps)``."""
 
     def __init__(self) -> None:
         self._kept: Recent[_Picture] = Recent()
@@ -75,31 +74,31 @@ class Overlaps:
         """
         # Where the frame's VDIs have been looked at already; once each, for a frame may have passes
         place = ("overlaps", own.renderer.GetAddressAsString(""))
-        groups = own.clock.of_frame.setdefault(place, {})
-        key, group = groups.pop(id(own.painter), (None, None))
+        groups = own.window.of_frame.setdefault(place, {})
+        key, group = groups.pop(id(own.driver), (None, None))
         if group is None or key != _key(own):
             frames = others(own)
             if len(frames) == 1:
                 return None
             for members in _overlapping(frames):
                 together = _Group(members)
-                groups.update({id(frame.painter): (_key(frame), together) for frame in members})
-            _, group = groups.pop(id(own.painter), (None, _Group([own])))
+                groups.update({id(frame.driver): (_key(frame), together) for frame in members})
+            _, group = groups.pop(id(own.driver), (None, _Group([own])))
         if len(group.frames) == 1:
             return None
         if group.picture is None:
             group.picture = self._picture(group.frames)
-        index = next(i for i, f in enumerate(group.frames) if f.painter is own.painter)
+        index = next(i for i, f in enumerate(group.frames) if f.driver is own.driver)
         return group.picture.part(index, own.full_size)
 
     def _picture(self, frames: Sequence[Frame]) -> _Picture:
         """Return the picture of a group: one that is kept, or a new one."""
         # Read once for all
-        depth = frames[0].clock.shared(OpaqueDepths).read(frames)
+        depth = frames[0].window.shared(OpaqueDepths).read(frames)
         frames = [replace(frame, depth=depth) for frame in frames]
         picture = self._known(frames)  # in full if it is there: that costs nothing
         if picture is None:
-            size = max(frame.painter.preview_size(frame) for frame in frames)
+            size = max(frame.driver.preview_size(frame) for frame in frames)
             first = frames[0].coarser(size)  # which samples the depth
             frames = [first, *(replace(f, depth=None).coarser(size) for f in frames[1:])]
             picture = self._known(frames) if first.preview else None
@@ -119,22 +118,23 @@ class Overlaps:
 
 def _key(*frames: Frame) -> Any:
     """Return what VDIs look like together, but for what hides them."""
-    return tuple((id(f.painter), weakref.ref(f.vdi), f.key) for f in frames if f.vdi is not None)
+    return tuple((id(f.driver), f.number, f.key) for f in frames)
 
 
 def _raycast(frames: Sequence[Frame]) -> OwnedImage:
-    before = time.perf_counter()
+    before = now()
     # One device draws them all, and the same in whatever order they were added
-    devices = {repr(frame.painter.device): frame.painter.device for frame in frames}
+    devices = {repr(frame.driver.device): frame.driver.device for frame in frames}
     device, first = devices[min(devices)], frames[0]
     joint = owned_image(
         [PlacedVDI(frame.vdi, frame.camera, frame.options) for frame in frames if frame.vdi],
         FrameRequest(first.camera, first.size, opaque_depth=first.depth, device=device),
         margin=_MARGIN,
     )
-    seconds = time.perf_counter() - before
+    seconds = now() - before
     for frame in frames:  # as if each had drawn its own
-        frame.clock.drawn(frame.size, frame.full_size, seconds / len(frames), effort=frame.effort)
+        took = (frame.size, frame.full_size, seconds / len(frames))
+        frame.window.pace = frame.window.pace.drawn(*took, effort=frame.effort)
     return joint
 
 

@@ -6,6 +6,7 @@ is opaque and writes no depth.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 #: What happens to a VDI under a pass of this class.
@@ -34,21 +35,23 @@ PEELED = (
 )
 
 
-def classes(renderer: Any) -> set[str]:
-    """Return the names of the classes of all passes of a renderer."""
-    return _below(renderer.GetPass())
+def tell_effects(renderer: Any, warn: Callable[[str], None]) -> tuple[bool, bool]:
+    """Look at what a renderer's passes do to a VDI, and warn of it.
 
-
-def effects(names: set[str]) -> list[str]:
-    """Return what passes of these classes do to a VDI, one text for each that does something."""
-    return [text for name, text in _EFFECTS.items() if name in names]
-
-
-def peels_volumes(renderer: Any, names: set[str]) -> bool:
-    """Whether VTK may draw a renderer's volumes between its translucent layers."""
-    if "vtkDualDepthPeelingPass" in names:
-        return True
-    return bool(renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes())
+    Returns whether one of them is of ambient occlusion, and whether volumes may be drawn between
+    translucent layers.
+    """
+    names = _below(renderer.GetPass())
+    for name, text in _EFFECTS.items():
+        if name in names:
+            warn(text)
+    peeled = "vtkDualDepthPeelingPass" in names
+    peeled = peeled or bool(
+        renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes()
+    )
+    if peeled and shows_what_is_translucent(renderer):
+        warn(PEELED)
+    return "vtkSSAOPass" in names, peeled
 
 
 def shows_what_is_translucent(renderer: Any) -> bool:

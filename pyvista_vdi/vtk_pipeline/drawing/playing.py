@@ -59,7 +59,7 @@ class PlayingMethods:
     def playing(self: Any) -> bool:
         """Whether one step is shown after the other."""
         mapper = self.GetMapper()
-        shown = None if mapper is None else mapper.painter.input
+        shown = None if mapper is None else mapper.driver.input
         return shown is not None and shown.player is not None and shown.player.playing
 
     def play(
@@ -92,11 +92,12 @@ class PlayingMethods:
             If no series is shown, the rate is none, or the limit no number of bytes.
         """
         self._player().play(rate, loop=loop, memory_limit=memory_limit)
-        upkeep, renderer = self.GetMapper().painter.upkeep, self.GetMapper().painter.renderer()
+        driver = self.GetMapper().driver
+        renderer = driver.renderer()
         window = None if renderer is None else renderer.GetRenderWindow()
         # Before the first frame there is nothing to look at, and that frame looks itself
         if window is not None and not window.GetNeverRendered():
-            upkeep.tick(window)
+            driver.follow(window)
 
     def pause(self: Any) -> None:
         """Stay at the step that is shown.
@@ -109,7 +110,7 @@ class PlayingMethods:
         self._player().pause()
 
     def _player(self: Any) -> Any:
-        shown = self._mapper_for(" that could show a series").painter.input
+        shown = self._mapper_for(" that could show a series").driver.input
         if shown is None or shown.player is None:
             raise InvalidArgumentError(
                 "this actor shows no series, which alone has times: add one (plotter.add_vdi("

@@ -8,14 +8,13 @@ wins, and so does one behind a part that is transparent.
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick, pick_vdi
+from pyvista_vdi.raycasting.picking import FirstHit, Pick, pick_vdi
 from pyvista_vdi.raycasting.raycast import render_first_hits
 from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_texture, show_first_hits, show_image
@@ -24,19 +23,9 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkInformation, vtkOpenG
 
 
 class Selection:
-    """What happens behind a mapper in a selection's passes.
-
-    Attributes
-    ----------
-    opacity : float
-        What a hit has to reach.
-    accumulated : bool
-        Whether what is in front of a supersegment counts.
-    """
+    """What happens behind a mapper in a selection's passes."""
 
     def __init__(self) -> None:
-        self.opacity = DEFAULT_OPACITY
-        self.accumulated = True
         self.texture = ImageTexture()
         self._drawn: tuple[Any, Image] | None = None
         self._uploads = 0
@@ -62,7 +51,9 @@ class Selection:
         if keys is not None:
             keys.Remove(vtkOpenGLActor.GLDepthMaskOverride())
 
-    def show(self, actor: Any, renderer: Any, seen: Frame | None, device: Any) -> None:
+    def show(
+        self, actor: Any, renderer: Any, seen: Frame | None, device: Any, hit: FirstHit
+    ) -> None:
         """Raycast and bind the hits in the selector's area; none if nothing is seen."""
         window, selector = renderer.GetRenderWindow(), renderer.GetSelector()
         if self._picking:
@@ -74,9 +65,9 @@ class Selection:
             place_texture(actor, self.texture.show(window, nothing, None, smooth=False))
             return
         area = _area(seen, selector.GetArea())
-        key = (weakref.ref(seen.vdi), seen.key, area, self.opacity, self.accumulated)
+        key = (seen.number, seen.key, area, hit)
         if self._drawn is None or self._drawn[0] != key:
-            self._drawn = (key, _packed(area, self._depths(seen, area, device)))
+            self._drawn = (key, _packed(area, self._depths(seen, area, device, hit)))
             self._uploads += 1
         unit = self.texture.show(window, self._drawn[1], self._uploads, smooth=False)
         place_texture(actor, unit)
@@ -86,7 +77,7 @@ class Selection:
         self.texture.release()
         self._drawn = None
 
-    def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
+    def pick(self, actor: Any, renderer: Any, x: float, y: float, hit: FirstHit) -> Pick | None:
         """Return what of an actor's VDI a renderer shows at a place of the window, in pixels.
 
         ``None`` where nothing of it is hit, or something else is in front.
@@ -106,19 +97,19 @@ class Selection:
             return None
         left, bottom = seen.origin
         assert seen.vdi is not None
-        hit = pick_vdi(
+        picked = pick_vdi(
             seen.vdi,
             FrameRequest(seen.camera, seen.size, seen.options),
             (int(x) - left, int(y) - bottom),
-            FirstHit.of(self.opacity, self.accumulated),
+            hit,
         )
-        if hit is None:  # at the threshold, by rounding
+        if picked is None:  # at the threshold, by rounding
             return None
         # From the frame's world, whose origin is the eye, to the scene's
-        px, py, pz, _ = np.linalg.solve(seen.to_view, [*hit.position, 1.0]).tolist()
-        return replace(hit, position=(px, py, pz))
+        px, py, pz, _ = np.linalg.solve(seen.to_view, [*picked.position, 1.0]).tolist()
+        return replace(picked, position=(px, py, pz))
 
-    def _depths(self, seen: Frame, area: Area, device: Any) -> Image:
+    def _depths(self, seen: Frame, area: Area, device: Any, hit: FirstHit) -> Image:
         """Return window depth of the hits in an area, (h, w), bottom row first; inf for none."""
         left, bottom, width, height = area
         if width == 0 or height == 0:
@@ -130,7 +121,6 @@ class Selection:
         assert seen.vdi is not None
         camera = seen.camera.tile(seen.size, corner, (width, height))
         request = FrameRequest(camera, (width, height), seen.options, device=device)
-        hit = FirstHit.of(self.opacity, self.accumulated)
         depth = render_first_hits(seen.vdi, request, hit)
         return seen.window_depth(depth[::-1])
 

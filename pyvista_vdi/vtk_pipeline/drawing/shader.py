@@ -6,7 +6,6 @@ from typing import Any
 
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_SHADERS, refusing
 from pyvista_vdi.vtk_pipeline.vtk import (
-    reference,
     vtkHardwareSelector,
     vtkOpenGLShaderProperty,
 )
@@ -129,7 +128,7 @@ def show_image(actor: Any, *, occluded: bool = False, peeled: bool = False) -> N
     whether volumes are drawn by depth peeling.
     """
     shader = actor.GetShaderProperty()
-    if _replacement(shader) is None:
+    if _CALL not in _placed(shader):
         _add_fragment(shader, "//VTK::Base::Dec", True, _DECLARATION, False)
         _add_fragment(shader, _CUSTOM, True, _UNIFORMS, False)
         for unused in _UNUSED:
@@ -152,8 +151,9 @@ def fill_viewport(actor: Any, edge: float | None) -> None:
     """Fill the viewport with a cube about the origin, of that edge; ``None``: boxes are boxes."""
     shader = actor.GetShaderProperty()
     text = None if edge is None else _FILL.format(scale=2 / edge)
-    if text == _replacement(shader, _POSITION):
+    if text == _placed(shader).get(_POSITION):
         return
+    _placed(shader)[_POSITION] = text
     if text is None:
         _clear_vertex(shader, _POSITION, True)
     else:
@@ -177,15 +177,11 @@ def show_first_hits(actor: Any, selection_pass: int) -> None:
 
 def _replace(shader: Any, text: str) -> None:
     """Put the text in place, unless it is: a property that is modified has the shader rebuilt."""
-    if _replacement(shader) != text:
+    if _placed(shader).get(_CALL) != text:
         _add_fragment(shader, _CALL, True, text, False)
+        _placed(shader)[_CALL] = text
 
 
-def _replacement(shader: Any, of: str = _CALL) -> str | None:
-    """Return what is in place now. Asked of VTK: copies of an actor share its shader."""
-    for i in range(shader.GetNumberOfShaderReplacements()):
-        name, first, text, everywhere = (reference(kind) for kind in ("", False, "", False))
-        shader.GetNthShaderReplacement(i, name, first, text, everywhere)
-        if str(name) == of:
-            return str(text)
-    return None
+def _placed(shader: Any) -> dict[str, str | None]:
+    """Return what is in place now, by its tag; copies of an actor share its shader."""
+    return vars(shader).setdefault("placed", {})  # type: ignore[no-any-return]

@@ -27,6 +27,11 @@ class _Texture:
             return False
         return bool(self._texture.GetHandle() != 0)
 
+    @property
+    def there(self) -> bool:
+        """Whether it was made, and not freed."""
+        return self._texture is not None
+
     def let_go(self) -> None:
         """Release the texture unit."""
         if self._texture is not None:

@@ -97,7 +97,7 @@ class Input:
         """
         return None
 
-    def complaint(self, error: Exception) -> str | None:
+    def complaint(self, error: BaseException) -> str | None:
         """Return what is said of an error between two frames; ``None``: what is usual."""
         return None
 

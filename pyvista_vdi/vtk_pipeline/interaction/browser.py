@@ -27,9 +27,7 @@ class Follower(Protocol):
 
 
 _followers: weakref.WeakSet[Follower] = weakref.WeakSet()
-_lock = (
-    threading.Lock()
-)  # windows are drawn in other threads, and a set that grows cannot be walked
+_lock = threading.Lock()  # windows are drawn in other threads, and a set that grows is not walked
 
 
 def follow(follower: Follower) -> None:
@@ -65,11 +63,18 @@ class SceneAtHand:
     def __init__(self, begun: Callable[[], object]) -> None:
         self._begun = weakref.WeakMethod(begun)  # type: ignore[arg-type]
         self._views: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._changes = 0  # that were written, of scenes that were not written whole since
 
     def is_all(self, window: Any) -> bool:
-        """Whether a window's scene, which is being written, is only for such browsers."""
+        """Whether a window's scene, which is being written, is only for such browsers.
+
+        What trame has at hand it writes twice, what has changed and then all of it, as its
+        contexts say; a scene that is exported is written whole at once.
+        """
+        self._changes += -1 if any(_writes_all(helper) for helper in _helpers()) else 1
+        exported, self._changes = self._changes < 0, max(self._changes, 0)
         views = [view for view in _hybrid_views() if view._view is window]
-        if not views or _exporting() or not all(_drawn_by_server(view) for view in views):
+        if not views or exported or not all(_drawn_by_server(view) for view in views):
             return False
         for view in views:
             if view not in self._views:
@@ -97,6 +102,14 @@ def _helpers() -> list[Any]:
     return list(getattr(module, "HELPERS_PER_SERVER", {}).values())
 
 
+def _writes_all(helper: Any) -> bool:
+    """Whether trame is writing a scene whole, and not what has changed in it."""
+    protocol = getattr(helper, "_root_protocol", None)
+    found = [] if protocol is None else protocol.getLinkProtocols()
+    contexts = [getattr(each, "context", None) for each in found]
+    return any(getattr(context, "ignore_last_dependencies", False) for context in contexts)
+
+
 def _publishers(window: Any) -> Iterator[tuple[Any, str]]:
     """Yield those who send pictures of a window to browsers, and the number they know it by."""
     for helper in _helpers():
@@ -121,13 +134,3 @@ def _drawn_by_server(view: Any) -> bool:
     state = view._app.state.to_dict()
     by_server, mode = (state.get(key) for key in _mode_keys(view))
     return mode == "remote" if by_server is None else bool(by_server)
-
-
-def _exporting() -> bool:
-    """Whether trame asks for the scene to write it somewhere, and not to have it at hand."""
-    frame = sys._getframe()
-    while frame.f_back is not None:
-        frame = frame.f_back
-        if frame.f_code.co_name == "get_standalone_state":
-            return True
-    return False

@@ -103,7 +103,7 @@ def test_a_set_from_a_file_is_decoded_ahead(plotter, made, decoded, tmp_path):
     turned(plotter, 5)
     finish("set")
     assert not any(in_frame for _, in_frame in decoded), "a frame has waited"
-    actor.mapper.painter.release()
+    actor.mapper.driver.release()
     decoded.clear()
     frame(plotter)  # begins anew
     finish("set")

@@ -1,4 +1,4 @@
-"""Timers by which the thread that draws a window looks at what goes on behind it."""
+"""The timer by which the thread that draws a window looks at what goes on behind it."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ def period_of(rate: float) -> int:
     return int(min(max(_SHORTEST, 500 / rate), PERIOD))
 
 
-class Ticker:
+class Timer:
     """Calls something again and again from the event loop, while it runs and no hand moves.
 
     Worker threads never call VTK. Where an interactor runs no event loop (off-screen), nothing is
-    called, and what was done behind the frames is seen at the next frame.
+    called, unless a browser watches the window from an asyncio loop; what was done behind the
+    frames is seen at the next frame then.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ class Ticker:
     While a button is held, VTK's styles take all events of the interactor for themselves, and
     repeat their last motion at *any* timer event: a ``vtkInteractorStyleTrackballCamera`` would
     turn on and on. So the timer goes when an interaction starts; motion brings frames of its own,
-    and after the last one the ticker is started again. Nor do others get our timer's events: a
+    and after the last one the timer is started again. Nor do others get our timer's events: a
     user's own timer callback counts its steps by them.
     """
 
@@ -50,32 +51,43 @@ class Ticker:
         self._timer = 0
         self._period = PERIOD
         self._observers: tuple[int, ...] = ()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._handle: asyncio.TimerHandle | None = None
 
     @property
     def running(self) -> bool:
-        """Whether it ticks."""
+        """Whether the interactor calls."""
         return self._timer > 0
 
-    def start(self, interactor: Any, period: int = PERIOD) -> None:
-        """Tick every so many milliseconds, if it does not already, in this interactor."""
+    def start(self, interactor: Any, period: int = PERIOD, *, in_loop: bool = False) -> None:
+        """Tick every so many milliseconds, if it does not already, in this interactor.
+
+        Also, ``in_loop``, in the asyncio loop that runs in this thread, if one does.
+        """
         if interactor is not self._interactor.Get() or interactor is None:
-            self.stop()
-        if interactor is None or (self.running and period == self._period):
-            return
-        if not self._observers:
-            self._observe(interactor)
-        self.pause()
-        self._timer, self._period = interactor.CreateRepeatingTimer(period), period
+            self._leave()
+        if interactor is not None and not (self.running and period == self._period):
+            if not self._observers:
+                self._observe(interactor)
+            self.pause()
+            self._timer = interactor.CreateRepeatingTimer(period)
+        self._period = period
+        if in_loop:
+            self._start_loop()
 
     def pause(self) -> None:
-        """Take the timer away."""
+        """Take the interactor's timer away."""
         interactor = self._interactor.Get()
         if interactor is not None and self.running:
             interactor.DestroyTimer(self._timer)
         self._timer = 0
 
     def stop(self) -> None:
-        """End: nothing is left at the interactor."""
+        """End: nothing is left at the interactor, or in the loop."""
+        self._leave()
+        self._leave_loop()
+
+    def _leave(self) -> None:
         self.pause()
         interactor = self._interactor.Get()
         if interactor is not None:
@@ -83,19 +95,24 @@ class Ticker:
                 interactor.RemoveObserver(observer)
         self._observers = ()
 
+    def _leave_loop(self) -> None:
+        if self._handle is not None:
+            self._handle.cancel()
+        self._handle = None
+
     def _observe(self, interactor: Any) -> None:
         weak = weakref.ref(self)
 
         @calldata_type(VTK_INT)  # type: ignore[misc]
-        def on_timer(_caller: Any, _event: str, timer: int) -> None:
-            ticker = weak()
-            if ticker is not None:
-                ticker._on_timer(timer)
+        def on_timer(_caller: Any, _event: str, number: int) -> None:
+            timer = weak()
+            if timer is not None:
+                timer._on_timer(number)
 
         def on_interaction(*_: Any) -> None:
-            ticker = weak()
-            if ticker is not None:
-                ticker.pause()
+            timer = weak()
+            if timer is not None:
+                timer.pause()
 
         ticks = interactor.AddObserver("TimerEvent", on_timer, _PRIORITY)
         interaction = interactor.AddObserver("StartInteractionEvent", on_interaction)
@@ -104,50 +121,27 @@ class Ticker:
         self._interactor.Set(interactor)
         self._observers = (ticks, interaction)
 
-    def _on_timer(self, timer: int) -> None:
+    def _on_timer(self, number: int) -> None:
         interactor = self._interactor.Get()
-        if timer == self._timer and interactor is not None and self._observers:
+        if number == self._timer and interactor is not None and self._observers:
             interactor.GetCommand(self._observers[0]).SetAbortFlag(1)
         tick = self._tick()
         if tick is not None:
             tick()
 
-
-class LoopTicker:
-    """Does the same from the asyncio loop that a frame is drawn in, for windows without events.
-
-    Parameters
-    ----------
-    tick : bound method
-        Held weakly.
-    """
-
-    def __init__(self, tick: Callable[[], None]) -> None:
-        self._tick = weakref.WeakMethod(tick)
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._handle: asyncio.TimerHandle | None = None
-        self._period = PERIOD
-
-    def start(self, period: int = PERIOD) -> None:
-        """Tick every so many milliseconds in the loop that runs in this thread, if one does."""
-        self._period = period
+    def _start_loop(self) -> None:
         try:
             loop = asyncio.get_running_loop()
         except RuntimeError:
             return
         if self._handle is None or loop is not self._loop:
-            self.stop()
-            self._loop, self._handle = loop, loop.call_later(period / 1000, self._on_timer)
+            self._leave_loop()
+            self._loop = loop
+            self._handle = loop.call_later(self._period / 1000, self._in_loop)
 
-    def stop(self) -> None:
-        """End: nothing is left in the loop."""
-        if self._handle is not None:
-            self._handle.cancel()
-        self._handle = None
-
-    def _on_timer(self) -> None:
+    def _in_loop(self) -> None:
         self._handle = None
         tick = self._tick()
         if tick is not None:
-            self.start(self._period)
+            self._start_loop()
             tick()

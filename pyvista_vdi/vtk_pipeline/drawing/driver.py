@@ -1,0 +1,487 @@
+"""Draws the frames of a mapper, and answers whatever else VTK asks of it.
+
+A frame is: VTK's event, what is seen of the scene, the decision, one raycast, a texture.
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
+from pyvista_vdi.model.coverage import coverage
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import View
+from pyvista_vdi.quality.decide import placeholder_share, ssim_of
+from pyvista_vdi.quality.frame_state import FrameTook, PlaceholderTook, VDIAsked, ViewPicked
+from pyvista_vdi.quality.pace import reduced
+from pyvista_vdi.quality.render_mode import seconds_per_pixel
+from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
+from pyvista_vdi.raycasting.picking import FirstHit, Pick
+from pyvista_vdi.vtk_pipeline.drawing import passes
+from pyvista_vdi.vtk_pipeline.drawing.box import Box
+from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding
+from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
+from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, consumers, viewport, volumes
+from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
+from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Images
+from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, touch
+from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
+from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
+from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
+from pyvista_vdi.vtk_pipeline.drawing.volume_picture import VolumePicture
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
+from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
+from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window, now
+from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference
+
+#: What is said where another volume has the mapper.
+_BEHIND_ANOTHER = (
+    "VDIMapper draws only behind its own VDIActor, and is behind another volume: use VDIActor in "
+    "place of vtkVolume, also for copies (VDIActor().ShallowCopy(actor))"
+)
+
+
+class Driver(Deciding):
+    """What happens behind a :class:`VDIMapper`; its observers call :meth:`begin` and :meth:`end`.
+
+    It holds its actor and its windows weakly, so that nothing here keeps a scene alive.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.box = Box()
+        self._actor = vtkWeakReference()
+        self._active = vtkWeakReference()  # which renderer is between its start and its end
+        self._watched = Met()
+        self._view: View | None = None  # of the last frame
+        self._texture, self._no_depth = ImageTexture(), NoDepth()
+        self._selection = Selection()
+        self._images, self._last = Images(), NOTHING
+        self._counted = self._generation = 0  # the VDI that was shown last, and how many were
+        self._scene_at_hand = SceneAtHand(self._say_not_exported)
+        self._trouble: BaseException | None = None
+        self._astray = False  # whether something else than the actor draws
+
+    # What is drawn, and how
+
+    def set_actor(self, actor: Any) -> None:
+        """Remember whose matrix and renderers count."""
+        other = self._actor.Get()
+        if other is not None and other is not actor:
+            raise InvalidArgumentError(
+                "this VDIMapper is already behind another VDIActor: give each actor its own "
+                "(the VDI itself can be shared)"
+            )
+        self._actor.Set(actor)
+
+    def leave_actor(self, actor: Any) -> None:
+        """Forget that actor, if it is this one."""
+        if self._actor.Get() is actor:
+            self._actor.Set(None)
+
+    @property
+    def actor(self) -> Any:
+        """Whose matrix and renderers count; ``None`` if there is none."""
+        return self._actor.Get()
+
+    def set_input(self, source: Input | None) -> None:
+        """Draw another VDI, and show its bounds to VTK at once."""
+        weak = weakref.ref(self)
+
+        def changed(*_: Any) -> None:
+            driver = weak()
+            if driver is not None:
+                driver.box.connect()
+
+        super().set_input(source)
+        if source is not None:
+            source.watch(changed)
+        self.box.show(source)
+        self._last = NOTHING
+
+    @property
+    def proxy(self) -> Any:
+        """The image whose box VTK draws in place of the VDI."""
+        return self.box.image
+
+    def release(self) -> None:
+        """Free the texture and the images kept, and end what goes on; a frame begins anew."""
+        super().release()
+        self._texture.release()
+        self._no_depth.release()
+        self._selection.release()
+        self._images.clear()
+
+    @property
+    def holds_images(self) -> bool:
+        """Whether images are kept, or a texture."""
+        return self._images.any or self._texture.there
+
+    # A frame
+
+    def begin(self, mapper: Any) -> None:
+        """Raycast and upload the image for the frame that has just begun."""
+        actor, renderer = self._actor.Get(), self.renderer()
+        # Else a copy of the actor by vtkVolume.ShallowCopy draws, in another window
+        self._astray = renderer is None or not _is_drawing(renderer)
+        if self._astray:
+            self._warnings.warn(_BEHIND_ANOTHER)
+            self.box.place((0.0,) * 6)  # nothing is seen of it
+            if actor is not None:  # whose shader the copy has
+                place_image(actor, 0, (0, 0), (1, 1))
+            return
+        # VTK asks for four where the actor's property says that they are dependent
+        components = 1 if actor.GetProperty().GetIndependentComponents() else 4
+        if self.box.components != components:
+            self.box.give_components(components)
+        window = renderer.GetRenderWindow()
+        of_window = Window.of(window)
+        self._window = weakref.ref(of_window)
+        if renderer.GetSelector() is not None:
+            self._select(mapper, renderer)
+            return
+        occluded = peeled = False
+        if renderer.GetPass() is not None or renderer.GetUseDepthPeelingForVolumes():
+            occluded, peeled = passes.tell_effects(renderer, self._warnings.warn)
+        self._selection.leave(actor, occluded=occluded, peeled=peeled)
+        with suppress(VDIError):  # which what is drawn says
+            self.box.Update()
+        drawn = self._last = self._guarded(self._paint, mapper, renderer) or self._last
+        of_window.pace = of_window.pace.showed(drawn.preview)
+        if window.GetInteractor() is not None:
+            of_window.listen(window.GetInteractor(), Grabbing)
+        unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
+        place_image(actor, unit, *viewport(renderer))
+        self._no_depth.show(window, mapper)
+        self.texts.write(renderer, self.status)
+        self.follow(window)
+
+    def end(self) -> None:
+        """Release the texture unit."""
+        if self._astray:
+            self.box.Modified()  # it has its bounds again
+        self._texture.let_go()
+        self._no_depth.let_go()
+        self._selection.texture.let_go()
+
+    def _paint(self, mapper: Any, renderer: Any) -> Drawn:
+        """Return the frame's image."""
+        frame, others = self._frame(mapper, renderer)
+        if frame is None:
+            return self._last
+        if others and frame.volume is None:  # which has no lists to be merged by
+            part = self.window.shared(Overlaps).part(frame, _frames)
+            if part is not None:
+                return part
+        window = self.window
+        frame = replace(frame, depth=window.shared(OpaqueDepths).read([frame]))
+        at_rest = reduced(frame.full_size, 1 / self.state.settings.image_distance**2)
+        frame = frame.coarser(at_rest)
+        drawn = self._images.get(frame)
+        if drawn is not None:
+            return drawn  # however the frame is to be: where it is there, full costs nothing
+        few = frame
+        many = window.pace.few_lists and window.single and window.previews(self.state.settings)
+        if many and frame.vdi is not None and frame.view is not None:
+            of = (frame.number, frame.vdi, frame.view.camera, self.device)
+            few = replace(frame, few_lists=self._behind.fewer_lists(*of))
+        size = self.preview_size(few)
+        frame = (frame if size == frame.full_size else few).coarser(size)
+        return (self._images.get(frame) if frame.preview else None) or self._raycast(frame)
+
+    def _frame(self, mapper: Any, renderer: Any) -> tuple[Frame | None, bool]:
+        """Return the frame of what it shows, ``None`` if that is nothing, and if others do, too."""
+        frame = Frame.current(renderer, self._actor.Get(), mapper)
+        window = Window.of(renderer.GetRenderWindow())
+        self._window, self._view = weakref.ref(window), frame.view
+        window.join(self, renderer)
+        shown = volumes(renderer)
+        others = len(shown) > 1
+        if others and any(p.GetMapper() is mapper and p is not frame.actor for p in shown):
+            self._warnings.warn(_BEHIND_ANOTHER)
+        seen = self.decided(frame, joint=others and self._overlapped(frame, shown))
+        if seen is None:
+            return None, others
+        self.box.place(seen.bounds)
+        if isinstance(seen, VolumePicture):
+            return frame.showing(seen, seen.number), others
+        number = self._number_of(seen)
+        if number != self._counted:
+            self._counted = number
+            self._generation += 1
+        return frame.showing(seen, number), others
+
+    def preview_size(self, frame: Frame) -> tuple[int, int]:
+        """Return the size of this frame's image: that of the viewport, or less."""
+        settings, window, renderer = self.state.settings, self.window, frame.renderer
+        pixels = math.prod(frame.full_size)
+        floor = min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2)
+        share = 1.0
+        if frame.volume is not None and frame.volume.placeholder:
+            if settings.previews and not window.takes_picture(renderer):
+                self.state, share = placeholder_share(self.state, pixels)
+                share = max(share, floor)
+        elif not window.previews(settings):
+            window.knows(renderer.GetActiveCamera())
+        elif not window.takes_picture(renderer):
+            each = seconds_per_pixel(self.state.costs, "volume", 0.0)
+            known = frame.volume is not None and each is not None
+            window.pace, share = window.pace.share(
+                window.rate(settings),
+                pixels,
+                floor,
+                frame.cost,
+                effort=frame.effort,
+                expected=each * frame.covered(frame.bounds) if known else None,  # type: ignore[operator]
+            )
+        return reduced(frame.full_size, min(share, 1 / settings.image_distance**2))
+
+    def _raycast(self, frame: Frame) -> Drawn:
+        """Return the image, and tell what it took."""
+        lit_from, parts, volume, window = None, [], frame.volume, self.window
+        if volume is not None and not volume.placeholder and frame.view is not None:
+            # In a window the VDI's light, so that nothing jumps
+            settings = self.state.settings
+            if settings.draw == "volume" or not window.watched_behind(settings):
+                lit_from = frame.view.camera
+        elif self.input is not None:
+            parts = self.input.parts()
+            parts = parts if len(parts) > 1 and parts[0][0] is frame.vdi else []
+        before = now()
+        drawn = self._images.raycast(frame, self.device, parts, lit_from)
+        seconds = now() - before
+        if volume is not None and volume.placeholder:
+            self.tell(PlaceholderTook(math.prod(frame.size), seconds))
+        else:
+            took = (frame.size, frame.full_size, seconds, frame.cost, frame.effort)
+            window.pace = window.pace.drawn(*took)
+        # A volume's first picture has kernels compiled and voxels sent to the device
+        if frame.few_lists is None and (volume is None or volume.pictures > 1):
+            self.tell(FrameTook(frame.way, frame.angle, frame.covered(frame.bounds), seconds))
+        return drawn
+
+    def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
+        """Return what a part of drawing returns, or ``None`` and say what went wrong."""
+        try:
+            return draw(mapper, renderer)
+        except KeyboardInterrupt as interrupt:
+            self._warnings.warn(
+                "generating the VDI was interrupted: what was shown stays; call "
+                "actor.regenerate() to try again"
+            )
+            self._note(interrupt)
+        except Exception as error:  # VTK would swallow it
+            if isinstance(error, InvalidVolumeError):  # as VTK's mappers: there is nothing to see
+                self._last = NOTHING
+                with suppress(VDIError):
+                    self.box.place(None if self.input is None else self.input.bounds())
+            self._warnings.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
+            self._note(error)
+        return None
+
+    def raise_trouble(self) -> None:
+        """Raise, once, what a frame could not be drawn for: VTK's renderer lets nothing through."""
+        trouble, self._trouble = self._trouble, None
+        if trouble is not None:
+            raise trouble
+
+    def _note(self, error: BaseException) -> None:
+        """Keep the first error for :meth:`raise_trouble`, without the frames that it came from."""
+        if self._trouble is None:
+            self._trouble = error.with_traceback(None)
+            error.__cause__ = error.__context__ = None
+
+    # Picks, neighbours, exports and status
+
+    def say_not_exported(self) -> None:
+        """Warn once that a scene which is written for another renderer lacks the VDI.
+
+        Not yet where trame has the scene at hand, and shows the pictures that are drawn here.
+        """
+        renderer = self.renderer()
+        window = None if renderer is None else renderer.GetRenderWindow()
+        if window is None or not self._scene_at_hand.is_all(window):
+            self._say_not_exported()
+
+    def _say_not_exported(self) -> None:
+        self._warnings.warn(
+            "the scene is being exported without its VDI: trame's export_html, export_vtksz and "
+            "views that are rendered in the browser (client-side) get an empty box in its place; "
+            "use plotter.vdi.export_html, screenshots, movies, or server-side rendering"
+        )
+
+    def status(self) -> VDIStatus:
+        """Return how the last frame was drawn, and what goes on."""
+        last, view, window = self._last, self._view, self._window()
+        vdi = None if self.input is None else self.input.last()
+        player = None if self.input is None else self.input.player
+        shown = None if vdi is None or view is None else (vdi, view.camera, view.size)
+        wide, high = last.full_size or (0, 0)
+        number = self._number if vdi is not None and self._numbered() is vdi else None
+        return VDIStatus(
+            mode="none" if last.full_size is None else "preview" if last.preview else "full",
+            samples=last.samples,
+            full_samples=wide * high,
+            fps=None if window is None else window.pace.fps,
+            angle=None if shown is None else angle_from_generating_view(*shown[:2]),
+            magnification=None if shown is None else magnification(*shown),
+            coverage=None if shown is None else coverage(*shown),
+            ssim=ssim_of(self.state, number, view),
+            progress=self._behind.progress,
+            generation=self._generation,
+            vdi=vdi,
+            stand_in=last.placeholder,
+            drawn=last.way,
+            time=None if player is None else player.time,
+        )
+
+    def between_frames(self) -> bool:
+        """Take what was made behind the frames; whether there is another VDI to be drawn."""
+        swapped = super().between_frames()
+        if swapped:
+            # Gone before the frame begins: freeing hundreds of megabytes takes its time
+            self._images.clear()
+        return swapped
+
+    def vdi_asked_for(self) -> VDI | None:
+        """Return the VDI, made now where pictures have been drawn without one or of other data.
+
+        It is of the view that the first picture had, or that somebody chose; ``None`` before.
+        """
+        source = self.input
+        if not isinstance(source, SourceInput):
+            return None if source is None else source.last()
+        if source.source.GetCamera() is not None and source.source.GetWindowSize() is not None:
+            self.tell(VDIAsked(source.last() is not None, source.stamp()))
+        return source.last()
+
+    def vdi_to_pick(self, frame: Frame) -> VDI | None:
+        """Return a VDI that has all of what a view shows; without the volume, that which is there.
+
+        ``None`` where no picture was drawn yet.
+        """
+        vdi, view = self.vdi_asked_for(), frame.view
+        if vdi is not None and view is not None and isinstance(self.input, SourceInput):
+            shown = self.tell(ViewPicked(coverage(vdi, view.camera, view.size)), frame)
+            return shown if isinstance(shown, VDI) else vdi
+        return vdi
+
+    def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
+        """Return what of an actor's VDI a renderer shows at a place of the window, in pixels."""
+        return self._selection.pick(actor, renderer, x, y, self._first_hit)
+
+    @property
+    def _first_hit(self) -> FirstHit:
+        settings = self.state.settings
+        return FirstHit.of(settings.picking_opacity, settings.picking_accumulated)
+
+    def _select(self, mapper: Any, renderer: Any) -> None:
+        """Draw what can be picked of what the last frame showed, or the first would show."""
+        actor, selection = self._actor.Get(), self._selection
+        selection.enter(actor, renderer.GetSelector())
+        seen = None
+        try:
+            frame = Frame.current(renderer, actor, mapper)
+            vdi = self.vdi_to_pick(frame)
+            if vdi is None:
+                self._last = self._paint(mapper, renderer)
+                vdi = self.vdi_to_pick(frame)
+            if vdi is not None:
+                seen = frame.showing(vdi, self._number_of(vdi))
+            selection.show(actor, renderer, seen, self.device, self._first_hit)
+        except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
+            self._warnings.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
+            selection.show(actor, renderer, None, self.device, self._first_hit)
+        self._no_depth.show(renderer.GetRenderWindow(), mapper)
+
+    def _overlapped(self, frame: Frame, shown: list[Any]) -> bool:
+        """Whether one of the volumes that are shown is ours and lies where this one does."""
+        rectangles: list[Any] = []
+        for prop in shown:
+            driver = getattr(prop.GetMapper(), "driver", None)
+            source = driver.input if isinstance(driver, Driver) else None
+            bounds = None if source is None or not prop.GetVisibility() else source.bounds()
+            if bounds is not None:
+                rectangle = Frame.current(frame.renderer, prop, None).rectangle(bounds)
+                rectangles.insert(0 if driver is self else len(rectangles), rectangle)
+        return any(touch(rectangles[0], other) for other in rectangles[1:])
+
+    def beside(self, mapper: Any, renderer: Any) -> Frame | None:
+        """Return the VDI as it is to be seen beside another one; ``None`` if it is not.
+
+        Never raises. What is out of the picture is not brought up to date.
+        """
+        return self._guarded(self._frame_in_picture, mapper, renderer)  # type: ignore[no-any-return]
+
+    def _frame_in_picture(self, mapper: Any, renderer: Any) -> Frame | None:
+        actor = self._actor.Get()
+        bounds = None if self.input is None else self.input.bounds()
+        if actor is None or bounds is None:
+            return None
+        if Frame.current(renderer, actor, mapper).rectangle(bounds) is None:
+            return None
+        frame, _ = self._frame(mapper, renderer)
+        return None if frame is None or frame.volume is not None else frame
+
+    def renderer(self) -> Any:
+        """Return the renderer that is drawing the actor; ``None`` if it has none."""
+        renderers = self.renderers()
+        if len(renderers) > 1:
+            for candidate in renderers:
+                self._watch(candidate)
+            active = self._active.Get()
+            if active in renderers:
+                return active
+            # The first frame that shows the actor twice: tell them apart by their windows, of which
+            # one is drawing, and by their viewports
+            drawing = [r for r in renderers if _is_drawing(r)]
+            viewports = [r for r in drawing if _is_viewport(r)]
+            renderers = viewports or drawing or renderers
+        return renderers[0] if renderers else None
+
+    def renderers(self) -> list[Any]:
+        """Return all renderers that show the actor, by itself or as a part of an assembly."""
+        there = consumers(self._actor.Get())
+        return list(dict.fromkeys(c for c in there if c.IsA("vtkRenderer")))
+
+    def _watch(self, renderer: Any) -> None:
+        """From now on, know which renderer is between its StartEvent and EndEvent."""
+        if not self._watched.is_new(renderer):
+            return
+        active = self._active  # a VTK weak reference: no cycle through the observer
+        renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
+        renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+
+
+def _is_drawing(renderer: Any) -> bool:
+    window = renderer.GetRenderWindow()
+    return window is not None and bool(window.CheckInRenderStatus())
+
+
+def _is_viewport(renderer: Any) -> bool:
+    width, height, x, y = [0], [0], [0], [0]
+    renderer.GetTiledSizeAndOrigin(width, height, x, y)
+    return viewport(renderer) == ((x[0], y[0]), (width[0], height[0]))
+
+
+def _frames(own: Frame) -> list[Frame]:
+    """Return what the renderer shows of VDIs in this frame, in its order."""
+    frames = []
+    props = own.renderer.GetViewProps()
+    for i in range(props.GetNumberOfItems()):
+        prop = props.GetItemAsObject(i)
+        if prop is own.actor:
+            frames.append(own)
+            continue
+        mapper = prop.GetMapper() if isinstance(prop, vtkVolume) and prop.GetVisibility() else None
+        driver = getattr(mapper, "driver", None)
+        frame = driver.beside(mapper, own.renderer) if isinstance(driver, Driver) else None
+        if frame is not None:
+            frames.append(frame)
+    return frames

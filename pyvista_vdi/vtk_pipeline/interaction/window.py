@@ -1,0 +1,276 @@
+"""A render window that shows VDIs: its frames, and what tells how good they are to be.
+
+The only place besides the driver that has a clock. What is chosen by the times of frames is in
+:mod:`pyvista_vdi.quality.pace`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import weakref
+from typing import Any, TypeVar
+
+from pyvista_vdi.quality.frame_state import Settings
+from pyvista_vdi.quality.pace import Pace
+from pyvista_vdi.vtk_pipeline.interaction import browser
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGL2PSHelper, vtkWeakReference
+
+T = TypeVar("T")
+
+#: Cameras remembered per window; more than any scene has viewports that are turned in turn.
+_KNOWN_CAMERAS = 16
+
+_BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressEvent")
+#: Priorities of observers before and after the style's, which is 0.
+_BEFORE, _AFTER = 1.0, -1.0
+
+#: By the windows' addresses; without callbacks, as ``drawing.mapper._drivers`` explains.
+_windows: dict[str, weakref.ref[Window]] = {}
+
+
+def now() -> float:
+    """Return the seconds of the clock that frames are measured by."""
+    return time.perf_counter()
+
+
+class Met:
+    """VTK's objects that were met before, held weakly: another may have an address later."""
+
+    def __init__(self) -> None:
+        self._met: dict[str, vtkWeakReference] = {}
+
+    def is_new(self, thing: Any) -> bool:
+        """Whether this is the first time; from now on it is not."""
+        known = self._met.setdefault(thing.GetAddressAsString(""), vtkWeakReference())
+        new = known.Get() is not thing
+        if new:
+            known.Set(thing)
+        return new
+
+
+class Window:
+    """The frames of one render window; VTK's window owns this object, through its observers.
+
+    Attributes
+    ----------
+    number : int
+        Frames of the window so far.
+    pace : Pace
+        What they have taken.
+    of_frame : dict
+        What those who draw share within a frame; empty between two.
+    """
+
+    def __init__(self, window: Any) -> None:
+        self.number = 0
+        self.pace = Pace()
+        self.of_frame: dict[Any, Any] = {}
+        self._window = vtkWeakReference()
+        self._window.Set(window)
+        self._drivers: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._shared: dict[type, Any] = {}
+        self._watched = Met()
+        self._known: list[vtkWeakReference] = []
+        self._given_up: int | None = None  # the window's multisampling, in a frame without it
+        self._started: float | None = None
+        self._previewed = False
+        self._picture_wanted = False
+        self._foreground = contextlib.ExitStack()  # from the frame's start to its end
+        window.AddObserver("StartEvent", lambda *_: self._start())
+        window.AddObserver("EndEvent", lambda *_: self._end())
+
+    @classmethod
+    def of(cls, window: Any) -> Window:
+        """Return that of a VTK window, made on first use."""
+        address = window.GetAddressAsString("")
+        known = _windows.get(address)
+        found = None if known is None else known()
+        if found is None or found._window.Get() is not window:
+            for gone in [key for key, each in list(_windows.items()) if each() is None]:
+                _windows.pop(gone, None)
+            found = cls(window)
+            _windows[address] = weakref.ref(found)
+        return found
+
+    def shared(self, kind: type[T]) -> T:
+        """Return what those who draw in this window share of a kind, made on first use."""
+        if kind not in self._shared:
+            self._shared[kind] = kind()
+        return self._shared[kind]  # type: ignore[no-any-return]
+
+    def join(self, driver: Any, renderer: Any) -> None:
+        """Note that a driver draws in this window; called in each of its frames."""
+        self._drivers.add(driver)
+        if self._watched.is_new(renderer):
+            weak = weakref.ref(self)
+
+            def camera_changed(*_: Any) -> None:
+                window = weak()
+                if window is not None:
+                    window._camera_changed()
+
+            renderer.AddObserver("ActiveCameraEvent", camera_changed)
+
+    def listen(self, interactor: Any, kind: type[Any]) -> None:
+        """Begin and end what is shared of a kind around what a style does at a press."""
+        if not self._watched.is_new(interactor):
+            return
+        weak = weakref.ref(self)
+
+        def pressed(caller: Any, _: str) -> None:
+            window = weak()
+            if window is not None:
+                window.shared(kind).begin(list(window._drivers), caller)
+
+        def taken(*_: Any) -> None:
+            window = weak()
+            if window is not None:
+                window.shared(kind).end()
+
+        for event in _BUTTONS:
+            interactor.AddObserver(event, pressed, _BEFORE)
+            interactor.AddObserver(event, taken, _AFTER)
+
+    @property
+    def single(self) -> bool:
+        """Whether no other VDI is drawn in this window."""
+        return len(self._drivers) <= 1
+
+    @property
+    def drawing(self) -> bool:
+        """Whether a frame has begun and not ended."""
+        return self._started is not None
+
+    def render(self) -> None:
+        """Draw the window, as from its event loop."""
+        window = self._window.Get()
+        if window is not None and browser.push(window):
+            return
+        interactor = None if window is None else window.GetInteractor()
+        if interactor is not None:
+            interactor.Render()
+
+    # What is seen of it
+
+    def watched_behind(self, settings: Settings) -> bool:
+        """Whether work may go on behind the frames: somebody watches, and can move."""
+        window = self._window.Get()
+        here = bool(window.GetShowWindow()) and window.GetInteractor() is not None
+        return here or self._from_afar(settings)
+
+    def _from_afar(self, settings: Settings) -> bool:
+        on = settings.off_screen
+        return browser.watches(self._window.Get()) if on is None else on
+
+    def rate(self, settings: Settings) -> float:
+        """Return the frames per second to be kept while a hand moves."""
+        return float(settings.target or self._window.Get().GetDesiredUpdateRate())
+
+    def moving(self, settings: Settings) -> bool:
+        """Whether a hand moves, by VTK's convention."""
+        return bool(self._window.Get().GetDesiredUpdateRate() >= settings.update_rate)
+
+    def previews(self, settings: Settings) -> bool:
+        """Whether frames may have fewer rays now: a hand moves, and somebody watches."""
+        if not (settings.previews and self.moving(settings)):
+            return False
+        return bool(self._window.Get().GetShowWindow()) or self._from_afar(settings)
+
+    @property
+    def whole_picture(self) -> bool:
+        """Whether this frame is a whole picture by itself, and not a tile of one."""
+        window = self._window.Get()
+        return window is None or tuple(window.GetTileScale()) == (1, 1)
+
+    def takes_picture(self, renderer: Any) -> bool:
+        """Whether this frame is drawn to be kept: such a frame is always full.
+
+        A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
+        a helper installed.
+        """
+        return self._keeps_picture() or not self.knows(renderer.GetActiveCamera())
+
+    def _keeps_picture(self) -> bool:
+        """Whether this frame is drawn to be kept, whatever its cameras are."""
+        exported = vtkOpenGLGL2PSHelper.GetInstance() is not None
+        return self._picture_wanted or not self.whole_picture or exported
+
+    def knows(self, camera: Any) -> bool:
+        """Whether something was drawn with this camera before; from now on it was."""
+        if any(known.Get() is camera for known in self._known):
+            return True
+        weak = vtkWeakReference()
+        weak.Set(camera)
+        known = [each for each in self._known if each.Get() is not None]
+        self._known = [*known[1 - _KNOWN_CAMERAS :], weak]
+        return False
+
+    # Its frames
+
+    def _start(self) -> None:
+        self._started = now()
+        self.of_frame.clear()
+        self.number += 1
+        # Between two frames only: no frame shows two generations, nor does a picture in tiles
+        drivers = list(self._drivers)
+        if self.whole_picture:
+            for driver in drivers:
+                driver.between_frames()
+        self._foreground.close()
+        for runtime in {driver.runtime() for driver in drivers}:
+            self._foreground.enter_context(runtime.foreground())
+        window = self._window.Get()
+        samples = window.GetMultiSamples()
+        if samples and self.pace.dear_samples and self._may_go_without(window, drivers):
+            self._given_up, samples = samples, 0
+            window.SetMultiSamples(0)
+        self.pace = self.pace.began(samples)
+
+    def _may_go_without(self, window: Any, drivers: list[Any]) -> bool:
+        """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
+        shown = [
+            (driver.state.settings, renderer)
+            for driver in drivers
+            for renderer in driver.renderers()
+            if renderer.GetRenderWindow() is window and driver.actor.GetVisibility()
+        ]
+        cameras = [known.Get() for known in self._known]
+        return bool(shown) and all(
+            settings.adjust_multi_samples
+            and self.previews(settings)
+            and not self._keeps_picture()
+            and renderer.GetActiveCamera() in cameras
+            for settings, renderer in shown
+        )
+
+    def _end(self) -> None:
+        window = self._window.Get()
+        given_up, self._given_up = self._given_up, None
+        if given_up is not None and not window.GetMultiSamples():  # it is as it was left here
+            window.SetMultiSamples(given_up)
+        self._foreground.close()
+        self.of_frame.clear()
+        started, self._started = self._started, None
+        self._previewed = self.pace.frame.preview or given_up is not None
+        seconds = None if started is None else now() - started
+        moving = any(self.moving(driver.state.settings) for driver in self._drivers)
+        self.pace = self.pace.ended(seconds, moving)
+
+    def _camera_changed(self) -> None:
+        """Replace a preview on the screen by the full frame before a screenshot reads it.
+
+        ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and
+        may then take the picture that is on the screen, as ``Plotter.screenshot`` has it.
+        """
+        window = self._window.Get()
+        if not self._previewed or self._started is not None or window is None:
+            return
+        interactor = window.GetInteractor()
+        if interactor is not None and not interactor.GetEnableRender():
+            return  # it is being closed
+        self._picture_wanted = True
+        try:
+            window.Render()
+        finally:
+            self._picture_wanted = False

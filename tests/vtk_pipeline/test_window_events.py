@@ -1,0 +1,344 @@
+"""Each row of docs/window_events.md: what a window shows after an event, by pictures and status."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
+from skimage.metrics import structural_similarity
+from watched_windows import (
+    MOVING,
+    WINDOW,
+    finish,
+    frame,
+    frames,
+    frames_until,
+    picture_of,
+    small_vdi,
+    threads,
+    turned,
+    watched,
+)
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import DeviceError, VDIWarning
+from pyvista_vdi.quality import background
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
+
+pytestmark = pytest.mark.gl
+
+CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
+
+#: What the table calls an event -> its test.
+EVENTS = {}
+
+
+def row(event):
+    def add(test):
+        assert event not in EVENTS
+        EVENTS[event] = test
+        return test
+
+    return add
+
+
+def auto(plotter, **options):
+    """A ball as ``add_vdi`` draws it by default, in a window that is watched."""
+    return watched(plotter, **{"draw": "auto", "regenerate": "auto", **options})
+
+
+def off_screen(plotter, **options):
+    """The same in a window that nobody watches."""
+    actor = plotter.add_vdi(soft_ball(), **{**LOOKS, **options})
+    plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))
+    plotter.show(auto_close=False)
+    return actor
+
+
+def differs(a, b):
+    return np.abs(a - b).max() > 8
+
+
+def looks_like(picture, actor, plotter):
+    """Whether a picture, perhaps of fewer rays, is that of the ball with the colours of now."""
+    looks = {**CLASSIFICATION, "cmap": actor.mapper.lookup_table.cmap.name}
+    truth = picture_of(soft_ball(), plotter, **looks)
+    return structural_similarity(picture, truth, channel_axis=2, data_range=255) > 0.96
+
+
+@row("nothing was drawn yet")
+def test_first(plotter, gate):
+    actor = auto(plotter)
+    assert (actor.status.drawn, actor.status.generation) == ("volume", 0)
+    assert actor.status.progress == 0.0
+    other = pv.Plotter(window_size=WINDOW)
+    still = off_screen(other)
+    assert (still.status.drawn, still.status.generation) == ("volume", 0)
+    assert still.status.progress is None
+    np.testing.assert_array_equal(frame(plotter), frame(other))
+    other.close()
+
+
+@row("the VDI made behind the frames is ready")
+def test_ready(plotter, gate):
+    actor = watched(plotter, regenerate=lambda status: status.angle > 20)
+    before = turned(plotter, 40)
+    assert (actor.status.progress, actor.status.generation) == (0.0, 1)
+    gate.set()
+    *earlier, last = frames_until(plotter, lambda: actor.status.generation == 2)
+    assert all(np.array_equal(picture, before) for picture in earlier)
+    np.testing.assert_array_equal(last, picture_of(actor.vdi, plotter))
+
+
+@row("the view moves")
+def test_moves(plotter, coarsest):
+    actor = auto(plotter)
+    turned(plotter, 3, MOVING)
+    assert actor.status.mode == "preview"
+    actor.mapper.SetInteractiveOffScreen(False)
+    turned(plotter, 3, MOVING)
+    assert actor.status.mode == "full"
+
+
+@row("the view rests")
+def test_rests(plotter, coarsest):
+    actor = watched(plotter)
+    full = frame(plotter)
+    assert differs(turned(plotter, 30, MOVING), full)
+    plotter.camera.Azimuth(-30)
+    np.testing.assert_array_equal(frame(plotter), full)
+    assert (actor.status.mode, actor.status.share) == ("full", 1.0)
+
+
+@row("the view has moved where the VDI's picture is poor")
+def test_poor(plotter, gate, no_estimates):
+    actor = watched(plotter, regenerate="auto")
+    no_estimates.ssim = 0.5
+    before = turned(plotter, 60)
+    frames_until(plotter, lambda: actor.status.progress is not None)
+    np.testing.assert_array_equal(frame(plotter), before)
+    gate.set()
+    frames_until(plotter, lambda: actor.status.generation == 2)
+    assert actor.status.angle < 1e-6
+
+
+@row("data or look change")
+@pytest.mark.parametrize("show", [auto, watched, off_screen])
+def test_changes(plotter, gate, show):
+    actor = show(plotter)
+    before = frame(plotter)
+    actor.mapper.lookup_table.cmap = "inferno"
+    after = frame(plotter)
+    assert differs(after, before)
+    assert looks_like(after, actor, plotter)
+    assert actor.status.stand_in == (show is watched)
+    assert (actor.status.progress is None) == (show is off_screen)
+
+
+@row("it changes again while a VDI is made")
+def test_changes_again(plotter, gate):
+    actor = watched(plotter)
+    for cmap in ("inferno", "bone", "viridis_r"):
+        actor.mapper.lookup_table.cmap = cmap
+        assert looks_like(frame(plotter), actor, plotter)
+        assert len(threads()) == 1
+    gate.set()
+    frames_until(plotter, lambda: actor.status.generation == 2)
+    assert looks_like(frame(plotter), actor, plotter), "another one was shown"
+    assert actor.status.progress is None
+
+
+@row("a change is taken back")
+def test_taken_back(plotter, gate):
+    actor = watched(plotter)
+    before, vdi = frame(plotter), actor.vdi
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.status.progress == 0.0
+    actor.prop.interpolation_type = "nearest"
+    np.testing.assert_array_equal(frame(plotter), before)
+    assert (actor.status.progress, actor.vdi) == (None, vdi)
+
+
+@row("making a VDI fails")
+def test_fails(plotter, monkeypatch):
+    actor = watched(plotter)
+    tries = []
+
+    def fail(*_, **__):
+        tries.append(1)
+        raise DeviceError("no more")
+
+    monkeypatch.setattr(background, "generate_by_dial", fail)
+    actor.mapper.lookup_table.cmap = "inferno"
+    with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more") as said:
+        frames_until(plotter, lambda: said)
+    frames(plotter, 3)  # warnings are errors: it is not said again
+    assert len(tries) == 1
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    finish()
+    frame(plotter)
+    assert len(tries) == 2
+    monkeypatch.undo()
+    actor.regenerate()
+    assert not differs(frame(plotter), picture_of(actor.vdi, plotter))
+
+
+@row("clipping planes, cropping or the opacity multiplier are set")
+@pytest.mark.parametrize("show", [watched, off_screen])
+def test_clips(plotter, show):
+    actor = show(plotter)
+    vdi, before = actor.vdi, frame(plotter)
+    plane = vtkPlane()
+    plane.SetNormal(0, 1, 0)
+    actor.mapper.AddClippingPlane(plane)
+    clipped = frame(plotter)
+    actor.opacity_multiplier = 0.3
+    thin = frame(plotter)
+    assert differs(clipped, before)
+    assert differs(thin, clipped)
+    assert (actor.vdi is vdi, actor.status.progress) == (True, None)
+
+
+@row("a picture is taken while the view moves")
+def test_picture(plotter, coarsest):
+    actor = watched(plotter)
+    full = turned(plotter, 20)
+    turned(plotter, -20, MOVING)
+    turned(plotter, 20, MOVING)
+    assert actor.status.mode == "preview"
+    shot = plotter.screenshot(return_img=True).astype(int)
+    assert actor.status.mode == "full"
+    np.testing.assert_array_equal(shot, full)
+    turned(plotter, 5, MOVING)
+    assert actor.status.mode == "preview"
+
+
+@row("something is picked")
+@pytest.mark.parametrize("show", [watched, off_screen])
+def test_picked(plotter, show):
+    actor = show(plotter)
+    before = frame(plotter)
+    hit = actor.pick(WINDOW[0] // 2, WINDOW[1] // 2)
+    assert hit.position[0] > 0  # the side that is seen
+    np.testing.assert_array_equal(frame(plotter), before)
+
+
+@row("two volumes overlap in the picture")
+@pytest.mark.parametrize("seen", [True, False])
+def test_overlap(seen):
+    pictures = []
+    for order in (1, -1):
+        plotter = pv.Plotter(window_size=WINDOW)
+        for shift in (0.0, 0.9)[::order]:
+            actor = plotter.add_vdi(soft_ball(16), regenerate="never", **LOOKS)
+            actor.position = (shift, 0.3, 0)
+            actor.mapper.SetInteractiveOffScreen(seen)
+        plotter.camera_position = ((6, 1, 0), (0, 0, 0), (0, 0, 1))
+        plotter.show(auto_close=False)
+        pictures.append(frame(plotter))
+        assert {each.status.drawn for each in plotter.actors.values()} == {"vdi"}
+        plotter.close()
+    assert not differs(*pictures)
+
+
+@row("two renderers show one actor")
+def test_two_renderers(gate):
+    gate.set()
+    plotter = pv.Plotter(window_size=WINDOW, shape=(1, 2))
+    actor = plotter.add_vdi(soft_ball(), draw="vdi", **LOOKS)
+    plotter.subplot(0, 1)
+    plotter.add_actor(actor)
+    actor.mapper.SetInteractiveOffScreen(True)
+    plotter.show(auto_close=False)
+    vdi = actor.vdi
+    turned(plotter, 60)
+    assert (actor.vdi is vdi, actor.status.progress) == (True, None)
+    actor.prop.interpolation_type = "linear"
+    frame(plotter)
+    assert actor.vdi is not vdi
+    assert gate.begun == 0
+    plotter.close()
+
+
+@row("a series plays")
+def test_plays(plotter):
+    actor = plotter.add_vdi(pvdi.VDISeries.of([small_vdi() for _ in range(3)]))
+    actor.mapper.SetInteractiveOffScreen(True)
+    plotter.show(auto_close=False)
+    actor.play(rate=200)
+    seen = set()
+    frames_until(plotter, lambda: seen.add(actor.step) or len(seen) == 3)
+    actor.pause()
+    finish("series")
+    step = actor.step
+    frames(plotter, 3)
+    assert actor.step == step
+
+
+@row("a set of VDIs is turned")
+def test_set(plotter):
+    cameras = [pvdi.Camera((5, y, 0), (0, 0, 0), (0, 0, 1)) for y in (-4, 4)]
+    vdis = [pvdi.generate(soft_ball(12), each, (60, 50), **CLASSIFICATION) for each in cameras]
+    actor = plotter.add_vdi(pvdi.VDISet.of(vdis), regenerate="never", show_scalar_bar=False)
+    actor.mapper.SetInteractiveOffScreen(True)
+    for camera, vdi in zip(cameras, vdis, strict=True):
+        plotter.camera_position = (camera.position, (0, 0, 0), (0, 0, 1))
+        plotter.show(auto_close=False)
+        frame(plotter)
+        assert actor.vdi.camera.position == pytest.approx(vdi.camera.position)
+
+
+@row("the window is closed")
+def test_closed(gate):
+    plotter = pv.Plotter(window_size=WINDOW)
+    actor = auto(plotter)
+    assert actor.status.progress == 0.0
+    plotter.close()
+    assert actor.status.progress is None
+    assert not [name for name in ("generation", "estimate", "stand-in") if threads(name)]
+
+
+@row("it is shown again in another window")
+def test_again(plotter):
+    first = pv.Plotter(window_size=WINDOW)
+    actor = watched(first)
+    before = frame(first)
+    first.close()
+    plotter.add_actor(actor)
+    plotter.camera_position = ((6, 0, 0), (0, 0, 0), (0, 0, 1))
+    plotter.show(auto_close=False)
+    np.testing.assert_array_equal(frame(plotter), before)
+    assert actor.status.generation == 1
+
+
+def test_the_page_has_these_events():
+    page = (CHECKOUT / "docs" / "window_events.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (.+?) \|", page, re.MULTILINE)
+    assert [each for each in rows if each not in ("event", "---")] == list(EVENTS)
+
+
+#: Where there may be threads, locks, clocks and weak references: what drives the frames of a mapper
+#: and a window, and what VTK's or trame's objects must not be kept alive by.
+DRIVING = {
+    "drawing": {"deciding", "driver", "mapper"},
+    "interaction": {"behind", "browser", "status", "timer", "window"},
+}
+
+
+@pytest.mark.parametrize("room", DRIVING)
+def test_nothing_but_the_driver_has_threads_locks_clocks_or_weak_references(room):
+    for path in sorted((CHECKOUT / "pyvista_vdi" / "vtk_pipeline" / room).glob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        imports = [n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
+        names = {each.name for node in imports for each in node.names}
+        names |= {str(node.module) for node in imports if isinstance(node, ast.ImportFrom)}
+        driving = {"time", "threading", "weakref", "asyncio", "vtkWeakReference", "Worker"}
+        assert path.stem in DRIVING[room] or not names & driving, path.name
