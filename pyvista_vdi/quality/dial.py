@@ -294,7 +294,7 @@ class Choice:
 
 
 def describe(metadata: dict[str, Any]) -> str | None:
-    """Return, in one line, what the dial chose for a VDI with such metadata; ``None`` without one."""
+    """Return a line on what the dial chose for a VDI with such metadata; ``None`` without one."""
     dial: Any = metadata.get("dial")
     try:
         chosen, predicted = dial["chosen"], dial["predicted"]
