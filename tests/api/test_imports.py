@@ -81,7 +81,7 @@ LEVELS_WITHIN = {
 
 #: Rooms that need VTK or PyVista in order to be imported.
 WITH_VTK = (
-    *("vtk_pipeline", "plotting", "extensions.paraview.plugin", "extensions.web.scenes"),
+    *("vtk_pipeline", "plotting", "extensions.paraview", "extensions.web.scenes"),
     *("extensions.series.pyvista_reader", "extensions.series.shown", "extensions.sets.shown"),
     "extensions.large.vtk_ranks",
 )
