@@ -15,7 +15,8 @@ import pyvista_vdi
 from pyvista_vdi import registry
 
 TESTS = Path(__file__).parents[1]
-FOLDERS = ("api", "cli", "io", "model", "generation", "raycasting", "plotting", "vtk_pipeline")
+#: Tests of the core: those that name what extensions add, and those run without any extension.
+NAMING, OTHERS = "api cli io", "model generation raycasting plotting vtk_pipeline"
 
 
 def gone_with(name):
@@ -27,7 +28,7 @@ def gone_with(name):
 def without(tmp_path):
     """What makes a copy of package and tests without an extension."""
 
-    def copy(name):
+    def copy(*names):
         ignored = shutil.ignore_patterns("__pycache__", "opencl")
         package = Path(pyvista_vdi.__file__).parent
         shutil.copytree(package, tmp_path / "pyvista_vdi", ignore=ignored)
@@ -35,8 +36,9 @@ def without(tmp_path):
         shutil.copytree(kernels, tmp_path / "pyvista_vdi" / "opencl")
         shutil.copytree(TESTS, tmp_path / "tests", ignore=shutil.ignore_patterns("__pycache__"))
         shutil.copy(TESTS.parent / "pyproject.toml", tmp_path)
-        shutil.rmtree(tmp_path / "pyvista_vdi" / "extensions" / name)
-        for each in gone_with(name):
+        for name in names:
+            shutil.rmtree(tmp_path / "pyvista_vdi" / "extensions" / name)
+        for each in {each for name in names for each in gone_with(name)}:
             shutil.rmtree(tmp_path / "tests" / "extensions" / each)
         return tmp_path
 
@@ -44,13 +46,14 @@ def without(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(registry.extensions()))
+@pytest.mark.parametrize("name", [*registry.extensions(), "all of them"])
 def test_the_cores_tests_pass_without(name, without):
-    place = without(name)
-    folders = [f"tests/{folder}" for folder in FOLDERS]
+    every = name == "all of them"
+    place = without(*registry.extensions()) if every else without(name)
+    folders = f"{NAMING} {OTHERS}" if every else NAMING
     command = [sys.executable, "-m", "pytest", "-q", "-n0", "-m", "fast", "-p", "no:cacheprovider"]
     done = subprocess.run(
-        [*command, *os.environ.get("PYVISTA_VDI_TEST_FOLDERS", " ".join(folders)).split()],
+        [*command, *(f"tests/{folder}" for folder in folders.split())],
         cwd=place,
         env={**os.environ, "PYTHONPATH": str(place)},
         capture_output=True,
