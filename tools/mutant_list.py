@@ -313,7 +313,7 @@ KERNEL_MUTANTS = (
     ),
     _m(
         "multi_vdi: owned by the last that covers",
-        "opencl/multi_vdi/merge.cl",
+        "opencl/cpu16/merge.cl",
         "meets > grades",
         "meets >= grades",
     ),

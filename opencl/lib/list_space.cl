@@ -1,5 +1,5 @@
 // V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight
-// (docs/conventions.md, "List space").
+// (docs/conventions.md, "List coordinates").
 //
 // u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth:
 //

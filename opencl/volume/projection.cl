@@ -1,5 +1,5 @@
 // Projections of a volume, the blend modes of volume rendering beside compositing: along a ray, the greatest or the least
-// scalar, classified; or the mean or the integral of opacity times scalar, as a grey value (docs/conventions.md, "Projections").
+// scalar, classified; or the mean or the integral of opacity times scalar, as a grey value (docs/conventions.md, "Blending").
 //
 // -D BLEND_MODE: which of them
 #include "volume/cropped_march.cl"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device.constants import STRIP
+from pyvista_vdi.model.ray_forms import Rectangle
 
 #: Work-items per group: four blocks.
 GROUP = 64
@@ -15,20 +14,6 @@ GROUP = 64
 _BLOCK = 4
 #: Rays of a block, which kernels written out in vectors follow in one work-item.
 BLOCK_RAYS = _BLOCK * _BLOCK
-
-
-class Rectangle(NamedTuple):
-    """Pixels of a window, the last ones excluded; y = 0 is the bottom row."""
-
-    x0: int
-    x1: int
-    y0: int
-    y1: int
-
-    @property
-    def pixels(self) -> int:
-        """How many there are."""
-        return max(self.x1 - self.x0, 0) * max(self.y1 - self.y0, 0)
 
 
 def part_columns(part: Rectangle) -> NDArray[np.int32]:

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import RUN_WORDS
-from pyvista_vdi.device.ray_forms import check_list_space
-from pyvista_vdi.device.work_order import GROUP, Rectangle, block_items
+from pyvista_vdi.device.work_order import GROUP, block_items
 from pyvista_vdi.generation.kernels import (
     CUT_LISTS,
     PACK_LISTS,
@@ -23,6 +22,7 @@ from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.ray_forms import Rectangle, check_list_space
 from pyvista_vdi.volume.rays import GridRays
 from pyvista_vdi.volume.variant import RayLaunch
 

@@ -13,12 +13,13 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.packing import Packed8, Packed16
+from pyvista_vdi.model.vdi import VDI
 
 #: Share of the way to the middle of the bounds at which their corners are looked at.
 _INNER = 0.5
 
 
-def subsampled_lists(vdi: Any, along_x: int = 1, along_y: int = 1) -> Any:
+def subsampled_lists(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     """Return a VDI of every k-th list along each edge: the same lists, of the same rays.
 
     A list stands for its neighbours, too. From the side a ray crosses a k-th of the lists, which
@@ -62,7 +63,7 @@ def subsampled_lists(vdi: Any, along_x: int = 1, along_y: int = 1) -> Any:
     return result
 
 
-def coarser(vdi: Any, step: int = 4) -> Any:
+def coarser(vdi: VDI, step: int = 4) -> VDI:
     """Return a VDI of every ``step``-th list along each edge, of the same view.
 
     A list of the result is the one of ``vdi`` that the middle of its pixel lies in. The medium of
@@ -96,7 +97,7 @@ def coarser(vdi: Any, step: int = 4) -> Any:
     return _of_rows(vdi, camera, window, offsets, rows, tau.astype(np.float32))
 
 
-def lists_crossed(vdi: Any, camera: Camera) -> NDArray[np.float64]:
+def lists_crossed(vdi: VDI, camera: Camera) -> NDArray[np.float64]:
     """Return how many lists rays of a view cross along the window's width and height, float64 (2,).
 
     The mean of nine rays that go through the bounds, over a length of half their diagonal.
@@ -125,7 +126,7 @@ def lists_crossed(vdi: Any, camera: Camera) -> NDArray[np.float64]:
 
 
 def _rows_of(
-    vdi: Any, lists: NDArray[np.int64], counts: NDArray[np.int64]
+    vdi: VDI, lists: NDArray[np.int64], counts: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return offsets of some lists one after the other, and which supersegments are theirs."""
     offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -134,17 +135,17 @@ def _rows_of(
 
 
 def _of_rows(
-    vdi: Any,
+    vdi: VDI,
     view: Camera,
     window: tuple[int, int],
     offsets: NDArray[np.int64],
     rows: NDArray[np.int64],
     optical_depth: NDArray[np.float32],
-) -> Any:
+) -> VDI:
     """Return the VDI of some supersegments, without metadata."""
     arrays: dict[str, Any] = {name: getattr(vdi, name)[rows] for name in ("front", "back", "color")}
     arrays |= {"bounds": vdi.bounds, "depth_origin": vdi.depth_origin}
-    return type(vdi)(view, window, offsets, optical_depth=optical_depth, **arrays)
+    return VDI(view, window, offsets, optical_depth=optical_depth, **arrays)
 
 
 def _length_per_depth(

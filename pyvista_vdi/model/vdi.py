@@ -15,7 +15,6 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
-from pyvista_vdi.model.list_subsampling import subsampled_lists
 from pyvista_vdi.model.packing import Packed8, Packing, check_precision, packing_of
 
 if TYPE_CHECKING:
@@ -280,7 +279,7 @@ class VDI:
 
         See :func:`pyvista_vdi.model.list_subsampling.subsampled_lists`.
         """
-        return subsampled_lists(self, along_x, along_y)  # type: ignore[no-any-return]
+        return registry.method("VDI.thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file that `pyvista_vdi.read` opens.

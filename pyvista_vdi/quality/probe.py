@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import SSIM_WINDOW, ListEdges, list_edges, list_places
 from pyvista_vdi.model.options import GenerationRequest, QualityTarget

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background

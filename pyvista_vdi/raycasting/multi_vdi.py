@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padded
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS, SEGMENT_SIZE, SPARE_SLOTS
-from pyvista_vdi.device.ray_forms import cells_of_points
-from pyvista_vdi.device.work_order import GROUP, Rectangle
+from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model.ray_forms import Rectangle, cells_of_points
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
@@ -143,7 +143,7 @@ class _Cells:
     def of(cls, scenes: Sequence[Scene], size: tuple[int, int]) -> _Cells:
         # Whether or not rays pass by what is empty: the picture is the same
         corners = [(scene.camera, size, scene.prepared.occupancy.corners) for scene in scenes]
-        met = np.array([cells_of_points(*points) for points in corners])
+        met = np.array([cells_of_points(*points, CELL) for points in corners])
         count = met.sum(axis=0)
         alone = np.choose(
             np.minimum(count, 2), [np.full_like(count, cls.NOBODY), met.argmax(axis=0), cls.SHARED]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.kernels import (

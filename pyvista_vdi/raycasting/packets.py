@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device.constants import STEEPEST
-from pyvista_vdi.device.ray_forms import inverse_affine
-from pyvista_vdi.device.work_order import BLOCK_RAYS, Rectangle
+from pyvista_vdi.device.work_order import BLOCK_RAYS
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.ray_forms import Rectangle, inverse_affine
 from pyvista_vdi.model.vdi import VDI
 
 #: Rays of a packet, side by side.

@@ -15,8 +15,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, as_float, as_range
 from pyvista_vdi.model.compositing import opacity

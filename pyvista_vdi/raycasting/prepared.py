@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import BUNDLE, FIRST_BITS, LIST_HEADER
 from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
 from pyvista_vdi.model.packing import Packed8, Packed16

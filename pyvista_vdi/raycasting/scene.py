@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import PLANE_FORMS
-from pyvista_vdi.device.work_order import Rectangle
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.raycasting.aligned_view import AlignedView, aligned_view
 from pyvista_vdi.raycasting.kernels import FRAME

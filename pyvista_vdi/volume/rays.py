@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import ray_forms as rays
-from pyvista_vdi.device.ray_forms import Floats, PixelRays, packed, packed_double_float
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import MOST_STEPS, entries
 from pyvista_vdi.model.grid import Geometry
+from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed, packed_double_float
 from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.volume.kernels import RAYS
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.work_order import block_items
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest

@@ -23,7 +23,7 @@ SIZE = (45, 37)
 
 #: Modules that launch kernels by groups of :data:`pyvista_vdi.device.work_order.GROUP`.
 LAUNCHING = (
-    "device.steps",
+    "volume.variant",
     "device.work_order",
     "raycasting.occupancy",
     "raycasting.prepared",

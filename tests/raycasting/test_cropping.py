@@ -15,7 +15,7 @@ from oracle import assert_explained, total
 from ray_scenes import random_cropping, random_ends, random_planes
 
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.cropping import PRESETS, Cropping
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.reference.raycast import kept_parts

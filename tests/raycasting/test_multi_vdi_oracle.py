@@ -20,7 +20,7 @@ from ray_scenes import random_ends, with_some
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, Cropping, InvalidArgumentError, reference
-from pyvista_vdi.device.ray_forms import cells_of_points
+from pyvista_vdi.model.ray_forms import cells_of_points
 from pyvista_vdi.raycasting import multi_vdi
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid
 from pyvista_vdi.raycasting.placed import PlacedVDI
@@ -272,7 +272,7 @@ def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisi
     shown = {"opaque_depth": depth, "device": runtime}
     met = np.array(
         [
-            cells_of_points(one.camera, size, prepared_vdi(runtime, one.vdi).occupancy.corners)
+            cells_of_points(one.camera, size, prepared_vdi(runtime, one.vdi).occupancy.corners, 16)
             for one in placed
         ]
     )
@@ -308,7 +308,7 @@ def test_nothing_is_met_beside_a_vdi_s_cells(default_runtime):
         camera, _ = strategies.random_view(rng, vdi, strategies.VIEWS[seed % len(strategies.VIEWS)])
         size = (int(rng.integers(1, 150)), int(rng.integers(1, 120)))
         corners = prepared_vdi(default_runtime, vdi).occupancy.corners
-        met = cells_of_points(camera, size, corners)
+        met = cells_of_points(camera, size, corners, 16)
         assert met.shape == (-(-size[1] // 16), -(-size[0] // 16))
         image = render_vdi(vdi, camera, size, skip_empty=False, device=default_runtime)
         assert not image[~of_cells(met, size)].any(), seed

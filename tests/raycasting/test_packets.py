@@ -16,7 +16,7 @@ from extreme_scenes import slabs_vdi
 
 from pyvista_vdi import VDI, Camera
 from pyvista_vdi.device import Launch
-from pyvista_vdi.device import ray_forms as rays
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.raycasting import packets
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit

@@ -22,8 +22,8 @@ from extreme_scenes import slabs_vdi
 from ray_scenes import generating_view, random_ends, rebuilt, with_lists
 
 from pyvista_vdi import VDI, Camera
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.device.constants import SLABS, STACK
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.raycasting.occupancy import OccupancyGrid
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 

@@ -21,8 +21,8 @@ from watched_windows import (
 )
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.device.ray_forms import pixel_rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.ray_forms import pixel_rays
 from pyvista_vdi.quality import render_mode
 from pyvista_vdi.vtk_pipeline.drawing import few_lists
 from pyvista_vdi.vtk_pipeline.drawing import painter as painter_module

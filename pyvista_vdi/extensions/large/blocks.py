@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.grid import Geometry, Grid
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.volume.grid_part import GridPart
 

@@ -16,7 +16,6 @@ from distributed.protocol.pickle import dumps, loads
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import (
     Cancelled,
     DeviceError,
@@ -29,6 +28,7 @@ from pyvista_vdi.extensions.large.blocks import Indices, Values
 from pyvista_vdi.extensions.large.passes import Opacities, Piece, Rows, Seen, Task
 from pyvista_vdi.extensions.large.reading import Read
 from pyvista_vdi.model.chunked import ChunkedArray
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.store_identity import StoreIdentity, check_once, identity_of
 
 #: Errors that keep their type where they say which block they are of.

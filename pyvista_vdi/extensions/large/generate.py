@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, Indices
 from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task, light_entering
@@ -16,6 +15,7 @@ from pyvista_vdi.generation.generate import made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.model.chunked import ChunkedArray, Ranges
 from pyvista_vdi.model.options import GenerationRequest
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 

@@ -24,7 +24,6 @@ from distributed import (
 )
 from numpy.typing import NDArray
 
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import (
     DeviceError,
     InvalidVolumeError,
@@ -47,6 +46,7 @@ from pyvista_vdi.extensions.large.reading import Plan, Read
 from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.generation.generate import Progress, report
 from pyvista_vdi.model.options import GenerationRequest
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.store_identity import StoreIdentity
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume

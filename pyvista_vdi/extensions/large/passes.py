@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.device.buffers import bytes_text
 from pyvista_vdi.device.constants import RUN_WORDS
-from pyvista_vdi.device.work_order import GROUP, Rectangle, block_items
+from pyvista_vdi.device.work_order import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.extensions.large.blocks import Blocks, Ends, Halo, Indices, Values, ends_of
 from pyvista_vdi.extensions.large.kernels import (
@@ -36,6 +36,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.float32_limits import held_unit_distance
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume

@@ -12,13 +12,13 @@ from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_o
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Shading, TransferFunction, Volume
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError
 from pyvista_vdi.extensions.large.blocks import Blocks, Halo
 from pyvista_vdi.extensions.large.generate import task_of
 from pyvista_vdi.extensions.large.passes import Piece, light_entering
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA
+from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.quality.probe import turned
 
 HALOS = [Halo(0, 1), Halo(1, 3)]

@@ -9,8 +9,8 @@ import pytest
 from strategies import camera_around, random_bounds, random_transform, world_corners
 
 from pyvista_vdi import Camera
-from pyvista_vdi.device import ray_forms as rays
 from pyvista_vdi.errors import InvalidCameraError
+from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.render_options import RenderOptions
 
 EPS64 = np.finfo(np.float64).eps

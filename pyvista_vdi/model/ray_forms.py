@@ -10,17 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.device import aligned_empty
-from pyvista_vdi.device.constants import CELL
-from pyvista_vdi.device.work_order import Rectangle
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.host_memory import aligned_empty
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -34,6 +32,20 @@ _AXES = np.eye(3)
 
 #: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
 LARGEST_PRODUCT = 1e36
+
+
+class Rectangle(NamedTuple):
+    """Pixels of a window, the last ones excluded; y = 0 is the bottom row."""
+
+    x0: int
+    x1: int
+    y0: int
+    y1: int
+
+    @property
+    def pixels(self) -> int:
+        """How many there are."""
+        return max(self.x1 - self.x0, 0) * max(self.y1 - self.y0, 0)
 
 
 @dataclass(frozen=True)
@@ -316,14 +328,14 @@ def _pixels_at(camera: Camera, window_size: tuple[int, int], points: Floats) -> 
 
 
 def cells_of_points(
-    camera: Camera, window_size: tuple[int, int], points: Floats
+    camera: Camera, window_size: tuple[int, int], points: Floats, cell: int
 ) -> NDArray[np.bool_]:
-    """Return which cells of a window the convex hull of model points may lie in.
+    """Return which cells, so many pixels wide, the hull of model points may lie in.
 
     bool (high, wide), bottom row first: those that two pixels more than the hull reach into, or
     all of them, if a point is not in front of the eye.
     """
-    wide, high = (-(-edge // CELL) for edge in window_size)
+    wide, high = (-(-edge // cell) for edge in window_size)
     if not len(points):
         return np.zeros((high, wide), np.bool_)
     at = _pixels_at(camera, window_size, points)
@@ -333,8 +345,8 @@ def cells_of_points(
     angles = np.arange(_TANGENTS) * (2 * np.pi / _TANGENTS)
     normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     reach = (normals @ at).max(axis=1) + 2
-    x, y = (np.arange(n) * CELL + CELL / 2 for n in (wide, high))
-    nearest = np.abs(normals).sum(axis=1) * CELL / 2  # a cell's corner, from its centre
+    x, y = (np.arange(n) * cell + cell / 2 for n in (wide, high))
+    nearest = np.abs(normals).sum(axis=1) * cell / 2  # a cell's corner, from its centre
     beyond = normals[:, 0, None, None] * x + normals[:, 1, None, None] * y[:, None]
     return np.asarray((beyond - nearest[:, None, None] <= reach[:, None, None]).all(axis=0))
 
