@@ -13,6 +13,7 @@ from drawing import generate_vdi, raycast_volume, render_vdi
 from runtimes import fresh_runtime
 
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
+from pyvista_vdi.device import Launch
 from pyvista_vdi.errors import (
     Cancelled,
     DeviceMemoryError,
@@ -267,7 +268,7 @@ def test_a_window_beyond_memory_is_refused_before_anything_is_drawn(
     limited(runtime, monkeypatch, buffer=2**30, total=2**31)
     before, peak = runtime.allocated, runtime.peak_allocated
     started = []
-    monkeypatch.setattr(type(runtime), "launch", lambda *args, **_: started.append(args))
+    monkeypatch.setattr(Launch, "__call__", lambda *args, **_: started.append(args))
     message = "'image' needs 64.00 GiB.*allows 1.00 GiB.*per buffer.*window size"
     with pytest.raises(DeviceMemoryError, match=message):
         view(window_size=(65536, 65536))
