@@ -18,6 +18,8 @@ nox.options.reuse_existing_virtualenvs = True
 nox.options.sessions = ["lint", "fast"]
 
 CHECKOUT = Path(__file__).parent
+#: Another version formats otherwise; also in pyproject.toml and .pre-commit-config.yaml.
+CLANG_FORMAT = "clang-format==23.1.5"
 
 
 @nox.session
@@ -54,10 +56,12 @@ def coverage(session: nox.Session) -> None:
 @nox.session
 def lint(session: nox.Session) -> None:
     """Check style, formatting and spelling, as pre-commit does."""
-    session.install("ruff>=0.15", "codespell[toml]>=2.3")
+    session.install("ruff>=0.15", "codespell[toml]>=2.3", CLANG_FORMAT)
     session.run("ruff", "check", "--no-cache", ".")
     session.run("ruff", "format", "--no-cache", "--check", ".")
     session.run("codespell")
+    kernels = map(str, sorted(Path("opencl").rglob("*.cl")))
+    session.run("clang-format", "--dry-run", "--Werror", *kernels)
 
 
 @nox.session

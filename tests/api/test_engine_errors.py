@@ -13,7 +13,7 @@ from drawing import generate_vdi, raycast_volume, render_vdi
 from runtimes import fresh_runtime
 
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
-from pyvista_vdi.device.launches import Launch
+from pyvista_vdi.device import Launch
 from pyvista_vdi.errors import (
     Cancelled,
     DeviceMemoryError,

@@ -19,7 +19,7 @@ from extreme_scenes import (
 )
 
 from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume, reference
-from pyvista_vdi.device import Runtime
+from pyvista_vdi.device import Launch
 from pyvista_vdi.volume import upload
 
 pytestmark = pytest.mark.extremes
@@ -84,13 +84,13 @@ def test_more_than_2_31_voxels_that_the_host_never_holds(runtime, worst, monkeyp
     centre = np.array([1500.3, 500.2, planes - 2.5])
     camera = Camera(centre + np.array([900, 700, 3000]), centre, (0, 1, 0), view_angle=4)
     options = {"sample_distance": 1.0, "memory_limit": "100 MiB", "device": runtime}
-    held, launch = [before := runtime.allocated], Runtime.launch
+    held, launch = [before := runtime.allocated], Launch.__call__
 
     def noted(self, *arguments, **how):
-        held.append(self.allocated)
+        held.append(runtime.allocated)
         launch(self, *arguments, **how)
 
-    monkeypatch.setattr(Runtime, "launch", noted)
+    monkeypatch.setattr(Launch, "__call__", noted)
     image = raycast_volume(volume, camera, WINDOW, function, **options)
     vdi = generate_vdi(volume, camera, WINDOW, function, **options)
     assert max(held) - before <= 100 * 2**20

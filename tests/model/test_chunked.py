@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from drawing import generate_chunked
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, UnsupportedError, Volume
@@ -153,8 +154,6 @@ def test_colours_and_uneven_chunks_are_refused_by_name(source, tmp_path):
 
 @pytest.mark.extension("large")
 def test_generate_makes_it_block_by_block(default_runtime):
-    from pyvista_vdi.extensions.large.generate import generate_chunked
-
     volume = Volume(Counted(), (1, 2, 3))
     camera = Camera((60, 50, 170), (13, 20, 45), (0, 1, 0))
     vdi = pvdi.generate(volume, camera, (32, 18), opacity="linear", device=default_runtime.info)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawing import generate_vdi, raycast_volume
+from drawing import generate_chunked, generate_vdi, raycast_volume
 from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
 from pyvista_vdi import AmbientOcclusion, InvalidVolumeError, Volume, reference, render_volume
@@ -79,8 +79,6 @@ def test_what_cannot_have_blank_octants_says_so():
 
 @pytest.mark.extension("large")
 def test_volumes_in_blocks_cannot_have_blank_octants():
-    from pyvista_vdi.extensions.large.generate import generate_chunked
-
     volume = blanked("uint8", 8)
     scene = (volume, VIEWS["all of it"](volume), (4, 3), transfer_for(volume))
     with pytest.raises(UnsupportedError, match="volumes in blocks"):
