@@ -14,13 +14,13 @@ _OF_FRAMES = ("opaque_depth", "device", "out")
 
 
 def request(
-    volume, camera, size, transfer_function, options=None, *, device=None, progress=None,
+    volume, camera, window_size, transfer_function, options=None, *, device=None, progress=None,
     metadata=None, **changes
 ):  # fmt: skip
     """The request of a VDI."""
     made = GenerationOptions.of(options, changes)
     return GenerationRequest(
-        volume, transfer_function, camera, size, made, device, progress, metadata or {}
+        volume, transfer_function, camera, window_size, made, device, progress, metadata or {}
     )
 
 
