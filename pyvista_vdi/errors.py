@@ -130,7 +130,7 @@ class Cancelled(VDIError, RuntimeError):  # noqa: N818 - an outcome that a callb
 
 @contextmanager
 def naming(what: str) -> Iterator[None]:
-    """Say in the message of what is wrong with a volume which of several it is."""
+    """Name, in the message of what is wrong with a volume, which of several it is."""
     try:
         yield
     except InvalidVolumeError as error:
@@ -149,7 +149,7 @@ _BETWEEN = ("pyvista_vdi", "pyvista", "vtkmodules", "cvista", "paraview", "conte
 
 
 def warn_external(message: str, category: type[Warning] = VDIWarning) -> None:
-    """Give a warning that points at the line outside this package that led to it."""
+    """Warn, pointing at the line outside this package that led to the warning."""
     frame = sys._getframe(1)
     while (frame.f_globals.get("__name__") or "").partition(".")[0] in _BETWEEN and frame.f_back:
         frame = frame.f_back
