@@ -45,11 +45,12 @@ def generated(monkeypatch):
     """Lets generation of some VDIs fail; holds the budgets that were asked for."""
     whole, asked, errors = harness.generate_vdi, [], {}
 
-    def generate(*arguments, max_supersegments, **others):
-        asked.append(max_supersegments)
-        if max_supersegments in errors:
-            raise errors[max_supersegments]
-        return whole(*arguments, max_supersegments=max_supersegments, **others)
+    def generate(request):
+        budget = request.options.max_supersegments
+        asked.append(budget)
+        if budget in errors:
+            raise errors[budget]
+        return whole(request)
 
     monkeypatch.setattr(harness, "generate_vdi", generate)
     return asked, errors

@@ -175,7 +175,7 @@ def test_fails(plotter, monkeypatch):
         tries.append(1)
         raise DeviceError("no more")
 
-    monkeypatch.setattr(background, "generate_by_dial", fail)
+    monkeypatch.setattr(background, "generate_vdi", fail)
     actor.mapper.lookup_table.cmap = "inferno"
     with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more") as said:
         frames_until(plotter, lambda: said)
