@@ -1,6 +1,6 @@
-// Fit: records that have grown too long, brought to a number of runs, by merging neighbours within a
-// threshold that is raised until they fit, or, for the budget, by least error (docs/concepts.md, "The
-// budget"). One ray for each work-item; sixteen: cpu16/generation_shorten.cl.
+// Fit: records that have grown too long, brought to a number of runs, by merging neighbours within
+// a threshold that is raised until they fit, or, for the budget, by least error (docs/concepts.md,
+// "The budget"). One ray for each work-item; sixteen: cpu16/generation_shorten.cl.
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
