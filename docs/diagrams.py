@@ -345,7 +345,7 @@ def draw_data_way() -> str:
             "volume/",
         ),
         ("march", ("a ray for each pixel", "of V_O; steps are", "recorded as runs"), "generation/"),
-        ("merge", ("neighbouring runs,", "at least error, down", "to N_S of them"), "generation/"),
+        ("merge", ("neighbouring runs,", "by least error, down", "to N_S of them"), "generation/"),
         (
             "pack",
             ("lists one behind", "the other; the offsets", "are their running sum"),

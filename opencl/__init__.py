@@ -11,6 +11,8 @@ Shared functions:
     What formulas are written of: numbers of one ray, or of sixteen, and their transposition.
 ``lib/rays.cl``
     Affine forms along the ray of a pixel, clipping to planes, pixels in blocks of 4 x 4.
+``lib/directions.cl``
+    Lengths and products of vectors in space.
 ``lib/double_float.cl``
     Sums, products and quotients of numbers of two floats.
 ``volume/sampling.cl``
@@ -27,6 +29,8 @@ Shared functions:
     Colour and optical depth around a sample.
 ``volume/occlusion.cl``
     Ambient occlusion at a sample.
+``volume/blanking.cl``
+    Blank points and cells of a volume.
 ``volume/rays_of_view.cl``, ``volume/march.cl``
     The steps along a ray of a volume: generation and direct volume rendering share them.
 ``volume/cropped_march.cl``, ``volume/projection.cl``
@@ -51,6 +55,7 @@ Shared functions:
     The same of sixteen rays in vectors, on CPUs.
 ``lib/compositing.cl``
     Compositing front to back, with or without carrying what is rounded off.
+
 Entry points:
 
 ``lib/probe.cl``
@@ -64,6 +69,11 @@ Entry points:
     ``sum_lengths``, ``list_offsets``: where each list begins in a VDI's arrays.
 ``volume/bricks.cl``
     ``want_bricks``, ``sample_steps``: samples of a volume that is on the device brick by brick.
+``large/optical_depths.cl``, ``large/runs.cl``
+    ``optical_depths``, ``copy_runs``, ``append_runs``: of a volume in blocks, how much light enters
+    each block, and the runs of its blocks to those of whole rays.
+``series/decode.cl``
+    ``decode_lists``: a step of a series from the arrays of its frame.
 ``raycasting/prepare.cl``, ``raycasting/prepare_packed.cl``
     ``prepare_lists``, ``prepare_packed``: a VDI's arrays to what the raycaster reads.
 ``raycasting/raycast.cl``, ``raycasting/first_hits.cl``
@@ -93,6 +103,8 @@ Entry points:
     (paper, section 4).
 ``volume/macrocells.cl``
     ``macrocell_ranges``, ``macrocell_visibility``: macrocells of a volume that are transparent.
+``volume/scalar_media.cl``
+    ``scalar_media``: the medium of each scalar of a volume of integers.
 ``volume/ambient_occlusion.cl``
     ``step_opacities``, ``ambient_transmittances``: ambient occlusion on a coarse grid.
 """

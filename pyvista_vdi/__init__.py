@@ -64,6 +64,7 @@ registry.core = registry.Extension(
             shared=True,
             reports_progress=False,
             needs="VTK",
+            install='pip install "pyvista-vdi[plot]"',
         ),
     ),
     readers={

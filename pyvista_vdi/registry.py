@@ -39,9 +39,10 @@ class FileFormat:
     holds : {"VDI", "series", "set"}
         What is read from it.
     read_options, write_options : tuple of str
-        Options of the module's functions; ``compression`` and ``level`` are options of all.
+        Options of the module's functions, beside ``compression`` and ``level``.
     compressions : tuple of str
-        Values of ``compression``, the first by default.
+        Values of ``compression``, the first by default. Without any, ``compression`` and ``level``
+        are no options.
     magic : bytes
         What it begins with, by which it is found in a page.
     page : bool
@@ -53,6 +54,8 @@ class FileFormat:
         Whether the module's functions take ``progress``.
     needs : str
         What its module cannot be loaded without, if that is optional.
+    install : str
+        The command that installs this.
     verbs : str
         Module whose ``info(options)`` and ``convert(options)`` the command line runs, in place of
         those for VDIs.
@@ -69,6 +72,7 @@ class FileFormat:
     shared: bool = False
     reports_progress: bool = True
     needs: str = ""
+    install: str = ""
     verbs: str = ""
 
     def load(self) -> Any:
@@ -78,9 +82,10 @@ class FileFormat:
         except ImportError as error:
             if not self.needs:
                 raise
+            by = f" by {self.install}" if self.install else ""
             raise MissingDependencyError(
                 f"{self.suffix} files need {self.needs}, which cannot be loaded ({error}): install "
-                'it by pip install "pyvista-vdi[plot]", or use .vdi files'
+                f"it{by}, or use .vdi files"
             ) from error
 
 
@@ -132,7 +137,7 @@ class Extension:
         Methods, ``"VDI.plot"`` or ``"plotter.vdi.export_html"``, and functions whose first argument
         is the VDI or the plotter.
     requires : sequence of str
-        Extensions that are shipped, without which this one is left out.
+        Extensions without which this one is left out, and what requires this one.
     """
 
     names: Places = field(default_factory=dict)
@@ -169,9 +174,6 @@ def extensions() -> dict[str, Extension]:
     found: dict[str, Extension] = {}
     for name in folders:
         found[name] = import_module(f"{shipped.__name__}.{name}").EXTENSION
-    for name, record in list(found.items()):
-        if not {*record.requires} <= {*found}:
-            del found[name]
     for point in entry_points(group=GROUP):
         try:
             record = point.load()
@@ -182,6 +184,10 @@ def extensions() -> dict[str, Extension]:
             warn_external(
                 f"the extension {point.name!r} is left out: {type(error).__name__}: {error}"
             )
+    # Leave out what requires something that is not there, until nothing does
+    while lacking := [n for n, record in found.items() if not {*record.requires} <= {*found}]:
+        for name in lacking:
+            del found[name]
     return found
 
 

@@ -114,6 +114,7 @@ KERNEL_OF_LANES void march_lists(
             const Real share = sample_length / (run_length + sample_length);
             const Real4 difference = difference_of(sample_feature, feature);
             const Run run = GROWING_RUN;
+            // merge_error of generation/runs.cl, of runs that touch: as merged_with of one ray
             const Real error = run_length * share * square_of(difference) * seen_weight(run, recording.hidden_weight);
             // A gap ends a run
             const Int grows = visible & (run_back == group_front) & (error <= threshold);

@@ -1,5 +1,15 @@
 // Lists of sixteen rays, each of which is in a list of its own, of supersegments of 24 bytes
-// (raycasting/supersegments.cl), and the search of raycasting/first_supersegment.cl through them.
+// (raycasting/supersegments.cl), and the search of raycasting/first_supersegment.cl through them:
+// Algorithm 1 of the paper. What one ray has, and sixteen:
+//
+//   raycasting/                here
+//   Search, p                  Searches, n
+//   first_supersegment         search_on (lines 3 to 6 and 12), guess_again (7 to 14)
+//   begin_search               search_again
+//   List, list_at              ListOfEach, lists_at
+//   Faces, faces_met           FacesOfEach, faces_met
+//   index_met                  entry_met
+//   medium_of                  medium_met
 //
 // Words of 64 bits come by one load each, as gathers are slow where these kernels run: as doubles,
 // where there are any, they take an instruction less.
@@ -84,7 +94,7 @@ inline Real4 medium_met(const Lists *lists, const ListOfEach *list, Int n, Int a
 #define CLOSE_GUESSES 4
 
 typedef struct {
-    Int n;              // the guess
+    Int n;              // the guess, p of one ray's search
     Int low, high;      // all before `low` end before the depth; the answer is `high` at most
     Int missed;         // guesses that were wrong
     Int passed, beyond; // whether the last one ends before the depth, or the one before it ends behind it

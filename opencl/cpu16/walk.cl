@@ -2,7 +2,15 @@
 // go away from V_O or come back: each turn, each ray makes a guess, meets a supersegment or leaves a
 // list, or the last two.
 //
-// Lists are of supersegments of 24 bytes, with OFFSET_T int.
+// Lists are of supersegments of 24 bytes, with OFFSET_T int. What one ray has, and sixteen:
+//
+//   raycasting/walk.cl         here
+//   Path, begin_path           Paths, begin_paths; a Sense beside them, as all share `away`
+//   Cursor                     Cursors
+//   Crossing, next_crossing    Crossings, next_crossings
+//   note_face                  `meets` of next_crossings, `stays` of media_crossed
+//   medium_met, ends_inside    media_crossed
+//   begin_search               search_again (cpu16/lists.cl, which has a table of its own)
 //
 // -D SKIP_EMPTY=0, 1   pass by what the occupancy grid says is empty; the picture is the same
 #include "lib/lanes.cl"

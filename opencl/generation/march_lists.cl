@@ -52,7 +52,9 @@ inline Run sampled_run(const March *march, const Medium *medium, __global const 
     return run;
 }
 
-// Merge: the sample with the growing run, where that is homogeneous. Returns whether it is.
+// Merge: the sample with the growing run, where that is homogeneous. Returns whether it is. The
+// error is merge_error's (generation/runs.cl) of runs that touch; cpu16/generation_march.cl has it,
+// too.
 inline bool merged_with(Growing *growing, Run sample, float4 feature, float length, float threshold, float hidden_weight)
 {
     const float share = length / (growing->length + length);

@@ -3,11 +3,12 @@
 // Colour is premultiplied by the run's own opacity and merged front to back, so that the view from V_O stays exact
 // (docs/conventions.md, "Merging samples into a supersegment").
 //
-// Merging is judged by how inhomogeneous the merged run would be (the criterion of Frey et al. 2013, which the paper
-// follows): by Ward's increase of the sum of squares, along the ray in reference lengths, of the feature
-// (opacity-weighted colour, opacity) of one reference length of the medium. Opacity is part of it, because black material of
-// changing density is not homogeneous. That opacity is taken as tau / (tau + l), which saturates as 1 - exp(-tau / l)
-// does and costs one division.
+// Merging is judged by the merge error, which is this package's own (docs/decisions/merging.md):
+// Ward's increase of the sum of squares, along the ray in reference lengths, of the feature
+// (opacity-weighted colour, opacity) of one reference length of the medium. The paper's criterion,
+// homogeneity (Frey et al. 2013), compares the same features: generation/homogeneity.cl. Opacity is
+// part of them, because black material of changing density is not homogeneous. That opacity is
+// taken as tau / (tau + l), which saturates as 1 - exp(-tau / l) does and costs one division.
 //
 // The formulas are those of one ray's run, and of sixteen rays' runs: Run and its components are generation/records.cl's or
 // cpu16/generation_records.cl's.
@@ -53,8 +54,10 @@ inline Real square_of(Real4 v)
     return (v.x * v.x + v.y * v.y) + (v.z * v.z + v.w * v.w);
 }
 
-// Ward's increase of the sum of squares when neighbours a and b, and the empty gap between them, become one, weighted by
-// how much of it the eye sees. Where they are not `chosen`, anything.
+// Ward's increase of the sum of squares when neighbours a and b, and the empty gap between them,
+// become one, weighted by how much of it the eye sees. Where they are not `chosen`, anything. While
+// marching, of runs that touch, merged_with of generation/march_lists.cl and march_lists of
+// cpu16/generation_march.cl have the same formula from the share of b.
 inline Real merge_error(Int chosen, Run a, Real4 feature_a, Run b, Real4 feature_b, Real per_reference, float hidden_weight)
 {
     const Real length_a = (a.BACK - a.FRONT) * per_reference;

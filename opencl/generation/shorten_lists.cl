@@ -1,6 +1,6 @@
-// Fit: records that have grown too long, brought to a number of runs, by merging neighbours within a threshold that is raised
-// until they fit, or, for the budget, at least error (docs/concepts.md, "The budget"). One ray for each work-item;
-// sixteen: cpu16/generation_shorten.cl.
+// Fit: records that have grown too long, brought to a number of runs, by merging neighbours within
+// a threshold that is raised until they fit, or, for the budget, by least error (docs/concepts.md,
+// "The budget"). One ray for each work-item; sixteen: cpu16/generation_shorten.cl.
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
@@ -162,7 +162,8 @@ inline int merge_to_limit(__global float *record, __global float *errors, int co
     return limit;
 }
 
-// Shorten records of more than recording.limit runs: with `exactly`, at least error; otherwise by raising the rays' thresholds.
+// Shorten records of more than recording.limit runs: with `exactly`, by least error; otherwise by
+// raising the rays' thresholds.
 __kernel void shorten_lists(
     const RaysOfView view,
     __global const float *forms,

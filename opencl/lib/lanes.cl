@@ -5,8 +5,9 @@
 // -D VECTOR_FUNCTIONS  0, or 1: the driver's functions round a vector as they round a number, as Intel's do: of sixteen they
 //           are asked for vectors
 //
-// A formula is written once, of Real, Int and Uint; only loads, stores and transposes differ. Truth values are
-// Int: 1 in one lane, all bits in a vector. They are joined by &, | and !, never by ~, and are not counted with: COUNT is.
+// A formula is written once, of Real, Int and Uint; only loads, stores and transposes differ. Truth
+// values are Int: 1 in one lane, all bits in a vector. They are joined by & or &&, | or || (of
+// vectors, these evaluate both sides, too) and !, never by ~, and are not counted with: COUNT is.
 // Functions that take a vector and a number (min, fmax, clamp) and operators take both forms; fma and SELECT want (Real)(x).
 #pragma OPENCL FP_CONTRACT OFF
 

@@ -1,9 +1,17 @@
 // The first supersegment that a ray meets in a list: Algorithm 1 of the paper, by its intent
 // (docs/conventions.md, "The paper's pseudocode, and its replacement", lists the errata).
+// Where its lines are:
+//
+//   1, 2      BinS in a ray's first list: begin_walk (walk.cl) begins at guess 0 instead, whence
+//             close guesses and then halving lead on, as from any other p
+//   3 to 14   first_supersegment
+//   16 to 20  note_face (walk.cl): the front lies before the exit, where the paper has f > i_exit,
+//             the wrong way round
 //
 // Faces are sorted and disjoint. A ray that comes back towards V_O meets them in reverse: all here
 // is in the ray's sense, in which it comes to the 0-th first, and depths are negated for a ray that
-// comes back, so that they grow along every ray.
+// comes back, so that they grow along every ray. So p counts from where the ray comes from; the
+// paper's counts from the front.
 #include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -30,7 +38,7 @@ inline Faces faces_met(const Lists *lists, List list, int n, bool away, Depths d
 
 // A search through a list for the first supersegment that ends behind a depth.
 typedef struct {
-    int p;         // the guess, as in Algorithm 1: the answer in the list before
+    int p;         // the guess: at first Algorithm 1's p, the answer in the list before
     int low, high; // all before `low` end before the depth; the answer is `high` at most
     int missed;    // guesses that were wrong
 } Search;

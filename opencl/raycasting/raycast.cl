@@ -41,6 +41,7 @@ __kernel void raycast(
         for (bool meets = crossing.meets; meets; meets = ONE_LIST && next_in_list(&at, &crossing, &path, &lists)) {
             const float4 medium = medium_met(&at, &crossing, &path, &lists);
             const float2 ends = ends_inside(&at, &crossing, &path);
+            // medium.w is the extinction: optical depth for each unit of model length
             composite_medium(&seen, medium.w * length_crossed(&path.ray, ends.x, ends.y), medium, true);
             crossing.stays = crossing.stays && !(ONE_LIST && seen.sums.w < frame.cutoff);
         }

@@ -40,7 +40,8 @@ inline Int nearest_slab(Uint low, Uint high, Int slab, bool away, Int *nothing)
     return HALF_SLABS - 1 - AS_INT(clz(nearest)) + SELECT((Int)(0), (Int)(HALF_SLABS), of_high);
 }
 
-// A ray that crosses fewer lists than this is not worth a look at the grid: at V_O it stays in one.
+// A ray that crosses no more lists than this does not look at the stack that it begins in: at V_O
+// it stays in one list. docs/decisions/empty_space.md has all that decides about skipping.
 #define FEW_LISTS 2.0f
 // Turns of a loop from one look at the grid to the next: rays that come to a new stack one after another look together.
 #define TURNS_PER_LOOK 4

@@ -77,7 +77,7 @@ inline Cursor begin_walk(const Path *path)
     at.j = list_index(&path->v, path->ray.start.y, 0);
     at.r = path->ray.r_begin;
     at.depth = path->sense.sign * path->ray.start.z;
-    at.search = begin_search(0);
+    at.search = begin_search(0); // where Algorithm 1 has lines 1 and 2: there is no list before
     at.active = path->ray.present;
     at.new_stack = lists_crossed(path) > FEW_LISTS;
     return at;
@@ -130,7 +130,9 @@ typedef struct {
     float r_next, next_depth; // and where it does
 } Crossing;
 
-// Whether the ray crosses the supersegment of a face before it leaves the list.
+// Whether the ray crosses the supersegment of a face before it leaves the list: lines 16 to 20 of
+// Algorithm 1, whose f > i_exit is the wrong way round (docs/conventions.md, "The paper's
+// pseudocode, and its replacement").
 inline void note_face(Crossing *crossing, Faces face)
 {
     crossing->face = face;

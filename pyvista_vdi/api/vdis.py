@@ -88,8 +88,8 @@ def generate(
         Longest list, 1 to 4096. A promise: never exceeded, and nothing non-transparent is
         dropped for it.
     criterion : {"least-error", "homogeneity"}
-        What decides where a list that must be shortened is cut: merging at least error, or the
-        paper's threshold on differences. See
+        What decides where a list that must be shortened is cut: merging where the error is least,
+        or the paper's threshold on differences. See
         :class:`pyvista_vdi.model.options.GenerationOptions`.
     sample_distance : float, optional
         Length of a step along a ray, model units; half the smallest spacing by default.
@@ -184,6 +184,8 @@ def generate(
     >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
     """
     refuse_keywords(unknown, generate)
+    # Records are made of their fields in order: one that is put between others shifts what follows
+    # here and in plotting/component.py, which tests/api/test_options.py finds
     look = Classification.checked(
         *(scalars, preference, blending, clim, n_colors, opacity, cmap, flip_scalars),
         *(opacity_unit_distance, log_scale, shade, ambient, diffuse, specular, specular_power),

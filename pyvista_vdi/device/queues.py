@@ -17,7 +17,7 @@ from pyvista_vdi.device.scheduling import ThisThread, Turns
 
 
 class _ThisThread(ThisThread):
-    """Also the number of a thread's queue, and where the times of what it enqueues go."""
+    """The calling thread: the number of its queue, and the profile that its times go to."""
 
     number = 1  # the main queue's
     profile: Profile | None = None

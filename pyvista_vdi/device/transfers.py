@@ -139,8 +139,9 @@ class Transfers(Memory):
         first: int = 0,
         later: bool = False,
     ) -> Any:
-        """Copy between a buffer, from an element on, and a C-contiguous array that fits it.
+        """Copy a C-contiguous array to a buffer, from the buffer's element ``first`` on.
 
+        With ``to_host`` the other way.
         Background work copies in pieces, and what others ask for ``later`` is not waited for: its
         event is returned.
         """

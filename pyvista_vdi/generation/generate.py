@@ -22,7 +22,7 @@ def generate_vdi(request: GenerationRequest) -> VDI:
     """Make a VDI of a classified volume.
 
     Each list's ray is marched once. Neighbouring samples are merged while the medium stays
-    homogeneous; what is recorded is then merged at least error, or cut by homogeneity,
+    homogeneous; what is recorded is then merged where the error is least, or cut by homogeneity,
     until the budget of supersegments is kept. Lists go on behind what V_O sees, because other
     views may see it.
 

@@ -137,14 +137,14 @@ class Records:
     def make_room(self, *, last: bool = False) -> None:
         """Fit records without room for another chunk of steps, behind the last one if it must be.
 
-        What is least unlike is merged, and such a ray's threshold is raised. At least error
-        :meth:`fit` does it behind the last chunk.
+        What is least unlike is merged, and such a ray's threshold is raised. By the criterion
+        least-error, :meth:`fit` does it behind the last chunk.
         """
         if self._cut is not None or not last:
             self._shorten(self.items, view=self.view, recording=self.recording, exactly=False)
 
     def fit(self) -> None:
-        """Merge at least error, or cut by homogeneity, until the budget is kept."""
+        """Merge where the error is least, or cut by homogeneity, until the budget is kept."""
         if self._cut is None:
             self._shorten(self.items, view=self.view, recording=self._budget, exactly=True)
         else:

@@ -81,7 +81,7 @@ def write(
         Called with the finished fraction, 0 to 1; when it returns False, nothing is written. VTK
         does not say how far it is: of ``.vti`` with 1 alone.
     **options
-        ``compression`` and ``level`` for all; ``precision`` for ``.vdi`` and ``.html``, there
+        ``compression`` and ``level`` for these; ``precision`` for ``.vdi`` and ``.html``, there
         ``title`` and ``background`` as well; ``exact`` and ``linear`` for ``.exr``. See
         :func:`pyvista_vdi.io.vdi_file.writer.write`,
         :func:`pyvista_vdi.extensions.deep_exr.files.write`,
@@ -109,9 +109,9 @@ def write(
     read : reads it again.
     """
     target = checked_target(path)
-    check_write_options(target, options)
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
+    check_write_options(target, options)
     found = format_named(target) or _own()
     written: Path
     if found.reports_progress:
@@ -237,15 +237,16 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
 def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:
     """Raise InvalidArgumentError now if :func:`write` would refuse an option for this file."""
     found = format_named(path) or _own()
-    _check_names("written", path, options, ("compression", "level", *found.write_options))
     compressions = found.compressions
-    compression, level = options.get("compression", compressions[0]), options.get("level")
-    if not isinstance(compression, str) or compression not in compressions:
+    of_compressed = ("compression", "level") if compressions else ()
+    _check_names("written", path, options, (*of_compressed, *found.write_options))
+    compression = options.get("compression", next(iter(compressions), None))
+    if compressions and not (isinstance(compression, str) and compression in compressions):
         known = f"one of {', '.join(compressions[:-1])} and " if compressions[1:] else ""
         raise InvalidArgumentError(
             f"compression of {path} must be {known}{compressions[-1]}; got {compression!r}"
         )
-    check_level(level)
+    check_level(options.get("level"))
     if options.get("precision") is not None:
         check_precision(options["precision"])
 

@@ -256,7 +256,7 @@ class GenerationOptions(MediumOptions):
         Longest list, 1 to 4096; never exceeded, and nothing that is not transparent is dropped.
     criterion : {"least-error", "homogeneity"}
         What decides where a list that must be shortened is cut. ``"least-error"``: neighbours are
-        merged at least error. ``"homogeneity"`` (the paper's, after Frey et al. 2013): a
+        merged where the error is least. ``"homogeneity"`` (the paper's, after Frey et al. 2013): a
         supersegment goes on while the medium is like its mean so far, by the least threshold that
         keeps the budget on this ray. It records up to 512 runs of a ray before unlike ones are
         merged, which takes more time and, in wide windows, memory. By both, neighbours within
@@ -268,7 +268,7 @@ class GenerationOptions(MediumOptions):
     view_cone : float
         Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
         see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
-        at least error or within ``tolerance``. ``"homogeneity"`` cuts without regard to it.
+        by least error or within ``tolerance``. ``"homogeneity"`` cuts without regard to it.
     precision : {"exact", "16-byte", "8-byte"}
         What a supersegment takes; see :meth:`VDI.with_precision`.
     sample_distance, lights, ambient_occlusion, memory_limit
@@ -281,6 +281,7 @@ class GenerationOptions(MediumOptions):
         If a value is out of range.
     """
 
+    # A new field goes behind the others: the public functions give them by their order
     max_supersegments: int = option(
         20, "longest list, 1 to 4096", check_max_supersegments, aliases=("n_supersegments",)
     )

@@ -285,6 +285,7 @@ class AddVDI(Component):
         clim, cmap = aliases.get("rng", clim), aliases.get("colormap", cmap)
         if mapper is not None:
             note_mapper(mapper)
+        # Fields in their order, as in api/vdis.py
         asked = Addition(
             array=ArrayChoice.checked(scalars, preference, blending_name(blending)),
             look=Looks.checked(

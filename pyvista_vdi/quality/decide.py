@@ -433,7 +433,10 @@ def _faithful(state: FrameState, f: FrameAsked, before: tuple[Action, ...]) -> D
 
 
 def _stored(state: FrameState, asked: StoredAsked) -> tuple[Action, ...]:
-    """Show what there is, brought up to date unless that has failed already."""
+    """Show a VDI that has no volume, or one of a series or set.
+
+    Update it first, unless that has failed at this stamp.
+    """
     failed = asked.stamp is not None and asked.stamp == state.failed_in_frame
     return (Show("last"),) if failed else (Do("update"), Show("last"))
 

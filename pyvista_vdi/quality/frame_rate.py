@@ -110,7 +110,7 @@ class FrameRate:
         return replace(self, choice=self._within(self.choice, full))
 
     def chosen(self, full: int) -> int:
-        """Return the samples that were chosen, of a frame that has so many in full quality."""
+        """Return how many samples the next frame gets: those chosen, or ``full`` if none were."""
         return full if self.choice is None else self.choice
 
     def record(self, samples: int, work: float, seconds: float) -> FrameRate:

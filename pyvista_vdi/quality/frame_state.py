@@ -2,7 +2,8 @@
 
 :func:`pyvista_vdi.quality.decide.decide` takes a :class:`FrameState` and an event, and returns the
 state after it and the actions that follow. VDIs are known by numbers here, and volumes by what they
-are made of.
+are made of. In names, *stored* is a VDI that is shown without its volume: of a file, a series or a
+set. What comes from a volume has the events without that word.
 """
 
 from __future__ import annotations

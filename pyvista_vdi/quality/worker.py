@@ -28,7 +28,7 @@ class Job:
         self._device = device
 
     def done(self) -> Any:
-        """Do it, and return what has become of it."""
+        """Do the work on a queue of this thread's own, and return its result."""
         runtime = get_runtime(self._device)
         with runtime.background(self.cancelled.is_set):
             return self._work(runtime, self._report)

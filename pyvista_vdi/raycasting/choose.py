@@ -45,10 +45,25 @@ class Variant:
 
 
 def choose(device: Runtime, scene: Scene) -> Variant:
-    """Return the variant that draws a scene on a device (docs/decisions/index.md).
+    """Return the variant that draws a scene on a device: of the first row that fits.
 
-    CPUs follow sixteen rays in vectors that are written out, where there are such kernels; what
-    else there is, and everything on other devices, is followed ray by ray.
+    ==========  =====================================================  ========================
+    asked for   where                                                  kernel
+    ==========  =====================================================  ========================
+    a preview   everywhere                                             ``preview``
+    segments    CPU; lists suit blocks                                 ``segments_of_blocks``
+    segments    elsewhere                                              ``segments``
+    first hits  everywhere                                             ``first_hits``
+    a picture   CPU; V_O's view, a list for each pixel; not cropped    ``raycast_aligned_view``
+    a picture   V_O's view, but for cropped ones that blocks can draw  ``raycast``, ONE_LIST=1
+    a picture   CPU; rays have many lists in common; not cropped       ``raycast_packets``
+    a picture   CPU; lists suit blocks                                 ``raycast_blocks``
+    a picture   all else                                               ``raycast``, ONE_LIST=0
+    ==========  =====================================================  ========================
+
+    Lists *suit blocks* that have 24-byte supersegments, offsets of 32 bits, and rays in float32. Of
+    pictures, *CPU* also means rays in float32, and sums that need not carry what they round off
+    (COMPENSATED below 2). The reasons are in docs/decisions/index.md.
     """
     prepared, options = scene.prepared, scene.options
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
@@ -101,7 +116,8 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         kernel, own = kernels.RAYCAST_ALIGNED_VIEW, {"origin": scene.aligned.origin}
         items = scene.aligned.items
         return Variant(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
-    # V_O's other rays have a loop of their own one by one; regions have blocks
+    # Each ray is still in one list: the kernel for single rays has a loop along it. Cropped rays
+    # are followed in blocks where they can be
     if scene.one_list and not (cropped and in_blocks):
         return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
 

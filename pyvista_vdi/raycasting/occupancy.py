@@ -1,4 +1,4 @@
-"""The occupancy grid of a VDI: where there is nothing to see (paper section 4)."""
+"""The occupancy grid of a VDI: where there is something to see (paper section 4)."""
 
 from __future__ import annotations
 

@@ -59,11 +59,11 @@ def packets_of(
     *,
     or_blocks: bool,
 ) -> Packets | None:
-    """Return the packets of a part of a frame; None if rays had better be followed one by one.
+    """Return the packets of a part of a frame; None if another kernel is faster.
 
     ``coordinates`` are the forms of (u, v, depth, denominator), float64 (4, 6), ``planes`` those
     that rays are clipped to, float64 (n, 6). ``epipole`` is :func:`epipole_of`'s, and ``lit``
-    :func:`share_lit`'s. Rays one by one are followed in blocks, or not.
+    :func:`share_lit`'s. ``or_blocks``: whether rays that are in no packets are followed in blocks.
     """
     if min(part.x1 - part.x0, part.y1 - part.y0) < LEAST_PIXELS:
         return None

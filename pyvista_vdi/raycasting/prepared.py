@@ -52,7 +52,7 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
 class PreparedVDI:
     """A VDI on a device, in the form that the raycaster reads; the VDI itself is not kept."""
 
-    #: Where there is nothing to see.
+    #: Where there is something to see, and where not.
     occupancy: OccupancyGrid
     #: Where lists begin, by their bundles or, of 8-byte supersegments, each; the supersegments,
     #: which are in one array if they are packed.

@@ -68,7 +68,8 @@ class Scene:
         camera, size, options = request.camera, request.size, request.options
         pixel_rays = rays.pixel_rays(camera, size, prepared.bounds)
         coordinates = [pixel_rays.form(row[:3], row[3]) for row in prepared.list_rows]
-        # Lengths are all that this is for, and a length times m absorbs as m times the extinction
+        # The opacity multiplier is in the lengths that kernels measure by these forms: a length
+        # times m absorbs as m times the extinction
         direction = rays.direction_forms(pixel_rays, size, options.opacity_multiplier)
         cropped = rays.cropped(pixel_rays, options.cropping, prepared.bounds)
         planes = [
@@ -128,9 +129,9 @@ class Scene:
         )
 
     def packets(self, *, or_blocks: bool) -> Packets | None:
-        """Return how the rays are dealt to packets; None if each had better be followed by itself.
+        """Return how the rays are dealt to packets; None if another kernel is faster.
 
-        That is in blocks, or not.
+        ``or_blocks``: whether that is the one for blocks of 4 x 4 rays, or that for single rays.
         """
         forms = self.forms.astype(np.float64)
         return packets_of(

@@ -186,12 +186,12 @@ def build_vdi(
 ) -> VDI:
     """Return a plain VDI: neighbouring samples merged, or cut, until the budget is kept.
 
-    Every sample that is not transparent begins as a supersegment of its own. At least error, while
-    a list is over budget, the two neighbours whose merging displaces the least optical depth become
-    one: with e the extinction times (r, g, b, 1), the cost is the sum of abs(e - mean e) over
-    length, what lies between the two (e = 0) included. Merging sees opacity as well as colour, so
-    black material that changes density is not homogeneous. Rendered at V_O the result equals
-    :func:`volume_image` for any budget, with colours weighted by transmittance.
+    Every sample that is not transparent begins as a supersegment of its own. By the criterion
+    least-error, while a list is over budget, the two neighbours whose merging displaces the least
+    optical depth become one: with e the extinction times (r, g, b, 1), the cost is the sum of
+    abs(e - mean e) over length, what lies between the two (e = 0) included. Merging sees opacity as
+    well as colour, so black material that changes density is not homogeneous. Rendered at V_O the
+    result equals :func:`volume_image` for any budget, with colours weighted by transmittance.
 
     Parameters
     ----------

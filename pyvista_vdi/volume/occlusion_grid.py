@@ -59,7 +59,7 @@ def opacities_of_part(
     variant: Variant,
     lengths: tuple[float, float],
 ) -> NDArray[np.float32]:
-    """Return what part of a volume has of the opacities of nodes, float32 (nz, ny, nx).
+    """Return this part's share of the mean opacities of nodes, float32 (nz, ny, nx).
 
     Parameters are those of :func:`ambient_transmittances`; ``points``: of the whole volume;
     ``first``: the first of ``nodes``, both along x, y and z.

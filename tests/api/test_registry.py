@@ -104,7 +104,10 @@ def size_of(plotter, factor):
 EXTENSION = Extension(
     volumes={"rest:Cells": "rest:volume_of"},
     shown={"rest:Cells": "rest:input_of"},
-    formats=(FileFormat(".lists", "rest", compressions=("zstd", "none")),),
+    formats=(
+        FileFormat(".lists", "rest", compressions=("zstd", "none")),
+        FileFormat(".plain", "rest"),
+    ),
     methods={"plotter.vdi.size_of": "rest:size_of"},
 )
 """
@@ -126,6 +129,12 @@ def test_data_files_and_methods_of_others(tmp_path):
         "    vdi.save('a.lists', compression='lz4')\n"
         "except pvdi.InvalidArgumentError as error:\n"
         "    print(error)\n"
+        "vdi.save('a.plain', level=None)\n"
+        "assert pvdi.read('a.plain').equals(vdi)\n"
+        "try:\n"
+        "    vdi.save('a.plain', compression='zstd')\n"
+        "except pvdi.InvalidArgumentError as error:\n"
+        "    print(error)\n"
         "mapper = pvdi.VDIMapper()\n"
         "mapper.SetInputData(rest.Cells())\n"
         "assert mapper.GetVDI().equals(vdi)\n"
@@ -138,6 +147,35 @@ def test_data_files_and_methods_of_others(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "compression of" in done.stdout
     assert "must be one of zstd and none; got 'lz4'" in done.stdout
+    assert "a.plain is written with the options none; got compression" in done.stdout
+
+
+def test_what_is_left_out_takes_along_what_requires_it(tmp_path):
+    (tmp_path / "chain.py").write_text(
+        "from pyvista_vdi.registry import Extension\n"
+        "FIRST, SECOND, THIRD = (Extension(requires=r) for r in (('b',), ('c',), ('absent',)))\n"
+        "FOURTH = Extension(requires=('series',))\n"
+    )
+    points = ("a = chain:FIRST", "b = chain:SECOND", "c = chain:THIRD", "d = chain:FOURTH")
+    done = run_python(
+        "from pyvista_vdi import registry\nprint(sorted(registry.extensions()))\n",
+        PYTHONPATH=installed(tmp_path, "\n".join(points)),
+    )
+    assert done.returncode == 0, done.stderr
+    there = set(registry.extensions())
+    assert done.stdout.strip() == repr(sorted(there | {"d"} if "series" in there else there))
+
+
+@pytest.mark.parametrize(
+    ("install", "remedy"),
+    [("", r"install it, or"), ("pip install lists", r"install it by pip install lists, or")],
+)
+def test_what_a_format_needs_is_said_with_its_own_remedy(install, remedy):
+    ours = next(each for each in registry.core.formats if each.needs)
+    assert ours.install == 'pip install "pyvista-vdi[plot]"'
+    lists = registry.FileFormat(".lists", "absent_lists", needs="lists", install=install)
+    with pytest.raises(pvdi.MissingDependencyError, match=rf"\.lists files need lists.*{remedy}"):
+        lists.load()
 
 
 def test_what_no_extension_has_is_said_by_name():

@@ -150,7 +150,7 @@ def opacities(seen: Seen) -> Opacities | None:
 
 
 def ambient(task: Task, device: Any, *opacities: Opacities | None) -> NDArray[np.float32]:
-    """Return the ambient light of the whole volume."""
+    """Return the mean transmittance around every node of the volume, from all blocks' opacities."""
     with _at(task, ()):
         return task.ambient(opacities, device)
 

@@ -112,7 +112,7 @@ def generate_on_dask(
 
 
 class _Run:
-    """One generation: its futures, and what is known of it."""
+    """One generation on a Dask cluster: its futures, and what is known so far."""
 
     def __init__(
         self,

@@ -349,7 +349,7 @@ class _Marched:
         self._runtime.finish()
 
     def opacities(self, block: Indices, grid: OcclusionGrid) -> Opacities | None:
-        """Return what the block has of the opacities of the occlusion's nodes around it."""
+        """Return the block's share of the mean opacities of nodes; the shares of all add up."""
         ends = self._task.blocks.ends(block)
         first, nodes = grid.nodes_around(*(tuple(reversed(end)) for end in ends))
         found = self._medium.part_opacities(grid, first, nodes)

@@ -32,7 +32,7 @@ class Decoding(Job):
     """Work beside the frames, and not in turns with them: what it makes is what they wait for."""
 
     def done(self) -> Any:
-        """Do it, and return what has become of it."""
+        """Do the work on a queue of this thread's own, and return its result."""
         runtime = get_runtime(self._device)
         with runtime.queue_scope():
             return self._work(runtime, self._report)

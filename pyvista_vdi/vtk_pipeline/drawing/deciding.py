@@ -297,7 +297,10 @@ class Deciding:
         return self._volumes.get(show.content, wanted, in_bricks=show.in_bricks)
 
     def _of_this_view(self, source: SourceInput, frame: Frame) -> VDI:
-        """Return a VDI of exactly the frame's view, made now; of a tile it is not kept."""
+        """Make and return a VDI of exactly the frame's view.
+
+        The source keeps it unless the frame is a tile.
+        """
         view = frame.view
         assert view is not None
         wanted, whole = source.source.MakeRequest(view), frame.full_size == view.size

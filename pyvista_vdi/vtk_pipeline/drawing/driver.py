@@ -87,7 +87,7 @@ class Driver(Deciding):
 
     @property
     def actor(self) -> Any:
-        """Whose matrix and renderers count; ``None`` if there is none."""
+        """The actor that this draws for, whose matrix and renderers count; ``None`` without one."""
         return self._actor.Get()
 
     def set_input(self, source: Input | None) -> None:

@@ -23,7 +23,10 @@ class Grabbing:
         self._transparent: list[tuple[Any, Any]] = []  # point data and scalars of solid proxies
 
     def begin(self, drivers: list[Any], interactor: Any) -> None:
-        """Make what is hit by one of the drivers solid: a button is pressed."""
+        """Make the proxies of VDIs under the pointer opaque: a button is pressed.
+
+        Their scalars become opaque ones, so that a style's picker hits them.
+        """
         self.end()  # another observer may have ended the last event before it came here
         style = interactor.GetInteractorStyle()
         if style is not None and style.IsA("vtkInteractorStyleSwitch"):

@@ -106,7 +106,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
         self._set_input(None if data is None else input_of(data))
 
     def RemoveInputConnection(self, *args: Any) -> None:
-        """Draw nothing any more, as all that follow."""
+        """Draw nothing any more; RemoveAllInputConnections and RemoveAllInputs do the same."""
         self._set_input(None)
 
     RemoveAllInputConnections = RemoveAllInputs = RemoveInputConnection
@@ -458,7 +458,7 @@ def _require_first_port(method: str, args: tuple[Any, ...]) -> None:
 
 
 class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
-    """Draws a VDI in a VTK renderer, behind a :class:`VDIActor`.
+    """The mapper of a :class:`VDIActor`: draws a VDI in a VTK renderer.
 
     The input is a :class:`VDISource` (``SetInputConnection``), a VDI in its canonical form
     (``SetInputData``) or a :class:`~pyvista_vdi.VDI` (``SetVDI``). Before each frame it brings

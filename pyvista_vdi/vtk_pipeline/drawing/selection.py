@@ -78,7 +78,7 @@ class Selection:
         self._drawn = None
 
     def pick(self, actor: Any, renderer: Any, x: float, y: float, hit: FirstHit) -> Pick | None:
-        """Return what of an actor's VDI a renderer shows at a place of the window, in pixels.
+        """Return what a renderer shows of an actor's VDI at (x, y) of the window, in pixels.
 
         ``None`` where nothing of it is hit, or something else is in front.
         """

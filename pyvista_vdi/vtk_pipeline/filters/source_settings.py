@@ -341,7 +341,7 @@ class SourceSettings(Algorithm):
         return self._options.precision
 
     def SetAmbientOcclusion(self, occlusion: OcclusionLike | None) -> None:
-        """Set whether what is hidden from the light around it is darkened.
+        """Set ambient occlusion: whether, and up to which radius.
 
         ``None`` or ``False``: no, which is the default; ``True``: with the default radius; a
         number: with this radius, model units; or an ``AmbientOcclusion``.
@@ -350,7 +350,7 @@ class SourceSettings(Algorithm):
         self._set(ambient_occlusion=occlusion)
 
     def GetAmbientOcclusion(self) -> AmbientOcclusion | None:
-        """Return whether what is hidden from the light around it is darkened."""
+        """Return the ambient occlusion; ``None`` if there is none."""
         return self._options.ambient_occlusion
 
     def SetMemoryLimit(self, limit: MemoryLike | None) -> None:

@@ -78,7 +78,10 @@ def _of_looks(setter: str) -> Any:
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
 class VDISource(Looking, RanksVDISource):
-    """A volume's VDI: :class:`pyvista_vdi.VDISource`, and a view and a ramp by default."""
+    """Generates a volume's VDI, by default of a view and with a ramp of its own.
+
+    See :class:`pyvista_vdi.VDISource`.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -446,7 +449,7 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
 class VDIWriter(vtk_pipeline.VDIWriter):
-    """A file of a VDI, or of all time steps: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
+    """Writes a VDI, or all time steps, to a file: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         if is_first_rank():  # all have the VDI

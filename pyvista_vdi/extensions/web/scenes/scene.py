@@ -75,7 +75,7 @@ class Scene:
 
     @property
     def actor(self) -> Any:
-        """The first one's actor, or ``None``."""
+        """The actor of the first VDI, or ``None``."""
         return next(iter(self.actors), None)
 
 
