@@ -2,12 +2,12 @@
 // VDI's window, or some of them, or more: the ray of each goes through a list of its own from front
 // to back, and through no other (docs/decisions/aligned_view.md).
 //
-// A work-item draws a packet of LANES pixels: those of PACKET_BUNDLES bundles of lists side by side.
-// What these hold lies in one piece of memory (raycasting/supersegments.cl), and one packet's behind
-// the other's; so it is loaded in whole vectors, and nothing is gathered or searched for. (Lists of
-// 8-byte supersegments do not lie in bundles: here, four side by side are called one, and their
-// words are loaded one by one.) Only depth matters: a supersegment is clipped to the ray in the
-// depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
+// A work-item draws a packet of LANES pixels: those of PACKET_BUNDLES bundles of lists side by
+// side. What these hold lies in one piece of memory (raycasting/supersegments.cl), and one packet's
+// behind the other's; so it is loaded in whole vectors, and nothing is gathered or searched for.
+// (Lists of 8-byte supersegments do not lie in bundles: here, four side by side are called one, and
+// their words are loaded one by one.) Only depth matters: a supersegment is clipped to the ray in
+// the depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
 #define LANES 16
 #include "lib/compositing.cl"
 #include "lib/transpose.cl"
@@ -23,8 +23,8 @@
 #define BUNDLE_HIGH (PACKED == 8 ? 1 : BUNDLE)
 #define PACKET_WIDE (LANES / BUNDLE_HIGH) // pixels
 // Each lane's pixel, from the packet's first; and the same of one lane
-#define LANE_X                                                                \
-    (PACKED == 8 ? (Int)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15) \
+#define LANE_X                                                                                     \
+    (PACKED == 8 ? (Int)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)                     \
                  : (Int)(0, 2, 4, 6, 1, 3, 5, 7, 0, 2, 4, 6, 1, 3, 5, 7))
 #define LANE_Y (PACKED == 8 ? (Int)(0) : (Int)(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1))
 #define X_OF(lane) ((lane) % PACKET_BUNDLES * BUNDLE_WIDE + (lane) / PACKET_BUNDLES % BUNDLE_WIDE)
@@ -62,7 +62,8 @@ inline PacketLists bundles_at(const Lists *in, int i, int j)
     OFFSET_T any_first = 0;
     for (int n = 0; n < PACKET_BUNDLES; ++n) {
         const int column = i + n * BUNDLE;
-        const ulong header = column < in->wide ? (ulong)in->headers[BUNDLE_OF_LIST(column, j, in->wide)] : 0;
+        const ulong header =
+            column < in->wide ? (ulong)in->headers[BUNDLE_OF_LIST(column, j, in->wide)] : 0;
         lists.firsts[n] = first_of_header(header);
         lists.counts[n] = count_of_header(header);
         lists.longest = max(lists.longest, lists.counts[n]);
@@ -93,14 +94,16 @@ inline PacketLists lists_in_row(const Lists *in, int i, int j)
     for (int lane = 0; lane < LANES; ++lane) {
         const int dx = X_OF(lane);
         const int first = dx < wide ? (int)((OFFSET_T)begins[dx] - lists.begin) + LIST_HEADER : 0;
-        counts[lane] = dx < wide ? max((int)((OFFSET_T)begins[dx + 1] - lists.begin) - first, 0) : 0;
+        counts[lane] =
+            dx < wide ? max((int)((OFFSET_T)begins[dx + 1] - lists.begin) - first, 0) : 0;
         firsts[lane] = first;
         any_lane = counts[lane] > 0 ? lane : any_lane;
         lists.longest = max(lists.longest, counts[lane]);
     }
     for (int lane = 0; lane < LANES; ++lane) {
         firsts[lane] = firsts[counts[lane] > 0 ? lane : any_lane];
-        __global const uint2 *const scale = (__global const uint2 *)in->faces + lists.begin + firsts[lane] - LIST_HEADER;
+        __global const uint2 *const scale =
+            (__global const uint2 *)in->faces + lists.begin + firsts[lane] - LIST_HEADER;
         origins[lane] = as_int(scale[0].x);
         strides[lane] = as_int(scale[0].y);
         per_codes[lane] = as_float(scale[1].x);
@@ -170,15 +173,18 @@ inline float8 faces_of_bundle(__global const ulong *faces, const PacketLists *li
 }
 
 // depth_of_code of raycasting/supersegments.cl.
-inline Real depths_of_codes(const Lists *in, const PacketLists *lists, Uint codes, float depth_origin)
+inline Real depths_of_codes(const Lists *in, const PacketLists *lists, Uint codes,
+                            float depth_origin)
 {
-    const Real offset = TO_REAL(lists->origin + AS_INT(codes & DEPTH_CODES) * lists->stride) * in->depth_step;
+    const Real offset =
+        TO_REAL(lists->origin + AS_INT(codes & DEPTH_CODES) * lists->stride) * in->depth_step;
     const Real before = DEPTH == PARALLEL ? offset : fmax(offset, in->nearest_offset);
     return depth_coordinate(before, depth_origin);
 }
 
 // The k-th supersegments of all lists.
-inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k, float depth_origin)
+inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k,
+                                float depth_origin)
 {
     PacketFaces at;
     if (PACKED == 16) {
@@ -191,18 +197,21 @@ inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k
         int at_lane[LANES];
         vstore16(lists->first + select((Int)(0), (Int)(k), k < lists->count), 0, at_lane);
         __global const ulong *const from = in->faces + lists->begin;
-        const Uint low_lanes = as_uint16((ulong8)(from[at_lane[0]], from[at_lane[1]], from[at_lane[2]], from[at_lane[3]],
-                                                  from[at_lane[4]], from[at_lane[5]], from[at_lane[6]], from[at_lane[7]]));
-        const Uint high_lanes =
-            as_uint16((ulong8)(from[at_lane[8]], from[at_lane[9]], from[at_lane[10]], from[at_lane[11]], from[at_lane[12]],
-                               from[at_lane[13]], from[at_lane[14]], from[at_lane[15]]));
+        const Uint low_lanes = as_uint16(
+            (ulong8)(from[at_lane[0]], from[at_lane[1]], from[at_lane[2]], from[at_lane[3]],
+                     from[at_lane[4]], from[at_lane[5]], from[at_lane[6]], from[at_lane[7]]));
+        const Uint high_lanes = as_uint16(
+            (ulong8)(from[at_lane[8]], from[at_lane[9]], from[at_lane[10]], from[at_lane[11]],
+                     from[at_lane[12]], from[at_lane[13]], from[at_lane[14]], from[at_lane[15]]));
         at.words[0] = (Uint)(low_lanes.even, high_lanes.even);
         at.words[1] = (Uint)(low_lanes.odd, high_lanes.odd);
         at.front = depths_of_codes(in, lists, at.words[0], depth_origin);
         at.back = depths_of_codes(in, lists, at.words[0] >> 14, depth_origin);
     } else {
-        const Real of_01 = (Real)(faces_of_bundle(in->faces, lists, 0, k), faces_of_bundle(in->faces, lists, 1, k));
-        const Real of_23 = (Real)(faces_of_bundle(in->faces, lists, 2, k), faces_of_bundle(in->faces, lists, 3, k));
+        const Real of_01 = (Real)(faces_of_bundle(in->faces, lists, 0, k),
+                                  faces_of_bundle(in->faces, lists, 1, k));
+        const Real of_23 = (Real)(faces_of_bundle(in->faces, lists, 2, k),
+                                  faces_of_bundle(in->faces, lists, 3, k));
         at.front = ((Real)(of_01.even, of_23.even)).s048c159d26ae37bf;
         at.back = ((Real)(of_01.odd, of_23.odd)).s048c159d26ae37bf;
     }
@@ -216,25 +225,23 @@ inline Real4 packet_media(const Lists *in, const PacketLists *lists, int k, Pack
         return numbers_at(in->media, lists, k);
     const Uint low = at.words[0], high = at.words[1];
     if (PACKED == 16)
-        return REAL4(TO_REAL(high & 2047) * (1.0f / 2047.0f), TO_REAL(high >> 11 & 2047) * (1.0f / 2047.0f),
+        return REAL4(TO_REAL(high & 2047) * (1.0f / 2047.0f),
+                     TO_REAL(high >> 11 & 2047) * (1.0f / 2047.0f),
                      TO_REAL(high >> 22) * (1.0f / 1023.0f), AS_REAL(low));
     const Uint tau = low >> 28 | (high & 255) << 4;
     const Uint thickness = (low >> 14 & DEPTH_CODES) - (low & DEPTH_CODES);
     const Real optical_depth = select((Real)(0.0f), AS_REAL((tau + TAU_BASE - 1) << 16), tau > 0);
-    return REAL4(TO_REAL(high >> 8 & 255) * (1.0f / 255.0f), TO_REAL(high >> 16 & 255) * (1.0f / 255.0f),
-                 TO_REAL(high >> 24) * (1.0f / 255.0f),
+    return REAL4(TO_REAL(high >> 8 & 255) * (1.0f / 255.0f),
+                 TO_REAL(high >> 16 & 255) * (1.0f / 255.0f), TO_REAL(high >> 24) * (1.0f / 255.0f),
                  fmin(optical_depth * lists->per_code / TO_REAL(thickness), FLT_MAX));
 }
 
 KERNEL_OF_LANES void raycast_aligned_view(
-    __global const HEADER_T *headers,   // these as of raycasting/raycast.cl; masks are not looked
-    __global const ulong *faces,        // at: lists say by themselves what is empty
-    __global const ulong *media,
-    __global const float *forms,
-    __global const float *opaque_depth,
-    __global const ulong *masks,
-    Frame frame,
-    int2 origin,                        // the pixel of list (0, 0); maybe beside the window
+    __global const HEADER_T *headers, // these as of raycasting/raycast.cl; masks are not looked
+    __global const ulong *faces,      // at: lists say by themselves what is empty
+    __global const ulong *media, __global const float *forms, __global const float *opaque_depth,
+    __global const ulong *masks, Frame frame,
+    int2 origin, // the pixel of list (0, 0); maybe beside the window
     __global float4 *image)
 {
     const int width = frame.width, height = frame.height;
@@ -249,9 +256,11 @@ KERNEL_OF_LANES void raycast_aligned_view(
     if (y >= height)
         return;
     const bool whole = x >= 0 && x + PACKET_WIDE <= width && y >= 0 && y + BUNDLE_HIGH <= height;
-    const long place = (long)(height - 1 - y) * width + x; // of the first pixel; row y + 1 is a width before
+    const long place =
+        (long)(height - 1 - y) * width + x; // of the first pixel; row y + 1 is a width before
 // Whether a pixel of the packet is one of the window's
-#define IS_IN_WINDOW(dx, dy) (x + (dx) >= 0 && x + (dx) < width && y + (dy) >= 0 && y + (dy) < height)
+#define IS_IN_WINDOW(dx, dy)                                                                       \
+    (x + (dx) >= 0 && x + (dx) < width && y + (dy) >= 0 && y + (dy) < height)
 
     Seen seen = nothing_seen();
     const PacketLists lists = packet_at(&in, i, j);
@@ -261,16 +270,18 @@ KERNEL_OF_LANES void raycast_aligned_view(
             float ends[LANES];
             for (int lane = 0; lane < LANES; ++lane) {
                 const int dx = X_OF(lane), dy = Y_OF(lane);
-                ends[lane] = whole || IS_IN_WINDOW(dx, dy) ? opaque_depth[place + dx - dy * width] : 0.0f;
+                ends[lane] =
+                    whole || IS_IN_WINDOW(dx, dy) ? opaque_depth[place + dx - dy * width] : 0.0f;
             }
             t_end = vload16(0, ends);
         }
         const Real a = offsets_from_middle(x + LANE_X, width);
         const Real b = offsets_from_middle(y + LANE_Y, height);
-        const Int wanted = IS_IN_WINDOW(LANE_X, LANE_Y) && i + LANE_X < in.wide && j + LANE_Y < in.high &&
-                            lists.count > 0;
+        const Int wanted = IS_IN_WINDOW(LANE_X, LANE_Y) && i + LANE_X < in.wide &&
+                           j + LANE_Y < in.high && lists.count > 0;
         Real t0 = -INFINITY, t1 = t_end;
-        Int going = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, frame.planes, a, b, &t0, &t1) && wanted;
+        Int going =
+            clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, frame.planes, a, b, &t0, &t1) && wanted;
         const Real begin = list_depth(forms, a, b, select((Real)(0.0f), t0, going));
         const Real end = list_depth(forms, a, b, select((Real)(1.0f), t1, going));
         // Model length per unit of V_O's depth
@@ -295,11 +306,13 @@ KERNEL_OF_LANES void raycast_aligned_view(
                 lengths /= NEARNESS(from) * NEARNESS(to);
             composite_medium(&seen, medium.w * lengths, medium, meet);
         }
-        // The next packet, which comes to about the same depth: all at once, as loads in the loop are not
+        // The next packet, which comes to about the same depth: all at once, as loads in the loop
+        // are not
         const PacketLists next = packet_at(&in, i + PACKET_WIDE, j);
         if (next.longest > 0)
             fetch(&in, &next, k + 1);
-        // The others have looked at what is not theirs, or lies beside V_O's window, where there may be anything
+        // The others have looked at what is not theirs, or lies beside V_O's window, where there
+        // may be anything
         seen.sums.x = select((Real)(0.0f), seen.sums.x, wanted);
         seen.sums.y = select((Real)(0.0f), seen.sums.y, wanted);
         seen.sums.z = select((Real)(0.0f), seen.sums.z, wanted);
@@ -312,7 +325,8 @@ KERNEL_OF_LANES void raycast_aligned_view(
         if (whole) {
             // Four pixels of a row, or two of each of two rows
             vstore8(of_bundle[n].lo, 0, (__global float *)target);
-            vstore8(of_bundle[n].hi, 0, (__global float *)(BUNDLE_HIGH == 1 ? target + 2 : target - width));
+            vstore8(of_bundle[n].hi, 0,
+                    (__global float *)(BUNDLE_HIGH == 1 ? target + 2 : target - width));
             continue;
         }
         float4 colors[BUNDLE_WIDE * BUNDLE_HIGH];

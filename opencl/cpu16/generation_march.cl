@@ -1,7 +1,9 @@
-// Volume to records of runs along sixteen rays in vectors that are written out: generation/march_lists.cl, to the same bits.
+// Volume to records of runs along sixteen rays in vectors that are written out:
+// generation/march_lists.cl, to the same bits.
 //
-// A compiler would scatter the words of runs one by one in each turn, and gather: here a run is stored as it lies, by one store.
-// The march is one kernel and the fitting another because they want different vector code on a CPU.
+// A compiler would scatter the words of runs one by one in each turn, and gather: here a run is
+// stored as it lies, by one store. The march is one kernel and the fitting another because they
+// want different vector code on a CPU.
 #define LANES 16
 #include "volume/march.cl"
 #include "cpu16/generation_records.cl"
@@ -15,22 +17,14 @@ inline void store_last_run(__global float *records, Int starts, Int count, Run r
 }
 
 // Work-items are blocks of 4 x 4 rays.
-KERNEL_OF_LANES void march_lists(
-    const Classified classified,
-    __global const VOXEL_T *voxels,
-    __global const float4 *table,
-    __global const uchar *distances,
-    __global const uchar *blanked,
-    __global const float *gradient,
-    __global const float *lighting,
-    __global const float *ambient,
-    const RaysOfView view,
-    __global const float *forms,
-    const Recording recording,
-    __global const float *entering,
-    __global const float *thresholds,
-    __global float *records,
-    __global uint *counts)
+KERNEL_OF_LANES void march_lists(const Classified classified, __global const VOXEL_T *voxels,
+                                 __global const float4 *table, __global const uchar *distances,
+                                 __global const uchar *blanked, __global const float *gradient,
+                                 __global const float *lighting, __global const float *ambient,
+                                 const RaysOfView view, __global const float *forms,
+                                 const Recording recording, __global const float *entering,
+                                 __global const float *thresholds, __global float *records,
+                                 __global uint *counts)
 {
     const uint first = (uint)get_global_id(0) * LANES;
     const Rays rays = rays_of_view(&view, first);
@@ -39,7 +33,8 @@ KERNEL_OF_LANES void march_lists(
     March march;
     if (!ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b, INFINITY)))
         return;
-    const Medium medium = {classified, voxels, table, distances, blanked, gradient, lighting, ambient};
+    const Medium medium = {classified, voxels,   table,    distances,
+                           blanked,    gradient, lighting, ambient};
     const Int begin = march.begin + view.first_step;
     const Int begun = rays.present & (march.steps > begin);
     if (!ANY(begun))
@@ -50,12 +45,13 @@ KERNEL_OF_LANES void march_lists(
     records += record_start(first, recording.capacity);
     const Int lists = rays.y * view.columns + rays.x;
 
-    // The records' last runs may still grow. Their features, the means of their steps', are kept, which is cheaper than
-    // computing them of their media
+    // The records' last runs may still grow. Their features, the means of their steps', are kept,
+    // which is cheaper than computing them of their media
     Int count = load_counts(counts, lists, rays.present);
     const Int starts = LANE_NUMBERS * (recording.capacity * RUN_WORDS);
     const Int some = count > 0;
-    Real run_front = 0.0f, run_back = -INFINITY, tau = 0.0f, before = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f, opacity = 0.0f;
+    Real run_front = 0.0f, run_back = -INFINITY, tau = 0.0f, before = 0.0f, red = 0.0f,
+         green = 0.0f, blue = 0.0f, opacity = 0.0f;
     if (ANY(some)) {
         const Places places = {SELECT((Int)(0), starts + (count - 1) * RUN_WORDS, some)};
         const Run last = load_run_at(records, places.each);
@@ -71,7 +67,9 @@ KERNEL_OF_LANES void march_lists(
 #define GROWING_RUN RUN(run_front, run_back, tau, before, red, green, blue, opacity)
     Real unmet = 1.0f; // before the ray's first run
     if (entering) {
-        const Places places = {SELECT((Int)(0), (view.first_row - recording.window_row) * view.columns + lists, rays.present)};
+        const Places places = {
+            SELECT((Int)(0), (view.first_row - recording.window_row) * view.columns + lists,
+                   rays.present)};
 #define ENTERING(n) entering[places.each[n]]
         unmet = OF_LANES(Real, ENTERING);
 #undef ENTERING
@@ -79,22 +77,26 @@ KERNEL_OF_LANES void march_lists(
     Real transmittance = SELECT(unmet, before - before * opacity, some);
     Real4 feature = run_feature(GROWING_RUN, per_reference);
     Real run_length = SELECT((Real)(0.0f), (run_back - run_front) * per_reference, some);
-    // A ray that cannot keep every detail asks about homogeneity once in a voxel only: the steps of a group are composited
-    // without asking
+    // A ray that cannot keep every detail asks about homogeneity once in a voxel only: the steps of
+    // a group are composited without asking
     const Int group = SELECT((Int)(1), (Int)(recording.grain), threshold > recording.finest);
     Int k = begin;
     Int left = group; // steps of this group
     Real group_front = step_face(&march, k);
-    Real group_tau = 0.0f, group_red = 0.0f, group_green = 0.0f, group_blue = 0.0f, group_opacity = 0.0f;
-    // Every turn does the same for every ray, and what depends on the ray is selected: the lanes of a vector need no masks
+    Real group_tau = 0.0f, group_red = 0.0f, group_green = 0.0f, group_blue = 0.0f,
+         group_opacity = 0.0f;
+    // Every turn does the same for every ray, and what depends on the ray is selected: the lanes of
+    // a vector need no masks
     for (;;) {
         const Int active = k < end;
         if (!ANY(active))
             break;
         const Real front = step_face(&march, k), back = step_face(&march, k + 1);
-        const Int empty = empty_steps(&march, &medium, active & (left == group), k, end, group, front, back);
+        const Int empty =
+            empty_steps(&march, &medium, active & (left == group), k, end, group, front, back);
         const Real4 step = step_medium(&march, &medium, front, back);
-        // What is passed by is transparent, and so is its first step, which is looked at all the same
+        // What is passed by is transparent, and so is its first step, which is looked at all the
+        // same
         const Real step_tau = SELECT(step.w, (Real)(0.0f), empty > 0);
         const Real weight = (1.0f - group_opacity) * opacity_of(step_tau); // over, front to back
         group_tau += step_tau;
@@ -108,14 +110,16 @@ KERNEL_OF_LANES void march_lists(
         const Int visible = active & whole & (group_opacity > 0.0f) & (back > group_front);
 
         if (ANY(visible)) {
-            const Run sample = RUN(group_front, back, group_tau, transmittance, group_red, group_green, group_blue, group_opacity);
+            const Run sample = RUN(group_front, back, group_tau, transmittance, group_red,
+                                   group_green, group_blue, group_opacity);
             const Real sample_length = (back - group_front) * per_reference;
             const Real4 sample_feature = run_feature(sample, per_reference);
             const Real share = sample_length / (run_length + sample_length);
             const Real4 difference = difference_of(sample_feature, feature);
             const Run run = GROWING_RUN;
             // merge_error of generation/runs.cl, of runs that touch: as merged_with of one ray
-            const Real error = run_length * share * square_of(difference) * seen_weight(run, recording.hidden_weight);
+            const Real error = run_length * share * square_of(difference) *
+                               seen_weight(run, recording.hidden_weight);
             // A gap ends a run
             const Int grows = visible & (run_back == group_front) & (error <= threshold);
             const Int begins = visible & !grows;
@@ -138,7 +142,8 @@ KERNEL_OF_LANES void march_lists(
             feature.y = KEPT_OR(feature.y, sample_feature.y, feature.y + share * difference.y);
             feature.z = KEPT_OR(feature.z, sample_feature.z, feature.z + share * difference.z);
             feature.w = KEPT_OR(feature.w, sample_feature.w, feature.w + share * difference.w);
-            transmittance = SELECT(transmittance, transmittance - transmittance * group_opacity, visible);
+            transmittance =
+                SELECT(transmittance, transmittance - transmittance * group_opacity, visible);
 #undef KEPT_OR
         }
         left = SELECT(left, group, whole);
@@ -154,17 +159,15 @@ KERNEL_OF_LANES void march_lists(
     store_counts(counts, lists, rays.present, count);
 }
 
-KERNEL_OF_LANES void longest_marches(
-    const Classified classified,
-    const RaysOfView view,
-    __global const float *forms,
-    int slice_rows,
-    __global int *longest)
+KERNEL_OF_LANES void longest_marches(const Classified classified, const RaysOfView view,
+                                     __global const float *forms, int slice_rows,
+                                     __global int *longest)
 {
     const uint first = (uint)get_global_id(0) * LANES;
     const Rays rays = rays_of_view(&view, first);
     March march;
-    if (!ANY(rays.present) || !ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b, INFINITY)))
+    if (!ANY(rays.present) ||
+        !ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b, INFINITY)))
         return;
     __global int *of_slice = longest + block_pixel(first, view.columns).y / slice_rows;
     const int steps = largest_lane(SELECT((Int)(0), march.steps - march.begin, rays.present));

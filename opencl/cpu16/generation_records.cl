@@ -1,11 +1,13 @@
-// The runs of sixteen rays, and the records in which they lie: one run of each is loaded or stored in one piece and transposed.
+// The runs of sixteen rays, and the records in which they lie: one run of each is loaded or stored
+// in one piece and transposed.
 #include "lib/transpose.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 typedef struct {
     Real FRONT, BACK, TAU, TRANSMITTANCE, RED, GREEN, BLUE, OPACITY;
 } Run;
-#define RUN(front, back, tau, before, red, green, blue, opacity) ((Run){front, back, tau, before, red, green, blue, opacity})
+#define RUN(front, back, tau, before, red, green, blue, opacity)                                   \
+    ((Run){front, back, tau, before, red, green, blue, opacity})
 #include "generation/runs.cl"
 
 // In one load each, which a compiler may not take apart to put the words where they go one by one.
@@ -20,7 +22,7 @@ inline Run load_run_at(__global const float *records, Place *at)
 #define EVEN_QUARTERS(word) (Real)(low.word.s0123, low.word.s89ab, high.word.s0123, high.word.s89ab)
 #define ODD_QUARTERS(word) (Real)(low.word.s4567, low.word.scdef, high.word.s4567, high.word.scdef)
     const Run run = {EVEN_QUARTERS(x), EVEN_QUARTERS(y), EVEN_QUARTERS(z), EVEN_QUARTERS(w),
-                     ODD_QUARTERS(x), ODD_QUARTERS(y), ODD_QUARTERS(z), ODD_QUARTERS(w)};
+                     ODD_QUARTERS(x),  ODD_QUARTERS(y),  ODD_QUARTERS(z),  ODD_QUARTERS(w)};
 #undef EVEN_QUARTERS
 #undef ODD_QUARTERS
     return run;
@@ -29,20 +31,21 @@ inline Run load_run_at(__global const float *records, Place *at)
 // But of rays whose place is negative.
 inline void store_run_at(__global float *records, Place *at, Run run)
 {
-#define STORE_ROW(n, row)                                                                                             \
-    if (at[n] >= 0)                                                                                                   \
-        vstore8((float8)(row.s0123, row.s89ab), 0, records + at[n]);                                                  \
-    if (at[(n) + 4] >= 0)                                                                                             \
+#define STORE_ROW(n, row)                                                                          \
+    if (at[n] >= 0)                                                                                \
+        vstore8((float8)(row.s0123, row.s89ab), 0, records + at[n]);                               \
+    if (at[(n) + 4] >= 0)                                                                          \
         vstore8((float8)(row.s4567, row.scdef), 0, records + at[(n) + 4]);
-#define STORE_HALF(first, half)                                                                                       \
-    {                                                                                                                 \
-        const Real4 rows =                                                                                            \
-            transpose(REAL4((Real)(run.FRONT.half, run.RED.half), (Real)(run.BACK.half, run.GREEN.half),             \
-                             (Real)(run.TAU.half, run.BLUE.half), (Real)(run.TRANSMITTANCE.half, run.OPACITY.half))); \
-        STORE_ROW(first, rows.x)                                                                                      \
-        STORE_ROW(first + 1, rows.y)                                                                                  \
-        STORE_ROW(first + 2, rows.z)                                                                                  \
-        STORE_ROW(first + 3, rows.w)                                                                                  \
+#define STORE_HALF(first, half)                                                                    \
+    {                                                                                              \
+        const Real4 rows = transpose(REAL4((Real)(run.FRONT.half, run.RED.half),                   \
+                                           (Real)(run.BACK.half, run.GREEN.half),                  \
+                                           (Real)(run.TAU.half, run.BLUE.half),                    \
+                                           (Real)(run.TRANSMITTANCE.half, run.OPACITY.half)));     \
+        STORE_ROW(first, rows.x)                                                                   \
+        STORE_ROW(first + 1, rows.y)                                                               \
+        STORE_ROW(first + 2, rows.z)                                                               \
+        STORE_ROW(first + 3, rows.w)                                                               \
     }
     STORE_HALF(0, lo)
     STORE_HALF(8, hi)
@@ -50,7 +53,8 @@ inline void store_run_at(__global float *records, Place *at, Run run)
 #undef STORE_ROW
 }
 
-// How many runs there are of each ray that is in the window, from `counts` by list; the others have none.
+// How many runs there are of each ray that is in the window, from `counts` by list; the others have
+// none.
 inline Int load_counts(__global const uint *counts, Int lists, Int in_window)
 {
     const Places places = {lists}, wanted = {in_window};

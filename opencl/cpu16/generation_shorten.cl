@@ -1,8 +1,10 @@
-// Records of sixteen rays that have grown too long, brought to a number of runs: generation/shorten_lists.cl, to the same bits.
+// Records of sixteen rays that have grown too long, brought to a number of runs:
+// generation/shorten_lists.cl, to the same bits.
 //
-// Ray by ray each merge waits for the divisions of the one before, and for branches that no processor foresees. The rays of a
-// block of 4 x 4 take the same steps, and what depends on the ray is selected. Functions take the records of a work-item's
-// rays, and where each begins. Errors lie in rows of all lanes'.
+// Ray by ray each merge waits for the divisions of the one before, and for branches that no
+// processor foresees. The rays of a block of 4 x 4 take the same steps, and what depends on the ray
+// is selected. Functions take the records of a work-item's rays, and where each begins. Errors lie
+// in rows of all lanes'.
 #define LANES 16
 #include "volume/rays_of_view.cl"
 #include "cpu16/generation_records.cl"
@@ -29,8 +31,9 @@ inline Real4 selected_feature(Real4 otherwise, Real4 then, Int condition)
 }
 
 // errors[k]: what merging runs k and k + 1 costs; INFINITY where there are no two.
-inline void measure_errors(__global const float *records, const Places *starts, __global float *errors, Int counts, int most,
-                           Real per_reference, float hidden_weight)
+inline void measure_errors(__global const float *records, const Places *starts,
+                           __global float *errors, Int counts, int most, Real per_reference,
+                           float hidden_weight)
 {
     Run run = load_run_at(records, starts->each);
     Real4 feature = run_feature(run, per_reference);
@@ -38,7 +41,8 @@ inline void measure_errors(__global const float *records, const Places *starts, 
         const Run next = load_run_at(records + min(k + 1, most - 1) * RUN_WORDS, starts->each);
         const Real4 next_feature = run_feature(next, per_reference);
         const Int there = k + 1 < counts;
-        const Real error = merge_error(there, run, feature, next, next_feature, per_reference, hidden_weight);
+        const Real error =
+            merge_error(there, run, feature, next, next_feature, per_reference, hidden_weight);
         STORE_LANES(SELECT((Real)(INFINITY), error, there), k, errors);
         run = next;
         feature = next_feature;
@@ -68,10 +72,10 @@ inline Int least_error(__global const float *errors, int most)
     return at;
 }
 
-// Merge neighbours whose error is within thresholds, in one pass from front to back, for rays that are chosen. Returns how
-// many runs each ray has then.
-inline Int merge_within(__global float *records, const Places *starts, Int counts, Real thresholds, Int chosen, Real per_reference,
-                        float hidden_weight)
+// Merge neighbours whose error is within thresholds, in one pass from front to back, for rays that
+// are chosen. Returns how many runs each ray has then.
+inline Int merge_within(__global float *records, const Places *starts, Int counts, Real thresholds,
+                        Int chosen, Real per_reference, float hidden_weight)
 {
     const int most = largest_lane(counts);
     Run run = load_run_at(records, starts->each);
@@ -82,7 +86,8 @@ inline Int merge_within(__global float *records, const Places *starts, Int count
         const Run next = load_run_at(records + k * RUN_WORDS, starts->each);
         const Real4 next_feature = run_feature(next, per_reference);
         const Int there = chosen & (k < counts);
-        const Real error = merge_error(there, run, feature, next, next_feature, per_reference, hidden_weight);
+        const Real error =
+            merge_error(there, run, feature, next, next_feature, per_reference, hidden_weight);
         const Int begins = there & (error > thresholds);
         const Int grows = there & !begins;
         // Where a run is not at its end, or a ray at its last one, it is stored for nothing
@@ -99,8 +104,9 @@ inline Int merge_within(__global float *records, const Places *starts, Int count
 }
 
 // Raise thresholds and merge within them until at most `limit` runs of each ray are left.
-inline Int make_room(__global float *records, const Places *starts, __global float *errors, Int counts, int limit, Real *thresholds,
-                     Real per_reference, float hidden_weight)
+inline Int make_room(__global float *records, const Places *starts, __global float *errors,
+                     Int counts, int limit, Real *thresholds, Real per_reference,
+                     float hidden_weight)
 {
     for (;;) {
         const Int chosen = counts > limit;
@@ -114,7 +120,8 @@ inline Int make_room(__global float *records, const Places *starts, __global flo
                 break;
             *thresholds = SELECT(*thresholds, *thresholds * 4.0f, low);
         }
-        counts = merge_within(records, starts, counts, *thresholds, chosen, per_reference, hidden_weight);
+        counts = merge_within(records, starts, counts, *thresholds, chosen, per_reference,
+                              hidden_weight);
     }
 }
 
@@ -150,8 +157,8 @@ inline Run run_of(__global const float *records, Int starts, Int k)
 }
 
 // Merge, least error first, until at most `limit` runs of each ray are left.
-inline Int merge_to_limit(__global float *records, const Places *first, __global float *errors, Int counts, int limit,
-                          Real per_reference, float hidden_weight)
+inline Int merge_to_limit(__global float *records, const Places *first, __global float *errors,
+                          Int counts, int limit, Real per_reference, float hidden_weight)
 {
     const int most = largest_lane(counts);
     measure_errors(records, first, errors, counts, most, per_reference, hidden_weight);
@@ -173,14 +180,16 @@ inline Int merge_to_limit(__global float *records, const Places *first, __global
         const Run d = run_of(records, starts, max(before, 0));
         const Run merged = merged_runs(a, b);
         const Real4 feature = run_feature(merged, per_reference);
-        const Real ahead = merge_error(chosen & (behind < counts), merged, feature, c, run_feature(c, per_reference),
-                                       per_reference, hidden_weight);
-        const Real error_before = merge_error(chosen & (before >= 0), d, run_feature(d, per_reference), merged, feature,
-                                              per_reference, hidden_weight);
+        const Real ahead = merge_error(chosen & (behind < counts), merged, feature, c,
+                                       run_feature(c, per_reference), per_reference, hidden_weight);
+        const Real error_before =
+            merge_error(chosen & (before >= 0), d, run_feature(d, per_reference), merged, feature,
+                        per_reference, hidden_weight);
         const Real error_after = SELECT((Real)(INFINITY), ahead, behind < counts);
         const Places place = {starts + at * RUN_WORDS};
         store_run_at(records, place.each, selected_run(a, merged, chosen));
-        const Places taking = {at}, taken = {next}, last = {behind}, earlier = {before}, who = {chosen};
+        const Places taking = {at}, taken = {next}, last = {behind}, earlier = {before},
+                     who = {chosen};
         const float *after_each = (const float *)&error_after;
         const float *before_each = (const float *)&error_before;
         for (int lane = 0; lane < LANES; ++lane) {
@@ -215,15 +224,10 @@ inline Int merge_to_limit(__global float *records, const Places *first, __global
 }
 
 // Work-items are blocks of 4 x 4 rays.
-KERNEL_OF_LANES void shorten_lists(
-    const RaysOfView view,
-    __global const float *forms,
-    const Recording recording,
-    int exactly,
-    __global float *thresholds,
-    __global float *records,
-    __global float *errors,
-    __global uint *counts)
+KERNEL_OF_LANES void shorten_lists(const RaysOfView view, __global const float *forms,
+                                   const Recording recording, int exactly,
+                                   __global float *thresholds, __global float *records,
+                                   __global float *errors, __global uint *counts)
 {
     const uint first = (uint)get_global_id(0) * LANES;
     const Rays rays = rays_of_view(&view, first);
@@ -239,10 +243,12 @@ KERNEL_OF_LANES void shorten_lists(
     errors += errors_start(first, recording.capacity);
     const Places starts = {LANE_NUMBERS * (recording.capacity * RUN_WORDS)};
     if (exactly) {
-        runs = merge_to_limit(records, &starts, errors, runs, limit, per_reference, recording.hidden_weight);
+        runs = merge_to_limit(records, &starts, errors, runs, limit, per_reference,
+                              recording.hidden_weight);
     } else {
         Real raised = LOAD_LANES(0, thresholds + first);
-        runs = make_room(records, &starts, errors, runs, limit, &raised, per_reference, recording.hidden_weight);
+        runs = make_room(records, &starts, errors, runs, limit, &raised, per_reference,
+                         recording.hidden_weight);
         STORE_LANES(raised, 0, thresholds + first);
     }
     store_counts(counts, lists, rays.present, runs);

@@ -36,8 +36,10 @@ inline Words words_at(__global const ulong *words, Int places)
     const Places in_memory = {places};
     const volatile int *at = in_memory.each;
     __global const Word *of = (__global const Word *)words;
-    const Real p = as_float16((Words8)(of[at[0]], of[at[1]], of[at[4]], of[at[5]], of[at[8]], of[at[9]], of[at[12]], of[at[13]]));
-    const Real q = as_float16((Words8)(of[at[2]], of[at[3]], of[at[6]], of[at[7]], of[at[10]], of[at[11]], of[at[14]], of[at[15]]));
+    const Real p = as_float16((Words8)(of[at[0]], of[at[1]], of[at[4]], of[at[5]], of[at[8]],
+                                       of[at[9]], of[at[12]], of[at[13]]));
+    const Real q = as_float16((Words8)(of[at[2]], of[at[3]], of[at[6]], of[at[7]], of[at[10]],
+                                       of[at[11]], of[at[14]], of[at[15]]));
     Words halves;
     halves.low = as_uint16(((Real)(p.even, q.even)).JOINED);
     halves.high = as_uint16(((Real)(p.odd, q.odd)).JOINED);
@@ -51,7 +53,8 @@ typedef struct {
 
 inline ListOfEach lists_at(const Lists *lists, Int i, Int j, Int asks)
 {
-    const Words header = words_at(lists->headers, select((Int)(0), BUNDLE_OF_LIST(i, j, lists->wide), asks));
+    const Words header =
+        words_at(lists->headers, select((Int)(0), BUNDLE_OF_LIST(i, j, lists->wide), asks));
     ListOfEach list;
     list.first = AS_INT(header.low) + PLACE_IN_BUNDLE(i, j);
     list.count = AS_INT(header.high >> (FIRST_BITS - 32));
@@ -94,16 +97,17 @@ inline Real4 medium_met(const Lists *lists, const ListOfEach *list, Int n, Int a
 #define CLOSE_GUESSES 4
 
 typedef struct {
-    Int n;              // the guess, p of one ray's search
-    Int low, high;      // all before `low` end before the depth; the answer is `high` at most
-    Int missed;         // guesses that were wrong
-    Int passed, beyond; // whether the last one ends before the depth, or the one before it ends behind it
+    Int n;         // the guess, p of one ray's search
+    Int low, high; // all before `low` end before the depth; the answer is `high` at most
+    Int missed;    // guesses that were wrong
+    Int passed,
+        beyond; // whether the last one ends before the depth, or the one before it ends behind it
 } Searches;
 
 // Compare the guesses of those that are `searching`. Returns for which it is the answer, search->n:
 // list.count if all end before; *face is its face, infinite if there is none.
-inline Int search_on(Searches *search, const Lists *lists, const ListOfEach *list, Real depth, Int searching, bool away,
-                     FacesOfEach *face)
+inline Int search_on(Searches *search, const Lists *lists, const ListOfEach *list, Real depth,
+                     Int searching, bool away, FacesOfEach *face)
 {
     const Int n = min(search->n, list->count);
     const Int there = searching && n < list->count;

@@ -6,8 +6,8 @@
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// The rays' streams of one VDI: slots of the segments that are not behind what has been composited, and of those behind the last
-// ones. At the end of a stream a segment begins at infinity.
+// The rays' streams of one VDI: slots of the segments that are not behind what has been composited,
+// and of those behind the last ones. At the end of a stream a segment begins at infinity.
 typedef struct {
     Int slots, ends;
     Segments at;
@@ -27,19 +27,21 @@ inline void come_to_segments(Stream *stream, __global const float *rows, int cap
 }
 
 KERNEL_OF_LANES void merge_blocks(
-    __global float *pool,         // see multi_vdi/pool.cl
-    int capacity,                       // slots of a ray
-    __global const int *ends,           // (streams, rays)
-    __global const uchar *contributes,  // (streams, rays), see multi_vdi/segments.cl
-    int rays,                           // in the band
-    __global const int2 *cells,         // see lib/rays.cl
-    int first_cell,                     // the band's
-    int width, int height,              // window of V_N
-    float transmittance_cutoff,         // the ray ends where less than this is left
-    __global const int *streams_of,     // (VDIs): the stream of each, in the order in which owners are numbered
-    __global int *needed,               // slots that a ray of each cell needs; over the capacity, the ray is not drawn
-    __global float4 *image,             // premultiplied RGBA, top row first
-    __global short *owner)              // the VDI to which each pixel belongs, top row first; -1: to none
+    __global float *pool,              // see multi_vdi/pool.cl
+    int capacity,                      // slots of a ray
+    __global const int *ends,          // (streams, rays)
+    __global const uchar *contributes, // (streams, rays), see multi_vdi/segments.cl
+    int rays,                          // in the band
+    __global const int2 *cells,        // see lib/rays.cl
+    int first_cell,                    // the band's
+    int width, int height,             // window of V_N
+    float transmittance_cutoff,        // the ray ends where less than this is left
+    __global const int
+        *streams_of, // (VDIs): the stream of each, in the order in which owners are numbered
+    __global int
+        *needed, // slots that a ray of each cell needs; over the capacity, the ray is not drawn
+    __global float4 *image, // premultiplied RGBA, top row first
+    __global short *owner)  // the VDI to which each pixel belongs, top row first; -1: to none
 {
     const int first_ray = (int)get_global_id(0) * LANES;
     const int2 corner = cell_pixel(cells + first_cell, first_ray);
@@ -49,7 +51,8 @@ KERNEL_OF_LANES void merge_blocks(
     if (!ANY(in_window))
         return;
     const Pixels pixels = pixels_at(x, y, in_window, width, height);
-    const Int used = select((Int)(0), vload16(0, ends + (STREAMS - 1) * rays + first_ray), in_window);
+    const Int used =
+        select((Int)(0), vload16(0, ends + (STREAMS - 1) * rays + first_ray), in_window);
     const int most = largest_lane(used);
     __global int *const needed_here = needed + first_cell + first_ray / CELL_ITEMS;
     if (most > *needed_here) // an old value is only lower, and does no harm
@@ -77,8 +80,10 @@ KERNEL_OF_LANES void merge_blocks(
     Int first = 0;
     for (int j = 0; j < STREAMS; ++j) {
         streams[j].slots = first;
-        first = streams[j].ends = select((Int)(0), vload16(0, ends + j * rays + first_ray), in_window);
-        streams[j].at.optical_depth = streams[j].at.color.x = streams[j].at.color.y = streams[j].at.color.z = 0.0f;
+        first = streams[j].ends =
+            select((Int)(0), vload16(0, ends + j * rays + first_ray), in_window);
+        streams[j].at.optical_depth = streams[j].at.color.x = streams[j].at.color.y =
+            streams[j].at.color.z = 0.0f;
         streams[j].at.from = streams[j].at.to = INFINITY;
         come_to_segments(&streams[j], rows, capacity, in_window);
     }
@@ -94,11 +99,13 @@ KERNEL_OF_LANES void merge_blocks(
             break;
         Real end = INFINITY;
         for (int j = 0; j < STREAMS; ++j)
-            end = LOWER_OF(end, select(streams[j].at.from, streams[j].at.to, streams[j].at.from <= begin));
+            end = LOWER_OF(
+                end, select(streams[j].at.from, streams[j].at.to, streams[j].at.from <= begin));
 
         // Its medium
-        Real optical_depth = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f; // colour times optical depth
-        Real4 color;                                                       // of the last one
+        Real optical_depth = 0.0f, red = 0.0f, green = 0.0f,
+             blue = 0.0f; // colour times optical depth
+        Real4 color;      // of the last one
         color.x = color.y = color.z = color.w = 0.0f;
         Int covering = 0;
         for (int j = 0; j < STREAMS; ++j) {
@@ -106,7 +113,8 @@ KERNEL_OF_LANES void merge_blocks(
             const Int covers = goes && at.from <= begin;
             const Int ends_here = covers && at.to <= end;
             // A segment that nothing cuts keeps its optical depth, however short it is in t
-            const Real share = select((end - begin) / (at.to - at.from), (Real)(1.0f), ends_here && at.from >= begin);
+            const Real share = select((end - begin) / (at.to - at.from), (Real)(1.0f),
+                                      ends_here && at.from >= begin);
             const Real part = select((Real)(0.0f), at.optical_depth * share, covers);
             red += part * at.color.x;
             green += part * at.color.y;
@@ -122,7 +130,7 @@ KERNEL_OF_LANES void merge_blocks(
             }
         }
         const Int several = covering > 1;
-        const Real per_depth = 1.0f / optical_depth; // one division, not three
+        const Real per_depth = 1.0f / optical_depth;        // one division, not three
         const Int meets = goes && optical_depth >= FLT_MIN; // of less, the reciprocal is not finite
         color.x = select(color.x, red * per_depth, several);
         color.y = select(color.y, green * per_depth, several);

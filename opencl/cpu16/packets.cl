@@ -2,10 +2,10 @@
 // rays in a work-item (docs/decisions/packets.md).
 //
 // A packet's rays cross the same lists, if not at the same depth. The work-item sweeps over the
-// lists along one axis of V_O's window, p, from where its first ray begins: in each column of lists,
-// list by list along the other axis, q, all rays that cross the list go on through it together,
-// while rays that are ahead wait. So each list and each supersegment is loaded once for the packet.
-// What a ray does is the same as in raycasting/walk.cl, whatever the others do.
+// lists along one axis of V_O's window, p, from where its first ray begins: in each column of
+// lists, list by list along the other axis, q, all rays that cross the list go on through it
+// together, while rays that are ahead wait. So each list and each supersegment is loaded once for
+// the packet. What a ray does is the same as in raycasting/walk.cl, whatever the others do.
 //
 // -D SWEEP_V=0, 1      p is v, not u
 // -D UPRIGHT=0, 1      packets stand on end in the window of V_N
@@ -25,16 +25,15 @@ typedef float Border;
 #define NOWHERE INT_MAX
 
 // The least of those that are chosen, NOWHERE if none is.
-inline int least_of(Int x, Int chosen)
-{
-    return least_lane(select((Int)(NOWHERE), x, chosen));
-}
+inline int least_of(Int x, Int chosen) { return least_lane(select((Int)(NOWHERE), x, chosen)); }
 
-// A packet's pixels lie along the image of the line that its rays share in V_O's window: an epipolar line. Rays of one plane
-// through both eyes cross the same lists, one after another. `epipole` is where V_N sees V_O's eye: homogeneous pixel offsets
-// along the strips' width, across it, and their denominator. A strip is LANES pixels wide; its packets are numbered by where
-// they meet that of its edges that is farther from the epipole, from before the window on. Lines draw together towards the
-// epipole: a pixel may be in two packets or more, whose numbers follow one another, and is in one at least.
+// A packet's pixels lie along the image of the line that its rays share in V_O's window: an
+// epipolar line. Rays of one plane through both eyes cross the same lists, one after another.
+// `epipole` is where V_N sees V_O's eye: homogeneous pixel offsets along the strips' width, across
+// it, and their denominator. A strip is LANES pixels wide; its packets are numbered by where they
+// meet that of its edges that is farther from the epipole, from before the window on. Lines draw
+// together towards the epipole: a pixel may be in two packets or more, whose numbers follow one
+// another, and is in one at least.
 inline Int across_strip(int first, int number, int along_size, int across_size, float4 epipole)
 {
     const float first_offset = (float)first + 0.5f - 0.5f * (float)along_size;
@@ -49,7 +48,8 @@ inline Int across_strip(int first, int number, int along_size, int across_size, 
         const float offset = (float)number + 0.5f - 0.5f * (float)across_size;
         slope = clamp((epipole.y - offset * epipole.z) * (1.0f / farther), -STEEPEST, STEEPEST);
     }
-    return number + convert_int16_rte(slope * convert_float16(LANE_NUMBERS - (last_is_farther ? LANES - 1 : 0)));
+    return number + convert_int16_rte(
+                        slope * convert_float16(LANE_NUMBERS - (last_is_farther ? LANES - 1 : 0)));
 }
 
 // Of u's and v's, that of p and that of q; and of p's and q's, those of u and v
@@ -63,10 +63,11 @@ typedef struct {
     Real depth; // in their sense, see raycasting/first_supersegment.cl
 } Progress;
 
-// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to another
-// stack has a `new_stack` there.
-inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, const ListRays *rays, const Axis *p, const Axis *q,
-                    const Sense *sense, const Grid *grid, float depth_origin)
+// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to
+// another stack has a `new_stack` there.
+inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, const ListRays *rays,
+                             const Axis *p, const Axis *q, const Sense *sense, const Grid *grid,
+                             float depth_origin)
 {
     const int stack_p = P >> STACK_SHIFT;
     while (ANY(looks)) {
@@ -75,10 +76,12 @@ inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, co
         const Int index_q = now->q * q->step;
         const Int here = looks && index_q >> STACK_SHIFT == stack_q;
         looks = looks && !here;
-        const ulong mask = grid->masks[SECOND_OF(stack_p, stack_q) * grid->stacks_wide + FIRST_OF(stack_p, stack_q)];
+        const ulong mask = grid->masks[SECOND_OF(stack_p, stack_q) * grid->stacks_wide +
+                                       FIRST_OF(stack_p, stack_q)];
         Int nearest, nothing;
-        const Int passes = look_ahead(&nearest, &nothing, (Uint)((uint)mask), (Uint)((uint)(mask >> HALF_SLABS)), sense,
-                                      now->depth, here, grid, depth_origin);
+        const Int passes =
+            look_ahead(&nearest, &nothing, (Uint)((uint)mask), (Uint)((uint)(mask >> HALF_SLABS)),
+                       sense, now->depth, here, grid, depth_origin);
         if (!ANY(passes))
             continue;
         const int edge_p = stack_edge(p, stack_p << STACK_SHIFT);
@@ -91,21 +94,23 @@ inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, co
         const Real r = r_entered(q, r_entered(p, now->r, (Int)(P), next_p), index_q, next_q);
         now->r = select(now->r, r, moves);
         now->depth = select(now->depth, depth_at(sense, r), moves);
-        const Int ends = r_until >= rays->r_begin + 1.0f || next_p < 0 || next_p >= p->lists || next_q < 0 ||
-                         next_q >= q->lists;
+        const Int ends = r_until >= rays->r_begin + 1.0f || next_p < 0 || next_p >= p->lists ||
+                         next_q < 0 || next_q >= q->lists;
         now->q = select(now->q, next_q * q->step, passes);
         now->p = select(now->p, select(next_p * p->step, (Int)(NOWHERE), ends), passes);
-        const Int enters = passes && !ends && ((next_p ^ P) | (next_q ^ index_q)) >> STACK_SHIFT != 0;
+        const Int enters =
+            passes && !ends && ((next_p ^ P) | (next_q ^ index_q)) >> STACK_SHIFT != 0;
         looks = looks || (enters && next_p == P);
         *new_stack = *new_stack || (enters && next_p != P);
     }
 }
 
-// The supersegment that each ray has met last and that is not composited yet: that takes as long for one ray as for all, and
-// few of them are in the same supersegment at a time.
+// The supersegment that each ray has met last and that is not composited yet: that takes as long
+// for one ray as for all, and few of them are in the same supersegment at a time.
 typedef struct {
     Int waits; // rays that have one
-    Real near, far, r, r_next; // its faces in their sense, and from where to where they cross the list
+    Real near, far, r,
+        r_next; // its faces in their sense, and from where to where they cross the list
     Real4 medium;
 } Met;
 
@@ -113,39 +118,44 @@ typedef struct {
 inline void composite_met(Seen *seen, Met *met, const ListRays *rays, const Sense *sense)
 {
     Real from, to;
-    clip_to_faces(&from, &to, sense, met->near, met->far, met->r, met->r_next, depth_at(sense, met->r),
-                  depth_at(sense, met->r_next));
-    composite_medium(seen, met->medium.w * lengths_between(rays, from, to), met->medium, met->waits);
+    clip_to_faces(&from, &to, sense, met->near, met->far, met->r, met->r_next,
+                  depth_at(sense, met->r), depth_at(sense, met->r_next));
+    composite_medium(seen, met->medium.w * lengths_between(rays, from, to), met->medium,
+                     met->waits);
     met->waits = 0;
 }
 
 // Where rays enter and leave the n-th supersegment that they come to, in their sense.
 inline float near_face(const Lists *lists, List list, int n, bool away, float depth_origin)
 {
-    return away ? face_of(lists, list, n, depth_origin).x : -face_of(lists, list, list.count - 1 - n, depth_origin).y;
+    return away ? face_of(lists, list, n, depth_origin).x
+                : -face_of(lists, list, list.count - 1 - n, depth_origin).y;
 }
 
 inline float far_face(const Lists *lists, List list, int n, bool away, float depth_origin)
 {
-    return away ? face_of(lists, list, n, depth_origin).y : -face_of(lists, list, list.count - 1 - n, depth_origin).x;
+    return away ? face_of(lists, list, n, depth_origin).y
+                : -face_of(lists, list, list.count - 1 - n, depth_origin).x;
 }
 
 // Follow the rays that are `going`, which step the same way, through all lists that they cross.
-__attribute__((always_inline))
-inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q, Int going, Int first_p, Int first_q,
-                  bool away, const Lists *lists, const Grid *grid, float depth_origin, float cutoff)
+__attribute__((always_inline)) inline void sweep(Seen *seen, const ListRays *rays, const Axis *p,
+                                                 const Axis *q, Int going, Int first_p, Int first_q,
+                                                 bool away, const Lists *lists, const Grid *grid,
+                                                 float depth_origin, float cutoff)
 {
     const Sense sense = sense_of(rays->along.z, rays->deep.z, away);
     const Real r_end = rays->r_begin + 1.0f;
     Met met;
     met.waits = 0;
-    met.near = met.far = met.r = met.r_next = met.medium.x = met.medium.y = met.medium.z = met.medium.w = 0.0f;
+    met.near = met.far = met.r = met.r_next = met.medium.x = met.medium.y = met.medium.z =
+        met.medium.w = 0.0f;
     Progress now;
     now.p = select((Int)(NOWHERE), first_p * p->step, going);
     now.q = first_q * q->step;
     now.r = rays->r_begin;
     now.depth = sense.sign * rays->start.z;
-    int n = 0; // the supersegment that the last list was left at
+    int n = 0;             // the supersegment that the last list was left at
     Int new_stack = going; // lanes in a stack that they have not looked at
     for (int place_p = least_lane(now.p); place_p != NOWHERE; place_p = least_lane(now.p)) {
         const int P = place_p * p->step;
@@ -173,7 +183,8 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
 
             const List list = list_at(lists, FIRST_OF(P, Q), SECOND_OF(P, Q));
             n = min(n, list.count);
-            while (n > 0 && ANY(here && far_face(lists, list, n - 1, away, depth_origin) > now.depth))
+            while (n > 0 &&
+                   ANY(here && far_face(lists, list, n - 1, away, depth_origin) > now.depth))
                 --n;
             for (int k = n; k < list.count; ++k) {
                 const float near = near_face(lists, list, k, away, depth_origin);
@@ -209,7 +220,8 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
             now.p = select(select(now.p, (Int)(place_p + 1), steps_p), (Int)(NOWHERE), ends);
             now.q = select(now.q, (Int)(place_q + 1), steps_q);
             column = now.p == place_p;
-            const bool goes_on = ANY(column); // here, where it is one instruction, as the comparison has just made a mask
+            const bool goes_on = ANY(column); // here, where it is one instruction, as the
+                                              // comparison has just made a mask
             if (((P + p->step) ^ P) >> STACK_SHIFT)
                 new_stack = new_stack || steps_p;
             if (((Q + q->step) ^ Q) >> STACK_SHIFT)
@@ -222,18 +234,15 @@ inline void sweep(Seen *seen, const ListRays *rays, const Axis *p, const Axis *q
 }
 
 KERNEL_OF_LANES void raycast_packets(
-    __global const HEADER_T *headers,   // these as of raycasting/raycast.cl
-    __global const ulong *faces,
-    __global const ulong *media,
-    __global const float *forms,
-    __global const float *opaque_depth,
-    __global const ulong *masks,
-    Frame frame,
-    float4 epipole,                     // see across_strip
-    int4 part,                          // of the window: first strip, how many, number of each strip's first packet
+    __global const HEADER_T *headers, // these as of raycasting/raycast.cl
+    __global const ulong *faces, __global const ulong *media, __global const float *forms,
+    __global const float *opaque_depth, __global const ulong *masks, Frame frame,
+    float4 epipole, // see across_strip
+    int4 part,      // of the window: first strip, how many, number of each strip's first packet
     __global float4 *image)
 {
-    const int along_size = UPRIGHT ? frame.height : frame.width, across_size = UPRIGHT ? frame.width : frame.height;
+    const int along_size = UPRIGHT ? frame.height : frame.width,
+              across_size = UPRIGHT ? frame.width : frame.height;
     // Strips lie side by side in blocks of LANES packets, so that what is close in the window is
     // close in time
     const int item = (int)get_global_id(0);
@@ -251,8 +260,8 @@ KERNEL_OF_LANES void raycast_packets(
     const Int x = UPRIGHT ? across : along, y = UPRIGHT ? along : across;
     const Pixels pixels = pixels_at(x, y, in_window, frame.width, frame.height);
     const Real t_end = frame.has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Real)(INFINITY);
-    const ListRays rays = begin_rays(forms, &frame, offsets_from_middle(x, frame.width), offsets_from_middle(y, frame.height),
-                                     t_end, in_window);
+    const ListRays rays = begin_rays(forms, &frame, offsets_from_middle(x, frame.width),
+                                     offsets_from_middle(y, frame.height), t_end, in_window);
     const Lists lists = LISTS_OF(frame);
     const Grid grid = GRID_OF(frame);
 
@@ -272,9 +281,11 @@ KERNEL_OF_LANES void raycast_packets(
         take_step(&p, (way & 2) != 0);
         take_step(&q, (way & 4) != 0);
         if (way & 1)
-            sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, &lists, &grid, frame.depth_origin, frame.cutoff);
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, &lists, &grid,
+                  frame.depth_origin, frame.cutoff);
         else
-            sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, &lists, &grid, frame.depth_origin, frame.cutoff);
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, &lists, &grid,
+                  frame.depth_origin, frame.cutoff);
     }
     write_pixels(image, &pixels, composited(&seen));
 }

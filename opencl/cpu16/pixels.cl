@@ -38,6 +38,7 @@ inline void write_pixels(__global float4 *image, const Pixels *pixels, Real4 rgb
     STORE_LANES(rgba.w, 0, channels[3]);
     for (int k = 0; k < LANES; ++k) {
         if (pixels->wanted[k])
-            image[pixels->places[k]] = (float4)(channels[0][k], channels[1][k], channels[2][k], channels[3][k]);
+            image[pixels->places[k]] =
+                (float4)(channels[0][k], channels[1][k], channels[2][k], channels[3][k]);
     }
 }

@@ -10,16 +10,16 @@
 #pragma OPENCL FP_CONTRACT OFF
 
 typedef struct {
-    Int present;         // those that meet what they are clipped to, and of which something is kept
-    Real3 start;         // where they enter it: u, v, depth coordinate
-    Real3 deep, along;   // point(r) = deep + r along
-    Int away;            // from V_O: depth does not decrease along the ray
-    Real r_begin;        // 0 or -1; they end at r_begin + 1
-    Real scale;          // model length per unit of r, but for the division by w(r_a) w(r_b)
+    Int present;       // those that meet what they are clipped to, and of which something is kept
+    Real3 start;       // where they enter it: u, v, depth coordinate
+    Real3 deep, along; // point(r) = deep + r along
+    Int away;          // from V_O: depth does not decrease along the ray
+    Real r_begin;      // 0 or -1; they end at r_begin + 1
+    Real scale;        // model length per unit of r, but for the division by w(r_a) w(r_b)
     Real w_deep, w_along;
-    Real t_deep;         // t where r is 0
-    Real t_scale;        // t per unit of r, but for the division by w(r) in perspective
-    Kept kept;           // parts of them, in r
+    Real t_deep;  // t where r is 0
+    Real t_scale; // t per unit of r, but for the division by w(r) in perspective
+    Kept kept;    // parts of them, in r
 } ListRays;
 
 // 1 / Z at r. Not used in parallel projection.
@@ -29,8 +29,8 @@ inline Real reciprocal_depth_at(const ListRays *rays, Real r)
 }
 
 // The kept parts of rays from t_deep, where r is 0, to t_other.
-inline Kept kept_parts_of_rays(__global const float *forms, int planes, Real a, Real b, Real t_deep, Real t_other,
-                               Real r_other, uint regions)
+inline Kept kept_parts_of_rays(__global const float *forms, int planes, Real a, Real b, Real t_deep,
+                               Real t_other, Real r_other, uint regions)
 {
     __global const float *form = forms + (PLANE_FORMS + planes) * FORM_SIZE;
     Real at_deep[CROPPING_PLANES], at_other[CROPPING_PLANES];
@@ -48,12 +48,14 @@ inline Kept kept_parts_of_rays(__global const float *forms, int planes, Real a, 
 
 // Begin the rays of pixel offsets (a, b) that are `wanted`, which end at `t_end`; `forms` as for
 // begin_ray of raycasting/ray.cl.
-inline ListRays begin_rays(__global const float *forms, const Frame *frame, Real a, Real b, Real t_end, Int wanted)
+inline ListRays begin_rays(__global const float *forms, const Frame *frame, Real a, Real b,
+                           Real t_end, Int wanted)
 {
     ListRays rays;
     Real t0 = -INFINITY;
     Real t1 = t_end;
-    rays.present = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, frame->planes, a, b, &t0, &t1) && wanted;
+    rays.present =
+        clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, frame->planes, a, b, &t0, &t1) && wanted;
     // Where nothing is to be drawn, anything finite
     t0 = select((Real)(0.0f), t0, rays.present);
     t1 = select((Real)(1.0f), t1, rays.present);
@@ -76,7 +78,8 @@ inline ListRays begin_rays(__global const float *forms, const Frame *frame, Real
     rays.w_deep = rays.w_along = 0.0f;
     const Real r_other = select((Real)(1.0f), (Real)(-1.0f), rays.away);
     if (DEPTH != PARALLEL) {
-        rays.scale *= reciprocal_depth(rays.start.z, frame->depth_origin) * reciprocal_depth(end.z, frame->depth_origin);
+        rays.scale *= reciprocal_depth(rays.start.z, frame->depth_origin) *
+                      reciprocal_depth(end.z, frame->depth_origin);
         rays.w_deep = reciprocal_depth(rays.deep.z, frame->depth_origin);
         rays.w_along = -rays.along.z;
         if (DEPTH == SHIFTED)
@@ -85,7 +88,8 @@ inline ListRays begin_rays(__global const float *forms, const Frame *frame, Real
     }
     if (CROPPED) {
         const Real t_other = select(t1, t0, rays.away);
-        rays.kept = kept_parts_of_rays(forms, frame->planes, a, b, rays.t_deep, t_other, r_other, frame->regions);
+        rays.kept = kept_parts_of_rays(forms, frame->planes, a, b, rays.t_deep, t_other, r_other,
+                                       frame->regions);
         rays.present = rays.present && rays.kept.count > 0;
     }
     return rays;
@@ -104,5 +108,6 @@ inline Real lengths_between(const ListRays *rays, Real from, Real to)
 {
     if (DEPTH == PARALLEL)
         return rays->scale * (to - from);
-    return rays->scale * (to - from) / (reciprocal_depth_at(rays, from) * reciprocal_depth_at(rays, to));
+    return rays->scale * (to - from) /
+           (reciprocal_depth_at(rays, from) * reciprocal_depth_at(rays, to));
 }

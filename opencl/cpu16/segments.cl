@@ -10,15 +10,15 @@
 // What is written of the rays.
 typedef struct {
     __global float *rows;
-    int capacity;       // slots of a ray
-    Int slots;          // behind the last segments
-    Real reached;       // t, so that rounding puts no segment before the end of another
-    Real absorbed;      // optical depth
+    int capacity;  // slots of a ray
+    Int slots;     // behind the last segments
+    Real reached;  // t, so that rounding puts no segment before the end of another
+    Real absorbed; // optical depth
 } Streams;
 
 // Append what the rays that are chosen cross of a medium, from r = from to r = to.
-inline void append_segments(Streams *streams, const ListRays *rays, Real from, Real to, Real4 medium, Int chosen,
-                            float depth_shift)
+inline void append_segments(Streams *streams, const ListRays *rays, Real from, Real to,
+                            Real4 medium, Int chosen, float depth_shift)
 {
     Segments segments;
     segments.color = medium;
@@ -33,16 +33,17 @@ inline void append_segments(Streams *streams, const ListRays *rays, Real from, R
 }
 
 // Follow the rays that are `active`, of which all go away or come back.
-__attribute__((always_inline))
-inline void follow(Streams *streams, const Paths *paths, Int active, bool away, const Lists *lists, const Grid *grid,
-                   const Frame *frame, float depth_shift)
+__attribute__((always_inline)) inline void follow(Streams *streams, const Paths *paths, Int active,
+                                                  bool away, const Lists *lists, const Grid *grid,
+                                                  const Frame *frame, float depth_shift)
 {
     const ListRays *rays = &paths->rays;
     const Sense sense = sense_of(rays->along.z, rays->deep.z, away);
     Cursors at = begin_walk(paths, &sense, active);
     for (int turn = 0; ANY(at.active); ++turn) {
         if (SKIP_EMPTY && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
-            skip_empty_cells(&at, at.new_stack && at.active, paths, &sense, grid, frame->depth_origin);
+            skip_empty_cells(&at, at.new_stack && at.active, paths, &sense, grid,
+                             frame->depth_origin);
             at.new_stack = 0;
             if (!ANY(at.active))
                 break;
@@ -57,7 +58,8 @@ inline void follow(Streams *streams, const Paths *paths, Int active, bool away, 
                 Real kept_from = from, kept_to = to;
                 if (CROPPED)
                     cut_to_part(&rays->kept, n, &kept_from, &kept_to);
-                append_segments(streams, rays, kept_from, kept_to, medium, crossing.meets, depth_shift);
+                append_segments(streams, rays, kept_from, kept_to, medium, crossing.meets,
+                                depth_shift);
             }
         }
         step_on(&at, &crossing, paths, streams->absorbed > frame->cutoff);
@@ -72,38 +74,30 @@ inline Int surely_covered(__global const float *forms, Real a, Real b, float mar
     if (margin == 0.0f)
         return meet;
     // The bounds' image is convex: mostly the block's corners speak for all
-    const Real corners_a = select((Real)(a.s0 - margin), (Real)(a.sf + margin), (LANE_NUMBERS & 1) != 0);
-    const Real corners_b = select((Real)(b.s0 - margin), (Real)(b.sf + margin), (LANE_NUMBERS & 2) != 0);
+    const Real corners_a =
+        select((Real)(a.s0 - margin), (Real)(a.sf + margin), (LANE_NUMBERS & 1) != 0);
+    const Real corners_b =
+        select((Real)(b.s0 - margin), (Real)(b.sf + margin), (LANE_NUMBERS & 2) != 0);
     if (ALL(clip_to_planes(bounds, BOX_PLANES, corners_a, corners_b, &t0, &t1)))
         return meet;
     for (int corner = 0; corner < 4; ++corner) {
         t0 = -INFINITY;
         t1 = INFINITY;
-        meet = clip_to_planes(bounds, BOX_PLANES, a + (corner & 1 ? margin : -margin), b + (corner & 2 ? margin : -margin),
-                              &t0, &t1) && meet;
+        meet = clip_to_planes(bounds, BOX_PLANES, a + (corner & 1 ? margin : -margin),
+                              b + (corner & 2 ? margin : -margin), &t0, &t1) &&
+               meet;
     }
     return meet;
 }
 
-KERNEL_OF_LANES void segments_of_blocks(
-    __global const HEADER_T *headers, // these as of multi_vdi/segments.cl
-    __global const ulong *faces,
-    __global const ulong *media,
-    __global const float *forms,
-    __global const float *opaque_depth,
-    __global const ulong *masks,
-    Frame frame,
-    __global const int2 *cells,
-    int first_cell,
-    int number,
-    int band_rays,
-    float depth_shift,
-    float margin,
-    int capacity,
-    __global float *pool,
-    __global int *ends,
-    __global uchar *contributes,
-    __global float *dark)
+KERNEL_OF_LANES void
+segments_of_blocks(__global const HEADER_T *headers, // these as of multi_vdi/segments.cl
+                   __global const ulong *faces, __global const ulong *media,
+                   __global const float *forms, __global const float *opaque_depth,
+                   __global const ulong *masks, Frame frame, __global const int2 *cells,
+                   int first_cell, int number, int band_rays, float depth_shift, float margin,
+                   int capacity, __global float *pool, __global int *ends,
+                   __global uchar *contributes, __global float *dark)
 {
     const int first_ray = (int)get_global_id(0) * LANES;
     const int2 corner = cell_pixel(cells + first_cell, first_ray);
@@ -115,7 +109,8 @@ KERNEL_OF_LANES void segments_of_blocks(
     Real t_end = frame.has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Real)(INFINITY);
     const Real dark_before = number > 0 ? vload16(0, dark + first_ray) : (Real)(INFINITY);
     t_end = select(t_end, fmin(t_end, DARK_FROM(dark_before, depth_shift)), dark_before < INFINITY);
-    const Int first_slots = number > 0 ? vload16(0, ends + (number - 1) * band_rays + first_ray) : (Int)(0);
+    const Int first_slots =
+        number > 0 ? vload16(0, ends + (number - 1) * band_rays + first_ray) : (Int)(0);
     Streams streams = {pool_of(pool, first_ray, capacity), capacity, first_slots, -INFINITY, 0.0f};
     const Lists lists = LISTS_OF(frame);
     const Grid grid = GRID_OF(frame);
@@ -135,5 +130,6 @@ KERNEL_OF_LANES void segments_of_blocks(
     vstore16(select(dark_before, reached, streams.absorbed > frame.cutoff), 0, dark + first_ray);
     const Int meets = streams.slots > first_slots;
     const Int covered = ANY(meets) ? surely_covered(forms, a, b, margin, meets) : (Int)(0);
-    vstore16(TO_UCHAR(COUNT(meets) + COUNT(covered)), 0, contributes + number * band_rays + first_ray);
+    vstore16(TO_UCHAR(COUNT(meets) + COUNT(covered)), 0,
+             contributes + number * band_rays + first_ray);
 }

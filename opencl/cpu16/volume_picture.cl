@@ -6,7 +6,8 @@
 // Pixels of rays through a window, top row first; -1 where there is none.
 inline Places places_in_picture(const Rays *rays, int width, int height)
 {
-    const Places places = {SELECT((Int)(-1), (height - 1 - rays->y) * width + rays->x, rays->present)};
+    const Places places = {
+        SELECT((Int)(-1), (height - 1 - rays->y) * width + rays->x, rays->present)};
     return places;
 }
 
@@ -25,10 +26,12 @@ inline void store_colors(__global float4 *image, const Places *places, Real4 rgb
 {
     Place *place = places->each;
     const Real4 rows = transpose(rgba);
-#define STORE(n, c, four)   \
-    if (place[n] >= 0)      \
+#define STORE(n, c, four)                                                                          \
+    if (place[n] >= 0)                                                                             \
         image[place[n]] = rows.c.four;
-#define STORE_ROW(g, four) STORE(4 * g, x, four) STORE(4 * g + 1, y, four) STORE(4 * g + 2, z, four) STORE(4 * g + 3, w, four)
+#define STORE_ROW(g, four)                                                                         \
+    STORE(4 * g, x, four)                                                                          \
+    STORE(4 * g + 1, y, four) STORE(4 * g + 2, z, four) STORE(4 * g + 3, w, four)
     STORE_ROW(0, s0123)
     STORE_ROW(1, s4567)
     STORE_ROW(2, s89ab)

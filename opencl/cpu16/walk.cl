@@ -1,6 +1,6 @@
 // The walk of raycasting/walk.cl of a block of 4 x 4 rays (docs/decisions/blocks.md), of which all
-// go away from V_O or come back: each turn, each ray makes a guess, meets a supersegment or leaves a
-// list, or the last two.
+// go away from V_O or come back: each turn, each ray makes a guess, meets a supersegment or leaves
+// a list, or the last two.
 //
 // Lists are of supersegments of 24 bytes, with OFFSET_T int. What one ray has, and sixteen:
 //
@@ -28,7 +28,8 @@ typedef struct {
     Axis u, v;
 } Paths;
 
-inline Paths begin_paths(__global const float *forms, const Frame *frame, Real a, Real b, Real t_end, Int wanted)
+inline Paths begin_paths(__global const float *forms, const Frame *frame, Real a, Real b,
+                         Real t_end, Int wanted)
 {
     Paths paths;
     paths.rays = begin_rays(forms, frame, a, b, t_end, wanted);
@@ -44,12 +45,14 @@ inline Paths begin_paths(__global const float *forms, const Frame *frame, Real a
 inline void prefetch_ends(const Paths *paths, const Lists *lists, int height)
 {
     const Axis *u = &paths->u, *v = &paths->v;
-    const Int crosses_few = paths->rays.present && fabs(u->along) + fabs(v->along) < LISTS_TO_PREFETCH;
+    const Int crosses_few =
+        paths->rays.present && fabs(u->along) + fabs(v->along) < LISTS_TO_PREFETCH;
     if (!ANY(crosses_few))
         return;
     const int shift = BLOCK * lists->high / height;
     const Real r_end = paths->rays.r_begin + 1.0f;
-    const Int first_i = list_index(u, paths->rays.start.x, shift), first_j = list_index(v, paths->rays.start.y, 0);
+    const Int first_i = list_index(u, paths->rays.start.x, shift),
+              first_j = list_index(v, paths->rays.start.y, 0);
     const Int last_i = list_index(u, fma(r_end, u->along, u->deep), shift);
     const Int last_j = list_index(v, fma(r_end, v->along, v->deep), 0);
     int columns[2][LANES], rows[2][LANES], wanted[2][LANES];
@@ -69,11 +72,11 @@ inline void prefetch_ends(const Paths *paths, const Lists *lists, int height)
 
 // How far the rays have come.
 typedef struct {
-    Int i, j;    // lists
+    Int i, j; // lists
     Real r;
-    Real depth;  // in their sense
+    Real depth; // in their sense
     Searches search;
-    Int active;  // rays that have not ended
+    Int active;    // rays that have not ended
     Int new_stack; // rays in a stack that they have not looked at
 } Cursors;
 
@@ -98,15 +101,16 @@ inline Int are_outside(const Paths *paths, Int i, Int j)
 
 // Pass by stacks, and parts of stacks, whose slabs ahead are empty, for the rays that look. Written
 // with selects, and in a loop of its own, so that the rays meet again behind it.
-inline void skip_empty_cells(Cursors *at, Int looks, const Paths *paths, const Sense *sense, const Grid *grid,
-                             float depth_origin)
+inline void skip_empty_cells(Cursors *at, Int looks, const Paths *paths, const Sense *sense,
+                             const Grid *grid, float depth_origin)
 {
     const Axis *u = &paths->u, *v = &paths->v;
     while (ANY(looks)) {
         const Int stack = (at->j >> STACK_SHIFT) * grid->stacks_wide + (at->i >> STACK_SHIFT);
         const Words mask = words_at(grid->masks, select((Int)(0), stack, looks));
         Int nearest, nothing;
-        const Int passes = look_ahead(&nearest, &nothing, mask.low, mask.high, sense, at->depth, looks, grid, depth_origin);
+        const Int passes = look_ahead(&nearest, &nothing, mask.low, mask.high, sense, at->depth,
+                                      looks, grid, depth_origin);
         if (!ANY(passes))
             break;
         const Int edge_i = stack_edge(u, at->i);
@@ -131,22 +135,25 @@ inline void skip_empty_cells(Cursors *at, Int looks, const Paths *paths, const S
 // What a turn has found out.
 typedef struct {
     ListOfEach list;
-    Int found;                // the first supersegment of the list behind the ray's depth, or none
+    Int found; // the first supersegment of the list behind the ray's depth, or none
     FacesOfEach face;
-    Int meets;                // rays that cross it in the list,
-    Int stays;                // and are still in the list behind it
-    Real r_u, r_v;            // where they leave the list by u and by v
-    Real r_next, next_depth;  // and where they do
+    Int meets;               // rays that cross it in the list,
+    Int stays;               // and are still in the list behind it
+    Real r_u, r_v;           // where they leave the list by u and by v
+    Real r_next, next_depth; // and where they do
 } Crossings;
 
-inline Crossings next_crossings(Cursors *at, const Paths *paths, const Sense *sense, const Lists *lists)
+inline Crossings next_crossings(Cursors *at, const Paths *paths, const Sense *sense,
+                                const Lists *lists)
 {
     Crossings crossing;
     crossing.list = lists_at(lists, at->i, at->j, at->active);
-    crossing.found = search_on(&at->search, lists, &crossing.list, at->depth, at->active, sense->away, &crossing.face);
+    crossing.found = search_on(&at->search, lists, &crossing.list, at->depth, at->active,
+                               sense->away, &crossing.face);
     crossing.r_u = crossings(&paths->u, at->i);
     crossing.r_v = crossings(&paths->v, at->j);
-    crossing.r_next = HIGHER_OF(at->r, LOWER_OF(paths->rays.r_begin + 1.0f, LOWER_OF(crossing.r_u, crossing.r_v)));
+    crossing.r_next = HIGHER_OF(
+        at->r, LOWER_OF(paths->rays.r_begin + 1.0f, LOWER_OF(crossing.r_u, crossing.r_v)));
     crossing.next_depth = depth_at(sense, crossing.r_next);
     crossing.meets = crossing.found && crossing.face.near <= crossing.next_depth;
     crossing.stays = 0;
@@ -155,13 +162,13 @@ inline Crossings next_crossings(Cursors *at, const Paths *paths, const Sense *se
 
 // The media that rays meet, and where they enter and leave them: also of those that meet theirs in
 // another turn, as it is close then.
-inline Real4 media_crossed(const Cursors *at, Crossings *crossing, const Sense *sense, const Lists *lists, Real *from,
-                           Real *to)
+inline Real4 media_crossed(const Cursors *at, Crossings *crossing, const Sense *sense,
+                           const Lists *lists, Real *from, Real *to)
 {
     const Int there = at->active && at->search.n < crossing->list.count;
     const Real4 medium = medium_met(lists, &crossing->list, at->search.n, there, sense->away);
-    clip_to_faces(from, to, sense, crossing->face.near, crossing->face.far, at->r, crossing->r_next, at->depth,
-                  crossing->next_depth);
+    clip_to_faces(from, to, sense, crossing->face.near, crossing->face.far, at->r, crossing->r_next,
+                  at->depth, crossing->next_depth);
     crossing->stays = crossing->meets && crossing->face.far <= crossing->next_depth;
     return medium;
 }
@@ -177,7 +184,8 @@ inline void step_on(Cursors *at, const Crossings *crossing, const Paths *paths, 
     const Int in_u = crossing->r_u <= crossing->r_v;
     const Int i = at->i + select((Int)(0), paths->u.step, leaves && in_u);
     const Int j = at->j + select((Int)(0), paths->v.step, leaves && !in_u);
-    const Int ends = crossing->r_next >= paths->rays.r_begin + 1.0f || done || are_outside(paths, i, j);
+    const Int ends =
+        crossing->r_next >= paths->rays.r_begin + 1.0f || done || are_outside(paths, i, j);
     at->active = at->active && !(leaves && ends);
     at->new_stack = at->new_stack || ((i ^ at->i) | (j ^ at->j)) >> STACK_SHIFT != 0;
     at->i = i;

@@ -1,18 +1,21 @@
-// The paper's criterion, homogeneity (section 2, after Frey et al. 2013), by which a record is brought to its budget: a
-// supersegment goes on while the medium is like its mean so far, by one threshold per ray, the least that keeps the budget.
+// The paper's criterion, homogeneity (section 2, after Frey et al. 2013), by which a record is
+// brought to its budget: a supersegment goes on while the medium is like its mean so far, by one
+// threshold per ray, the least that keeps the budget.
 //
 // It works on the recorded runs: the volume is not marched again, and no run is dropped.
 #include "generation/shorten_lists.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Bisections of the threshold: it is found to a thousandth, or to 2^-30 of the largest difference where that is tiny.
+// Bisections of the threshold: it is found to a thousandth, or to 2^-30 of the largest difference
+// where that is tiny.
 #define BISECTIONS 30
 #define BISECTED 1e-3f
 
-// Merge neighbours front to back while the next run's feature is within `threshold` of the mean so far. A gap is a medium
-// of its own that is nothing: it is taken in where nothing is within the threshold, too. Returns how many runs are left;
-// they are written only where `store`.
-inline int merge_alike(__global float *record, int count, float threshold, float per_reference, bool store)
+// Merge neighbours front to back while the next run's feature is within `threshold` of the mean so
+// far. A gap is a medium of its own that is nothing: it is taken in where nothing is within the
+// threshold, too. Returns how many runs are left; they are written only where `store`.
+inline int merge_alike(__global float *record, int count, float threshold, float per_reference,
+                       bool store)
 {
     const float most = threshold * threshold;
     int kept = 0;
@@ -70,13 +73,10 @@ inline int cut_to_limit(__global float *record, int count, int limit, float per_
     return count > limit ? merge_alike(record, count, INFINITY, per_reference, true) : count;
 }
 
-// Bring records to at most recording.limit runs by homogeneity, and merge neighbours as while marching: what is alike needs no cut.
-__kernel void cut_lists(
-    const RaysOfView view,
-    __global const float *forms,
-    const Recording recording,
-    __global float *records,
-    __global uint *counts)
+// Bring records to at most recording.limit runs by homogeneity, and merge neighbours as while
+// marching: what is alike needs no cut.
+__kernel void cut_lists(const RaysOfView view, __global const float *forms,
+                        const Recording recording, __global float *records, __global uint *counts)
 {
     const uint item = (uint)get_global_id(0);
     const Rays ray = rays_of_view(&view, item);
@@ -86,5 +86,6 @@ __kernel void cut_lists(
     const float per_reference = march_speed(forms, ray.a, ray.b) / recording.reference_length;
     __global float *record = records + record_start(item, recording.capacity);
     const int cut = cut_to_limit(record, (int)counts[list], recording.limit, per_reference);
-    counts[list] = (uint)merge_within(record, cut, recording.finest, per_reference, recording.hidden_weight);
+    counts[list] =
+        (uint)merge_within(record, cut, recording.finest, per_reference, recording.hidden_weight);
 }

@@ -1,10 +1,11 @@
 // Where each list begins: the running sum of the lists' lengths, from slice to slice.
 //
-// A block is what one work-group takes, whatever its size: LISTS_PER_ITEM lists for each of its work-items. sum_lengths sums
-// up each block; list_offsets adds what lies before a block to the running sum within it.
+// A block is what one work-group takes, whatever its size: LISTS_PER_ITEM lists for each of its
+// work-items. sum_lengths sums up each block; list_offsets adds what lies before a block to the
+// running sum within it.
 
-// Sum of the values of the work-group's items before this one. `sums`: an element for each item; afterwards the last one's
-// is the sum of all.
+// Sum of the values of the work-group's items before this one. `sums`: an element for each item;
+// afterwards the last one's is the sum of all.
 inline ulong sum_before(ulong value, __local ulong *sums)
 {
     const int item = (int)get_local_id(0);
@@ -29,11 +30,9 @@ inline ulong sum_of_lists(__global const uint *lengths, uint first, uint end)
 }
 
 // Sum of each block of lists.
-__kernel void sum_lengths(
-    uint lists,
-    __global const uint *lengths,
-    __local ulong *partial,        // an element for each work-item
-    __global ulong *sums)          // of the blocks
+__kernel void sum_lengths(uint lists, __global const uint *lengths,
+                          __local ulong *partial, // an element for each work-item
+                          __global ulong *sums)   // of the blocks
 {
     const uint item = (uint)get_global_id(0);
     const uint first = min(item * LISTS_PER_ITEM, lists);
@@ -43,14 +42,14 @@ __kernel void sum_lengths(
         sums[item / (uint)get_local_size(0)] = before + value;
 }
 
-// Offsets of a slice of lists behind those made before: offsets[0] is where its first list begins, and the others follow.
+// Offsets of a slice of lists behind those made before: offsets[0] is where its first list begins,
+// and the others follow.
 __kernel void list_offsets(
-    uint lists,
-    __global const uint *lengths,
-    __local ulong *partial,        // as above
+    uint lists, __global const uint *lengths,
+    __local ulong *partial, // as above
     __global const ulong *sums,
-    uint made,                     // lists that have their offsets already
-    __global ulong *all_offsets)   // that of list `made` is there; as many as there are lists follow
+    uint made,                   // lists that have their offsets already
+    __global ulong *all_offsets) // that of list `made` is there; as many as there are lists follow
 {
     __global ulong *offsets = all_offsets + made;
     const uint item = (uint)get_global_id(0);

@@ -6,18 +6,16 @@
 #pragma OPENCL FP_CONTRACT OFF
 
 // Records of a slice of rays to the VDI's arrays.
-__kernel void pack_lists(
-    const RaysOfView view,          // the slice
-    __global const float *forms,
-    int capacity,
-    __global const float *records,
-    __global const ulong *offsets,  // where each list begins, and the last one ends
-    uint made,                      // lists before the slice's
-    ulong held,                     // supersegments before those that the arrays hold
-    __global float *fronts,         // view depth less the depth origin, world units
-    __global float *backs,
-    __global float *colors,         // straight RGB, 3 per supersegment
-    __global float *optical_depths)
+__kernel void
+pack_lists(const RaysOfView view, // the slice
+           __global const float *forms, int capacity, __global const float *records,
+           __global const ulong *offsets, // where each list begins, and the last one ends
+           uint made,                     // lists before the slice's
+           ulong held,                    // supersegments before those that the arrays hold
+           __global float *fronts,        // view depth less the depth origin, world units
+           __global float *backs,
+           __global float *colors, // straight RGB, 3 per supersegment
+           __global float *optical_depths)
 {
     const uint item = (uint)get_global_id(0);
     const Rays ray = rays_of_view(&view, item);
@@ -31,9 +29,11 @@ __kernel void pack_lists(
     float least = -INFINITY, most = INFINITY;
     if (DOUBLE_FLOAT_RAYS) {
         float length = 0.0f;
-        clip_from_entry(forms + 6 * FORM_SIZE, view.planes, ray.a, ray.b, INFINITY, &entry, &length);
+        clip_from_entry(forms + 6 * FORM_SIZE, view.planes, ray.a, ray.b, INFINITY, &entry,
+                        &length);
         const float2 exit = double_float_sum(entry, (float2)(length, 0.0f));
-        // Faces as they are stored lie in the volume, or its bounds would cut off what rounding has put outside
+        // Faces as they are stored lie in the volume, or its bounds would cut off what rounding has
+        // put outside
         least = entry.y > 0.0f ? nextafter(entry.x, INFINITY) : entry.x;
         most = exit.y < 0.0f ? nextafter(exit.x, -INFINITY) : exit.x;
     }

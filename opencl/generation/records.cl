@@ -1,12 +1,13 @@
-// The runs of one ray, and the record in which they lie; of sixteen rays: cpu16/generation_records.cl.
+// The runs of one ray, and the record in which they lie; of sixteen rays:
+// cpu16/generation_records.cl.
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Which compilers keep in registers where they put a structure into memory. It holds components together, and what is computed
-// is computed from one component at a time: compilers that put work-items into the lanes of a vector then have nothing to take
-// apart and to put together again.
+// Which compilers keep in registers where they put a structure into memory. It holds components
+// together, and what is computed is computed from one component at a time: compilers that put
+// work-items into the lanes of a vector then have nothing to take apart and to put together again.
 typedef float8 Run;
-#define FRONT s0         // t of the ray
+#define FRONT s0 // t of the ray
 #define BACK s1
 #define TAU s2           // optical depth
 #define TRANSMITTANCE s3 // from the eye to the front face
@@ -14,16 +15,18 @@ typedef float8 Run;
 #define GREEN s5
 #define BLUE s6
 #define COLOR s456
-#define OPACITY s7       // 1 - exp(-tau), accumulated
-#define RUN(front, back, tau, before, red, green, blue, opacity) (float8)(front, back, tau, before, red, green, blue, opacity)
+#define OPACITY s7 // 1 - exp(-tau), accumulated
+#define RUN(front, back, tau, before, red, green, blue, opacity)                                   \
+    (float8)(front, back, tau, before, red, green, blue, opacity)
 #include "generation/runs.cl"
 
-// merged_runs, where very many samples become one run: `compensation` is what the sums have rounded off so far (Kahan), see
-// lib/compositing.cl.
+// merged_runs, where very many samples become one run: `compensation` is what the sums have rounded
+// off so far (Kahan), see lib/compositing.cl.
 inline Run merged_runs_compensated(Run a, Run b, Run *compensation)
 {
     const float through = 1.0f - a.OPACITY;
-    const Run term = (Run)(0.0f, 0.0f, b.TAU, 0.0f, through * b.COLOR, through * b.OPACITY) - *compensation;
+    const Run term =
+        (Run)(0.0f, 0.0f, b.TAU, 0.0f, through * b.COLOR, through * b.OPACITY) - *compensation;
     Run run = a + term;
     *compensation = (run - a) - term;
     run.FRONT = a.FRONT;
@@ -32,12 +35,13 @@ inline Run merged_runs_compensated(Run a, Run b, Run *compensation)
     return run;
 }
 
-// A run moves as four words of 8 bytes, because the number of loads and stores is what counts where a vector's lanes go to
-// different places.
+// A run moves as four words of 8 bytes, because the number of loads and stores is what counts where
+// a vector's lanes go to different places.
 inline Run load_run(__global const float *records, int k)
 {
     __global const ulong *words = (__global const ulong *)(records + k * RUN_WORDS);
-    return (Run)(as_float2(words[0]), as_float2(words[1]), as_float2(words[2]), as_float2(words[3]));
+    return (Run)(as_float2(words[0]), as_float2(words[1]), as_float2(words[2]),
+                 as_float2(words[3]));
 }
 
 inline void store_run(__global float *records, int k, Run run)

@@ -7,8 +7,8 @@
 #include "generation/records.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Errors are looked at in rows, which are loaded at once and end with INFINITY, as the number of loads is what counts where
-// work-items are the lanes of vectors.
+// Errors are looked at in rows, which are loaded at once and end with INFINITY, as the number of
+// loads is what counts where work-items are the lanes of vectors.
 #define ROW_NUMBERS (int8)(0, 1, 2, 3, 4, 5, 6, 7)
 
 // Errors of a record of so many runs, in whole rows.
@@ -18,8 +18,8 @@ inline int errors_of(int count)
 }
 
 // errors[k]: what merging runs k and k + 1 costs; INFINITY where there are no two.
-inline void measure_errors(__global const float *record, __global float *errors, int count, float per_reference,
-                           float hidden_weight)
+inline void measure_errors(__global const float *record, __global float *errors, int count,
+                           float per_reference, float hidden_weight)
 {
     Run run = load_run(record, 0);
     float4 feature = run_feature(run, per_reference);
@@ -65,8 +65,10 @@ inline int least_error(__global const float *errors, int count)
     return min(first2.x, first2.y);
 }
 
-// Merge neighbours whose error is within a threshold, in one pass from front to back. Returns how many runs are left.
-inline int merge_within(__global float *record, int count, float threshold, float per_reference, float hidden_weight)
+// Merge neighbours whose error is within a threshold, in one pass from front to back. Returns how
+// many runs are left.
+inline int merge_within(__global float *record, int count, float threshold, float per_reference,
+                        float hidden_weight)
 {
     int kept = 0;
     Run run = load_run(record, 0);
@@ -74,7 +76,8 @@ inline int merge_within(__global float *record, int count, float threshold, floa
     for (int k = 1; k < count; ++k) {
         const Run next = load_run(record, k);
         const float4 next_feature = run_feature(next, per_reference);
-        if (merge_error(1, run, feature, next, next_feature, per_reference, hidden_weight) > threshold) {
+        if (merge_error(1, run, feature, next, next_feature, per_reference, hidden_weight) >
+            threshold) {
             store_run(record, kept++, run);
             run = next;
             feature = next_feature;
@@ -88,8 +91,8 @@ inline int merge_within(__global float *record, int count, float threshold, floa
 }
 
 // Raise the threshold and merge within it until at most `limit` runs are left.
-inline int make_room(__global float *record, __global float *errors, int count, int limit, __global float *threshold,
-                     float per_reference, float hidden_weight)
+inline int make_room(__global float *record, __global float *errors, int count, int limit,
+                     __global float *threshold, float per_reference, float hidden_weight)
 {
     while (count > limit) {
         measure_errors(record, errors, count, per_reference, hidden_weight);
@@ -122,8 +125,8 @@ inline int before_of(__global const float *record, int k)
 }
 
 // Merge, least error first, until at most `limit` runs are left.
-inline int merge_to_limit(__global float *record, __global float *errors, int count, int limit, float per_reference,
-                          float hidden_weight)
+inline int merge_to_limit(__global float *record, __global float *errors, int count, int limit,
+                          float per_reference, float hidden_weight)
 {
     if (count <= limit)
         return count;
@@ -145,12 +148,13 @@ inline int merge_to_limit(__global float *record, __global float *errors, int co
         errors[at] = INFINITY;
         if (behind < count) {
             const Run last = load_run(record, behind);
-            errors[at] = merge_error(1, merged, feature, last, run_feature(last, per_reference), per_reference, hidden_weight);
+            errors[at] = merge_error(1, merged, feature, last, run_feature(last, per_reference),
+                                     per_reference, hidden_weight);
         }
         if (before >= 0) {
             const Run first = load_run(record, before);
-            errors[before] = merge_error(1, first, run_feature(first, per_reference), merged, feature, per_reference,
-                                         hidden_weight);
+            errors[before] = merge_error(1, first, run_feature(first, per_reference), merged,
+                                         feature, per_reference, hidden_weight);
         }
     }
     // Close the gaps
@@ -164,27 +168,23 @@ inline int merge_to_limit(__global float *record, __global float *errors, int co
 
 // Shorten records of more than recording.limit runs: with `exactly`, by least error; otherwise by
 // raising the rays' thresholds.
-__kernel void shorten_lists(
-    const RaysOfView view,
-    __global const float *forms,
-    const Recording recording,
-    int exactly,
-    __global float *thresholds,
-    __global float *records,
-    __global float *errors,
-    __global uint *counts)
+__kernel void shorten_lists(const RaysOfView view, __global const float *forms,
+                            const Recording recording, int exactly, __global float *thresholds,
+                            __global float *records, __global float *errors, __global uint *counts)
 {
     const uint item = (uint)get_global_id(0);
     const Rays ray = rays_of_view(&view, item);
     if (!ray.present)
         return;
-    const int list = ray.y * view.columns + ray.x, count = (int)counts[list], limit = recording.limit;
+    const int list = ray.y * view.columns + ray.x, count = (int)counts[list],
+              limit = recording.limit;
     if (count <= limit)
         return;
     const float per_reference = march_speed(forms, ray.a, ray.b) / recording.reference_length;
     __global float *record = records + record_start(item, recording.capacity);
     errors += errors_start(item, recording.capacity);
-    counts[list] = (uint)(exactly ? merge_to_limit(record, errors, count, limit, per_reference, recording.hidden_weight)
-                                  : make_room(record, errors, count, limit, thresholds + item, per_reference,
-                                              recording.hidden_weight));
+    counts[list] = (uint)(exactly ? merge_to_limit(record, errors, count, limit, per_reference,
+                                                   recording.hidden_weight)
+                                  : make_room(record, errors, count, limit, thresholds + item,
+                                              per_reference, recording.hidden_weight));
 }

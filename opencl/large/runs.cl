@@ -1,4 +1,5 @@
-// Runs of blocks: from the records of a block's rays, and behind each other into the records of V_O's rays.
+// Runs of blocks: from the records of a block's rays, and behind each other into the records of
+// V_O's rays.
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
@@ -6,13 +7,10 @@
 #pragma OPENCL FP_CONTRACT OFF
 
 // A slice's records, one behind the other in the order of its lists.
-__kernel void copy_runs(
-    const RaysOfView view,
-    int capacity,
-    __global const float *records,
-    __global const uint *counts,   // runs of each list
-    __global const uint *begins,   // where those of each list go
-    __global float *runs)
+__kernel void copy_runs(const RaysOfView view, int capacity, __global const float *records,
+                        __global const uint *counts, // runs of each list
+                        __global const uint *begins, // where those of each list go
+                        __global float *runs)
 {
     const uint item = (uint)get_global_id(0);
     const Rays ray = rays_of_view(&view, item);
@@ -25,17 +23,15 @@ __kernel void copy_runs(
         store_run(to, k, load_run(record, k));
 }
 
-// Append a block's runs to the records of rays that come from nearer blocks. Runs that touch become one where a march would
-// have gone on with the first. How much light is left is what those before have let through.
-__kernel void append_runs(
-    const RaysOfView view,
-    __global const float *forms,
-    const Recording recording,
-    int4 window,                   // of the block: first column, first row, columns, rows
-    __global const uint *begins,   // where the runs of each of the block's lists begin, and the last one's end
-    __global const float *runs,
-    __global float *records,
-    __global uint *counts)
+// Append a block's runs to the records of rays that come from nearer blocks. Runs that touch become
+// one where a march would have gone on with the first. How much light is left is what those before
+// have let through.
+__kernel void
+append_runs(const RaysOfView view, __global const float *forms, const Recording recording,
+            int4 window, // of the block: first column, first row, columns, rows
+            __global const uint *
+                begins, // where the runs of each of the block's lists begin, and the last one's end
+            __global const float *runs, __global float *records, __global uint *counts)
 {
     const uint item = (uint)get_global_id(0);
     const Rays ray = rays_of_view(&view, item);
@@ -56,9 +52,9 @@ __kernel void append_runs(
         const Run last = load_run(record, count - 1);
         Run run = load_run(runs + (size_t)next * RUN_WORDS, 0);
         transmittance = last.TRANSMITTANCE - last.TRANSMITTANCE * last.OPACITY;
-        if (run.FRONT == last.BACK &&
-            merge_error(1, last, run_feature(last, per_reference), run, run_feature(run, per_reference), per_reference,
-                        recording.hidden_weight) <= recording.finest) {
+        if (run.FRONT == last.BACK && merge_error(1, last, run_feature(last, per_reference), run,
+                                                  run_feature(run, per_reference), per_reference,
+                                                  recording.hidden_weight) <= recording.finest) {
             transmittance -= transmittance * run.OPACITY;
             store_run(record, count - 1, merged_runs(last, run));
             ++next;

@@ -1,7 +1,8 @@
 // Scalar to colour and extinction (docs/conventions.md, "From a volume to the medium").
 //
-// The table holds `entries` (R, G, B, opacity) at equidistant scalars; opacity is that of a slab of one opacity unit
-// distance. It is interpolated first and converted to optical depth then, as VTK does.
+// The table holds `entries` (R, G, B, opacity) at equidistant scalars; opacity is that of a slab of
+// one opacity unit distance. It is interpolated first and converted to optical depth then, as VTK
+// does.
 #include "lib/opacity.cl"
 #include "lib/transpose.cl"
 #pragma OPENCL FP_CONTRACT OFF
@@ -9,9 +10,10 @@
 // Optical depth of a step through an opaque sample, whatever the unit distance: exp(-30) is 1e-13.
 #define OPAQUE_OPTICAL_DEPTH 30.0f
 
-// Colour (rgb) and opacity (w) of a scalar; NaN is transparent. per_scalar: (entries - 1) / (high - low), or a huge number
-// where the range is a single scalar.
-inline Real4 classify(Real scalar, __global const float4 *table, int entries, float low, float per_scalar)
+// Colour (rgb) and opacity (w) of a scalar; NaN is transparent. per_scalar: (entries - 1) / (high -
+// low), or a huge number where the range is a single scalar.
+inline Real4 classify(Real scalar, __global const float4 *table, int entries, float low,
+                      float per_scalar)
 {
     const Int known = isnan(scalar) == 0;
     const Real x = clamp((scalar - low) * per_scalar, 0.0f, (float)(entries - 1));
@@ -32,7 +34,8 @@ inline Real unit_optical_depth(Real opacity)
     return SELECT((Real)(INFINITY), -log1p_of(-opacity), opacity < 1.0f);
 }
 
-// Optical depth of a step of `units` opacity unit distances, of which one has the optical depth `of_unit`.
+// Optical depth of a step of `units` opacity unit distances, of which one has the optical depth
+// `of_unit`.
 inline Real scaled_to_step(Real of_unit, Real units)
 {
     return SELECT(fmax(units, OPAQUE_OPTICAL_DEPTH), of_unit * units, of_unit < INFINITY);

@@ -1,8 +1,9 @@
 // Cropping: the parts of a ray in the regions that are kept (docs/conventions.md, "Cropping").
 //
-// Two planes across each axis of the model frame make 27 regions; bit i + 3 j + 9 k of `regions` keeps the i-th along x, the
-// j-th along y and the k-th along z, as in vtkVolumeMapper. The planes are forms (lib/rays.cl) that are positive beyond
-// them: low x, high x, low y, high y, low z, high z; a high one is never below its low one.
+// Two planes across each axis of the model frame make 27 regions; bit i + 3 j + 9 k of `regions`
+// keeps the i-th along x, the j-th along y and the k-th along z, as in vtkVolumeMapper. The planes
+// are forms (lib/rays.cl) that are positive beyond them: low x, high x, low y, high y, low z, high
+// z; a high one is never below its low one.
 //
 // -D CROPPED   not 0: the regions that are kept are no box (a box is clipped to)
 #include "lib/lanes.cl"
@@ -23,9 +24,9 @@ typedef struct {
     Real from[MOST_KEPT], to[MOST_KEPT]; // ascending; those that a ray does not have are empty
 } Kept;
 
-// The kept parts of a ray between two parameters, along which the planes' values are linear: `first` at r_first and `last`
-// at r_last. Here and where parts are used, loops go to MOST_KEPT: one that ends otherwise for each ray is compiled wrongly by
-// Intel's runtime for CPUs.
+// The kept parts of a ray between two parameters, along which the planes' values are linear:
+// `first` at r_first and `last` at r_last. Here and where parts are used, loops go to MOST_KEPT:
+// one that ends otherwise for each ray is compiled wrongly by Intel's runtime for CPUs.
 inline Kept kept_parts(const Real *first, const Real *last, Real r_first, Real r_last, uint regions)
 {
     const Real begin = fmin(r_first, r_last);
@@ -35,7 +36,9 @@ inline Kept kept_parts(const Real *first, const Real *last, Real r_first, Real r
     cuts[CROPPING_PLANES + 1] = end;
     for (int k = 0; k < CROPPING_PLANES; ++k) {
         rises[k] = last[k] - first[k];
-        Real r = SELECT(begin, clamp(r_first - (r_last - r_first) * (first[k] / rises[k]), begin, end), rises[k] != 0.0f);
+        Real r =
+            SELECT(begin, clamp(r_first - (r_last - r_first) * (first[k] / rises[k]), begin, end),
+                   rises[k] != 0.0f);
         for (int place = 1; place <= k; ++place) {
             const Real before = fmin(cuts[place], r);
             r = fmax(cuts[place], r);

@@ -1,4 +1,5 @@
-// Lengths and products of vectors in space, one or one of each lane (lib/lanes.cl), rounded as drivers' functions of one are.
+// Lengths and products of vectors in space, one or one of each lane (lib/lanes.cl), rounded as
+// drivers' functions of one are.
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -10,10 +11,7 @@
 #define dot_with(row, v) dot(vload3(0, row), v)
 #define affine_with(row, x, y, z) dot(vload4(0, row), (float4)(x, y, z, 1.0f))
 #else
-inline Real dot_of(Real3 a, Real3 b)
-{
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+inline Real dot_of(Real3 a, Real3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 inline Real dot_with(__global const float *row, Real3 v)
 {
@@ -30,14 +28,16 @@ inline Real length_of(Real3 v)
 {
     if (VECTOR_FUNCTIONS) {
 #define IN_DOUBLE(c) convert_double8(v.c)
-#define LENGTHS(half)                                                                                   \
-    convert_float8(sqrt(IN_DOUBLE(x.half) * IN_DOUBLE(x.half) + IN_DOUBLE(y.half) * IN_DOUBLE(y.half) + \
+#define LENGTHS(half)                                                                              \
+    convert_float8(sqrt(IN_DOUBLE(x.half) * IN_DOUBLE(x.half) +                                    \
+                        IN_DOUBLE(y.half) * IN_DOUBLE(y.half) +                                    \
                         IN_DOUBLE(z.half) * IN_DOUBLE(z.half)))
         return (Real)(LENGTHS(lo), LENGTHS(hi));
 #undef LENGTHS
 #undef IN_DOUBLE
     }
-    const float *of_x = (const float *)&v.x, *of_y = (const float *)&v.y, *of_z = (const float *)&v.z;
+    const float *of_x = (const float *)&v.x, *of_y = (const float *)&v.y,
+                *of_z = (const float *)&v.z;
 #define LENGTH(n) length((float3)(of_x[n], of_y[n], of_z[n]))
     return OF_LANES(Real, LENGTH);
 #undef LENGTH

@@ -1,7 +1,9 @@
-// Numbers of 48 bits: an unevaluated sum of two floats, (.x, .y) with |.y| at most half a unit in the last place of .x.
+// Numbers of 48 bits: an unevaluated sum of two floats, (.x, .y) with |.y| at most half a unit in
+// the last place of .x.
 //
-// The sum and the product of two floats, and what they round off, are exact (Knuth 1969, 4.2.2; Dekker 1971, "A floating-point
-// technique for extending the available precision"). That of pairs is right to some 2^-46 of the larger operand.
+// The sum and the product of two floats, and what they round off, are exact (Knuth 1969, 4.2.2;
+// Dekker 1971, "A floating-point technique for extending the available precision"). That of pairs
+// is right to some 2^-46 of the larger operand.
 #pragma OPENCL FP_CONTRACT OFF
 
 // |a| >= |b|, or a is 0
@@ -35,7 +37,4 @@ inline float2 double_float_quotient(float2 a, float2 b)
     return double_float_of_ordered(quotient, rest.x / b.x);
 }
 
-inline bool double_float_less(float2 a, float2 b)
-{
-    return a.x < b.x || (a.x == b.x && a.y < b.y);
-}
+inline bool double_float_less(float2 a, float2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }

@@ -52,10 +52,7 @@ inline float depth_offset(float z, Depths depths)
     return depths.deep.x + z / (depths.reciprocal * (depths.reciprocal - z));
 }
 
-inline float reciprocal_depth(float z, Depths depths)
-{
-    return depths.reciprocal - z;
-}
+inline float reciprocal_depth(float z, Depths depths) { return depths.reciprocal - z; }
 #else
 #define FACES_ARE_OFFSETS 0
 #define KEPT_FACE(offset, depth_origin) depth_coordinate(offset, depth_origin)
@@ -63,16 +60,15 @@ inline float reciprocal_depth(float z, Depths depths)
 typedef float Depths; // the depth origin
 
 // Of one number or of a vector of them
-#define depth_coordinate(offset, depth_origin)                        \
-    (DEPTH == PARALLEL  ? (offset)                                    \
-     : DEPTH == SHIFTED ? (offset) / ((offset) + (depth_origin))      \
+#define depth_coordinate(offset, depth_origin)                                                     \
+    (DEPTH == PARALLEL  ? (offset)                                                                 \
+     : DEPTH == SHIFTED ? (offset) / ((offset) + (depth_origin))                                   \
                         : -1.0f / ((offset) + (depth_origin)))
-#define depth_offset(z, depth_origin)                                 \
-    (DEPTH == PARALLEL  ? (z)                                         \
-     : DEPTH == SHIFTED ? (z) * (depth_origin) / (1.0f - (z))         \
+#define depth_offset(z, depth_origin)                                                              \
+    (DEPTH == PARALLEL  ? (z)                                                                      \
+     : DEPTH == SHIFTED ? (z) * (depth_origin) / (1.0f - (z))                                      \
                         : -1.0f / (z) - (depth_origin))
-#define reciprocal_depth(z, depth_origin) \
-    (DEPTH == SHIFTED ? (1.0f - (z)) / (depth_origin) : -(z))
+#define reciprocal_depth(z, depth_origin) (DEPTH == SHIFTED ? (1.0f - (z)) / (depth_origin) : -(z))
 #endif
 
 // Value of a form at t.

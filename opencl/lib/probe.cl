@@ -17,8 +17,7 @@ __kernel void probe(__global const float *x, __global float4 *values, __global u
 
     // The rounding error of the square: zero if the compiler contracts or fma is not fused.
     const float square = value * value;
-    values[index] =
-        (float4)(expm1(-value), log1p(-value), exp(-value), fma(value, value, -square));
+    values[index] = (float4)(expm1(-value), log1p(-value), exp(-value), fma(value, value, -square));
     atomic_add(total, (uint)index + 1u);
 
     shared[lane] = (uint)index;

@@ -1,15 +1,18 @@
 // Rays through a window, and their clipping to a convex region.
 //
-// A "form" is an affine function along the ray of pixel (x, y), six floats (c0, c1, c2, d0, d1, d2):
+// A "form" is an affine function along the ray of pixel (x, y), six floats (c0, c1, c2, d0, d1,
+// d2):
 //
 //     value(t) = (c0 + a c1 + b c2) + t (d0 + a d1 + b d2),   a = x + 1/2 - W/2,  b = y + 1/2 - H/2
 //
-// with t the view depth of the ray's own camera less a reference depth (world units). The host forms all six in float64
-// about a reference depth near the data, so that float32 is enough here however far away the eye or the origin is
-// (docs/conventions.md, "Rays"). y = 0 is the bottom row.
+// with t the view depth of the ray's own camera less a reference depth (world units). The host
+// forms all six in float64 about a reference depth near the data, so that float32 is enough here
+// however far away the eye or the origin is (docs/conventions.md, "Rays"). y = 0 is the bottom row.
 //
-// -D DOUBLE_FLOAT_RAYS   rays may enter the data so far from there that it is not enough for the positions of samples: six more
-//                  floats of each form are what float32 has rounded off the first six (docs/numerics.md)
+// -D DOUBLE_FLOAT_RAYS   rays may enter the data so far from there that it is not enough for the
+// positions of samples: six more
+//                  floats of each form are what float32 has rounded off the first six
+//                  (docs/numerics.md)
 #include "lib/double_float.cl"
 #include "lib/directions.cl"
 #pragma OPENCL FP_CONTRACT OFF
@@ -31,15 +34,18 @@ inline Real form_slope(__global const float *form, Real a, Real b)
     return form_value(form + 3, a, b);
 }
 
-// Model units per unit of t along a ray that is marched. `forms`: 3 index positions, then 3 model directions.
+// Model units per unit of t along a ray that is marched. `forms`: 3 index positions, then 3 model
+// directions.
 inline Real march_speed(__global const float *forms, Real a, Real b)
 {
-    return length_of(REAL3(form_slope(forms + 3 * FORM_SIZE, a, b), form_slope(forms + 4 * FORM_SIZE, a, b),
+    return length_of(REAL3(form_slope(forms + 3 * FORM_SIZE, a, b),
+                           form_slope(forms + 4 * FORM_SIZE, a, b),
                            form_slope(forms + 5 * FORM_SIZE, a, b)));
 }
 
 // Clip [*t0, *t1] to where each of `count` forms is >= 0. Returns whether anything is left.
-inline Int clip_to_planes(__global const float *planes, int count, Real a, Real b, Real *t0, Real *t1)
+inline Int clip_to_planes(__global const float *planes, int count, Real a, Real b, Real *t0,
+                          Real *t1)
 {
     for (int k = 0; k < count; ++k) {
         const Real value = form_value(planes + k * FORM_SIZE, a, b);
@@ -47,7 +53,8 @@ inline Int clip_to_planes(__global const float *planes, int count, Real a, Real 
         const Real t = -value / slope;
         *t0 = SELECT(*t0, fmax(*t0, t), slope > 0.0f);
         *t1 = SELECT(*t1, fmin(*t1, t), slope < 0.0f);
-        *t1 = SELECT(*t1, (Real)(-INFINITY), slope == 0.0f && value < 0.0f); // parallel to the plane and outside it
+        *t1 = SELECT(*t1, (Real)(-INFINITY),
+                     slope == 0.0f && value < 0.0f); // parallel to the plane and outside it
     }
     return *t0 < *t1;
 }
@@ -63,12 +70,13 @@ inline float2 double_float_of_form(__global const float *c, float a, float b)
 // Value of a form at t.
 inline float2 form_at(__global const float *form, float a, float b, float2 t)
 {
-    return double_float_sum(double_float_of_form(form, a, b), double_float_product(t, double_float_of_form(form + 3, a, b)));
+    return double_float_sum(double_float_of_form(form, a, b),
+                            double_float_product(t, double_float_of_form(form + 3, a, b)));
 }
 
 // clip_to_planes, and what is left as its entry and its length.
-inline bool clip_from_entry(__global const float *planes, int count, float a, float b, float t_end, float2 *entry,
-                            float *length)
+inline bool clip_from_entry(__global const float *planes, int count, float a, float b, float t_end,
+                            float2 *entry, float *length)
 {
     float2 t0 = (float2)(-INFINITY, 0.0f);
     float2 t1 = (float2)(t_end, 0.0f);
@@ -99,12 +107,14 @@ inline Real offsets_from_middle(Int pixels, int count)
     return TO_REAL(pixels) + 0.5f - 0.5f * (float)count;
 }
 
-// Pixel of a work-item: blocks of 4 x 4 pixels, so that neighbouring items walk through the same lists and voxels.
+// Pixel of a work-item: blocks of 4 x 4 pixels, so that neighbouring items walk through the same
+// lists and voxels.
 inline int2 block_pixel(uint item, int width)
 {
     const uint block = item >> 4;
     const uint columns = (uint)(width + 3) >> 2;
-    return (int2)((int)((block % columns) << 2 | (item & 3)), (int)((block / columns) << 2 | (item >> 2 & 3)));
+    return (int2)((int)((block % columns) << 2 | (item & 3)),
+                  (int)((block / columns) << 2 | (item >> 2 & 3)));
 }
 
 // The ray of a pixel.
@@ -131,7 +141,8 @@ typedef struct {
     Real a, b;   // pixel offsets
 } Rays;
 
-inline Rays rays_of_part(uint first, int width, int height, int first_column, int columns, int first_row, int rows)
+inline Rays rays_of_part(uint first, int width, int height, int first_column, int columns,
+                         int first_row, int rows)
 {
     const int2 corner = block_pixel(first, columns);
     Rays rays;
@@ -149,17 +160,20 @@ inline Rays rays_of_block(uint first, int width, int height, int first_row, int 
     return rays_of_part(first, width, height, 0, width, first_row, rows);
 }
 
-// Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right, so that one work-item's lists
-// are still cached when those above and below come to them: whole columns of strips, a work-group each. `part` is its first column and
-// strip, in columns and strips of the window, how many columns it has in each strip, and how many strips.
+// Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right,
+// so that one work-item's lists are still cached when those above and below come to them: whole
+// columns of strips, a work-group each. `part` is its first column and strip, in columns and strips
+// of the window, how many columns it has in each strip, and how many strips.
 inline int2 part_pixel(int group, int item, int4 part)
 {
     const int strip = group / part.z;
     const int column = group - strip * part.z;
-    return (int2)((part.x + column) << 2 | (item & 3), (part.y + strip) * (4 * STRIP) + (item >> 2));
+    return (int2)((part.x + column) << 2 | (item & 3),
+                  (part.y + strip) * (4 * STRIP) + (item >> 2));
 }
 
-// The same for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are their columns and rows.
+// The same for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are their columns
+// and rows.
 inline int2 cell_pixel(__global const int2 *cells, int item)
 {
     const int2 cell = cells[item / CELL_ITEMS];

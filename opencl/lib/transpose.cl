@@ -1,16 +1,19 @@
-// Four numbers for each lane (lib/lanes.cl): as they lie in memory, and as one vector of each number.
+// Four numbers for each lane (lib/lanes.cl): as they lie in memory, and as one vector of each
+// number.
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #if LANES == 16
-// The first halves, or the second ones, of each 128 bits of two vectors; and their numbers in turns, or half behind half.
-// Swizzles of whole vectors: of vectors put together by single numbers a compiler makes as many instructions.
+// The first halves, or the second ones, of each 128 bits of two vectors; and their numbers in
+// turns, or half behind half. Swizzles of whole vectors: of vectors put together by single numbers
+// a compiler makes as many instructions.
 #define FIRST_HALVES(p, q) ((Real)((p).s014589cd, (q).s014589cd))
 #define SECOND_HALVES(p, q) ((Real)((p).s2367abef, (q).s2367abef))
 #define IN_TURNS s08192a3b4c5d6e7f
 #define JOINED s018923ab45cd67ef
 
-// From one to the other: in the g-th 128 bits of the n-th vector stand the numbers of lane 4 g + n, and the other way round.
+// From one to the other: in the g-th 128 bits of the n-th vector stand the numbers of lane 4 g + n,
+// and the other way round.
 inline Real4 transpose(Real4 rows)
 {
     const Real first_01 = FIRST_HALVES(rows.x, rows.y).IN_TURNS;
@@ -18,7 +21,8 @@ inline Real4 transpose(Real4 rows)
     const Real second_01 = SECOND_HALVES(rows.x, rows.y).IN_TURNS;
     const Real second_23 = SECOND_HALVES(rows.z, rows.w).IN_TURNS;
     return REAL4(FIRST_HALVES(first_01, first_23).JOINED, SECOND_HALVES(first_01, first_23).JOINED,
-                 FIRST_HALVES(second_01, second_23).JOINED, SECOND_HALVES(second_01, second_23).JOINED);
+                 FIRST_HALVES(second_01, second_23).JOINED,
+                 SECOND_HALVES(second_01, second_23).JOINED);
 }
 
 // Four numbers of each lane, from the `at`-th four on.

@@ -3,8 +3,8 @@
 //
 // Every VDI is piecewise constant along a ray, so all of them together are: where several segments
 // cover a piece of the ray, their extinctions add and the colour is the mean by extinction
-// (docs/conventions.md, "Several VDIs"). Streams are walked together from boundary to boundary: each
-// turn composites one piece, and comes to the next segment of those streams whose segment ends
+// (docs/conventions.md, "Several VDIs"). Streams are walked together from boundary to boundary:
+// each turn composites one piece, and comes to the next segment of those streams whose segment ends
 // there. The sums are formed in the order of the streams.
 //
 // -D STREAMS   how many VDIs
@@ -30,24 +30,25 @@ inline void come_to_segment(Stream *stream, __global const float *rows)
     stream->at.from = at[0];
     stream->at.to = at[FLOATS_APART];
     stream->at.optical_depth = at[2 * FLOATS_APART];
-    stream->at.color = (float4)(at[3 * FLOATS_APART], at[4 * FLOATS_APART], at[5 * FLOATS_APART], 0.0f);
+    stream->at.color =
+        (float4)(at[3 * FLOATS_APART], at[4 * FLOATS_APART], at[5 * FLOATS_APART], 0.0f);
 }
 
-__kernel void merge(
-    __global float *pool,              // see multi_vdi/pool.cl
-    int capacity,                      // slots of a ray
-    __global const int *ends,          // (streams, rays)
-    __global const uchar *contributes, // (streams, rays), see multi_vdi/segments.cl
-    int rays,                          // in the band
-    __global const int2 *cells,        // see lib/rays.cl
-    int first_cell,                    // the band's
-    int width, int height,             // window of V_N
-    float transmittance_cutoff,        // the ray ends where less than this is left
-    __global const int *streams_of,    // (VDIs): the stream of each, in the order of the owners
-    __global int *needed,              // slots that a ray of each cell needs; over the capacity, the
-                                       // ray is not drawn
-    __global float4 *image,            // premultiplied RGBA, top row first
-    __global short *owner)             // the VDI to which each pixel belongs; -1: to none
+__kernel void
+merge(__global float *pool,              // see multi_vdi/pool.cl
+      int capacity,                      // slots of a ray
+      __global const int *ends,          // (streams, rays)
+      __global const uchar *contributes, // (streams, rays), see multi_vdi/segments.cl
+      int rays,                          // in the band
+      __global const int2 *cells,        // see lib/rays.cl
+      int first_cell,                    // the band's
+      int width, int height,             // window of V_N
+      float transmittance_cutoff,        // the ray ends where less than this is left
+      __global const int *streams_of,    // (VDIs): the stream of each, in the order of the owners
+      __global int *needed,   // slots that a ray of each cell needs; over the capacity, the
+                              // ray is not drawn
+      __global float4 *image, // premultiplied RGBA, top row first
+      __global short *owner)  // the VDI to which each pixel belongs; -1: to none
 {
     const int place = (int)get_global_id(0);
     const Ray pixel = ray_of_pixel(cell_pixel(cells + first_cell, place), width, height);
@@ -87,7 +88,8 @@ __kernel void merge(
         if (!(begin < INFINITY))
             break;
         for (int j = 0; j < STREAMS; ++j)
-            end = LOWER_OF(end, streams[j].at.from <= begin ? streams[j].at.to : streams[j].at.from);
+            end =
+                LOWER_OF(end, streams[j].at.from <= begin ? streams[j].at.to : streams[j].at.from);
 
         // Sum up its medium: optical depths, and colours times them
         float optical_depth = 0.0f;
@@ -100,7 +102,8 @@ __kernel void merge(
                 continue;
             const bool ends_here = at.to <= end;
             // A segment that nothing cuts keeps its optical depth, however short it is in t
-            const float share = ends_here && at.from >= begin ? 1.0f : (end - begin) / (at.to - at.from);
+            const float share =
+                ends_here && at.from >= begin ? 1.0f : (end - begin) / (at.to - at.from);
             const float part = at.optical_depth * share;
             colors += part * at.color.xyz;
             optical_depth += part;

@@ -6,9 +6,9 @@
 // behind one another in its slots.
 //
 // -D SEGMENT_ROWS=0, 1  how they lie: rays in blocks of 16, component by component, so that
-//                       neighbouring work-items touch neighbouring words; or ray by ray, a segment's
-//                       components together, so that a vector's lanes are loaded and stored in whole
-//                       rows (opencl/cpu16/pool.cl): a ray then has SPARE_SLOTS
+//                       neighbouring work-items touch neighbouring words; or ray by ray, a
+//                       segment's components together, so that a vector's lanes are loaded and
+//                       stored in whole rows (opencl/cpu16/pool.cl): a ray then has SPARE_SLOTS
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -18,7 +18,7 @@
 
 // t behind which nothing is seen because of the VDIs before, as a VDI's own t: not less, by what
 // `dark` and `depth_shift` are rounded
-#define DARK_FROM(dark, depth_shift) \
+#define DARK_FROM(dark, depth_shift)                                                               \
     ((dark) - (depth_shift) + 5e-7f * (fabs(dark) + fabs(depth_shift)))
 
 typedef struct {
@@ -31,7 +31,8 @@ inline __global float *pool_of(__global float *pool, int first_ray, int capacity
 {
     if (SEGMENT_ROWS)
         return pool + (size_t)first_ray * (capacity + SPARE_SLOTS) * SEGMENT_SIZE;
-    return pool + (size_t)(first_ray / RAY_BLOCK) * capacity * (SEGMENT_SIZE * RAY_BLOCK) + first_ray % RAY_BLOCK;
+    return pool + (size_t)(first_ray / RAY_BLOCK) * capacity * (SEGMENT_SIZE * RAY_BLOCK) +
+           first_ray % RAY_BLOCK;
 }
 
 // In that part, where a ray's segment in a slot begins, and its components are.

@@ -15,7 +15,8 @@ typedef struct {
 } Stream;
 
 // Append what the ray crosses of a medium, from r = from to r = to.
-inline void append_segment(Stream *stream, const ListRay *ray, float from, float to, float4 medium, float depth_shift)
+inline void append_segment(Stream *stream, const ListRay *ray, float from, float to, float4 medium,
+                           float depth_shift)
 {
     const float optical_depth = fmin(medium.w * length_between(ray, from, to), MAX_OPTICAL_DEPTH);
     if (!(from < to && optical_depth > 0.0f))
@@ -42,35 +43,35 @@ inline bool surely_covered(__global const float *forms, float a, float b, float 
     bool covered = true;
     for (int corner = 0; corner < 4 && margin != 0.0f; ++corner) {
         float t0 = -INFINITY, t1 = INFINITY;
-        covered = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, BOX_PLANES, a + (corner & 1 ? margin : -margin),
-                                 b + (corner & 2 ? margin : -margin), &t0, &t1) && covered;
+        covered = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, BOX_PLANES,
+                                 a + (corner & 1 ? margin : -margin),
+                                 b + (corner & 2 ? margin : -margin), &t0, &t1) &&
+                  covered;
     }
     return covered;
 }
 
-__kernel void segments(
-    __global const HEADER_T *headers, // these as of raycasting/raycast.cl
-    __global const ulong *faces,
-    __global const ulong *media,
-    __global const float *forms,
-    __global const float *opaque_depth,
-    __global const ulong *masks,
-    Frame frame,                      // its cutoff is the optical depth behind which rays end
-    __global const int2 *cells,       // see lib/rays.cl
-    int first_cell,                   // the band's
-    int number,                       // of this VDI's stream
-    int band_rays,                    // how many
-    float depth_shift,                // this VDI's reference depth less the frame's
-    float margin,                     // pixels; see `contributes`
-    int capacity,                     // slots of a ray
-    __global float *pool,             // see multi_vdi/pool.cl
-    __global int *ends,               // (streams, rays): slot behind each stream's last
-    __global uchar *contributes,      // (streams, rays): 1 if a ray meets the VDI, 2 if its
+__kernel void
+segments(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
+         __global const ulong *faces, __global const ulong *media, __global const float *forms,
+         __global const float *opaque_depth, __global const ulong *masks,
+         Frame frame,                 // its cutoff is the optical depth behind which rays end
+         __global const int2 *cells,  // see lib/rays.cl
+         int first_cell,              // the band's
+         int number,                  // of this VDI's stream
+         int band_rays,               // how many
+         float depth_shift,           // this VDI's reference depth less the frame's
+         float margin,                // pixels; see `contributes`
+         int capacity,                // slots of a ray
+         __global float *pool,        // see multi_vdi/pool.cl
+         __global int *ends,          // (streams, rays): slot behind each stream's last
+         __global uchar *contributes, // (streams, rays): 1 if a ray meets the VDI, 2 if its
                                       // neighbours at `margin` pixels meet its bounds, too
-    __global float *dark)             // (rays): t where light has ended in one of the VDIs so far
+         __global float *dark)        // (rays): t where light has ended in one of the VDIs so far
 {
     const int place = (int)get_global_id(0);
-    const Ray pixel = ray_of_pixel(cell_pixel(cells + first_cell, place), frame.width, frame.height);
+    const Ray pixel =
+        ray_of_pixel(cell_pixel(cells + first_cell, place), frame.width, frame.height);
     if (!pixel.present)
         return;
     const Lists lists = LISTS_OF(frame);
@@ -108,5 +109,6 @@ __kernel void segments(
     const bool meets = stream.slot > first_slot;
     ends[number * band_rays + place] = stream.slot;
     dark[place] = stream.absorbed > frame.cutoff ? fmin(dark_before, stream.reached) : dark_before;
-    contributes[number * band_rays + place] = meets + (meets && surely_covered(forms, pixel.a, pixel.b, margin));
+    contributes[number * band_rays + place] =
+        meets + (meets && surely_covered(forms, pixel.a, pixel.b, margin));
 }

@@ -4,7 +4,8 @@
 // The picture.
 __kernel void clear_image(ulong pixels, __global float4 *image)
 {
-    const size_t place = get_global_id(0); // in all its bits: a compiler sees that work-items write next to each other
+    const size_t place = get_global_id(
+        0); // in all its bits: a compiler sees that work-items write next to each other
     if (place < pixels)
         image[place] = (float4)(0.0f);
 }

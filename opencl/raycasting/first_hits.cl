@@ -3,18 +3,13 @@
 #include "raycasting/walk.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-__kernel void first_hits(
-    __global const HEADER_T *headers,   // these as of raycasting/raycast.cl
-    __global const ulong *faces,
-    __global const ulong *media,
-    __global const float *forms,
-    __global const float *opaque_depth,
-    __global const ulong *masks,
-    Frame frame,
-    int4 part,
-    float least_optical_depth,          // a hit has some, and at least this much:
-    int accumulated,                    // by itself, or with all before it
-    __global float *image)              // t of the first hit, infinite where there is none, top row first
+__kernel void
+first_hits(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
+           __global const ulong *faces, __global const ulong *media, __global const float *forms,
+           __global const float *opaque_depth, __global const ulong *masks, Frame frame, int4 part,
+           float least_optical_depth, // a hit has some, and at least this much:
+           int accumulated,           // by itself, or with all before it
+           __global float *image) // t of the first hit, infinite where there is none, top row first
 {
     const int item = (int)get_local_id(0);
     const int2 xy = part_pixel(((int)get_global_id(0) - item) / COLUMN_ITEMS, item, part);
@@ -43,7 +38,8 @@ __kernel void first_hits(
                 break;
         }
         Crossing crossing = next_crossing(&at, &path, &lists);
-        for (bool meets = crossing.meets; meets; meets = ONE_LIST && next_in_list(&at, &crossing, &path, &lists)) {
+        for (bool meets = crossing.meets; meets;
+             meets = ONE_LIST && next_in_list(&at, &crossing, &path, &lists)) {
             // Is it a hit?
             const float2 ends = ends_inside(&at, &crossing, &path);
             const float crossed = length_crossed(ray, ends.x, ends.y);
@@ -61,5 +57,6 @@ __kernel void first_hits(
     float passed_by = ray->scale * (r_hit - ray->r_begin);
     if (DEPTH != PARALLEL)
         passed_by /= reciprocal_depth(ray->start.z, ray->depths) * reciprocal_depth_at(ray, r_hit);
-    image[pixel.place] = hit ? ray->t_begin + passed_by / model_speed(forms, pixel.a, pixel.b) : INFINITY;
+    image[pixel.place] =
+        hit ? ray->t_begin + passed_by / model_speed(forms, pixel.a, pixel.b) : INFINITY;
 }

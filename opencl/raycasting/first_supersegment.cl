@@ -21,10 +21,7 @@ typedef struct {
 } Faces;
 
 // Index in the list of the n-th supersegment that a ray comes to: from the front, or from the back.
-inline int index_met(List list, int n, bool away)
-{
-    return away ? n : list.count - 1 - n;
-}
+inline int index_met(List list, int n, bool away) { return away ? n : list.count - 1 - n; }
 
 inline Faces faces_met(const Lists *lists, List list, int n, bool away, Depths depths)
 {
@@ -52,8 +49,8 @@ inline Search begin_search(int guess)
 // Compare one guess: Algorithm 1, a comparison a call, so that rays side by side need not wait for
 // the one that searches longest. Returns whether search->p is the answer, list.count where all end
 // before the depth; *face is its face then, at infinity if there is none.
-inline bool first_supersegment(Search *search, const Lists *lists, List list, float depth, bool away,
-                               Depths depths, Faces *face)
+inline bool first_supersegment(Search *search, const Lists *lists, List list, float depth,
+                               bool away, Depths depths, Faces *face)
 {
     // Lines 3 and 12: does the guess exist, and end behind the point of entry?
     const int p = min(search->p, list.count);

@@ -8,7 +8,7 @@
 
 // The grid as it is counted, and the lists' window.
 typedef struct {
-    int width, height;     // lists
+    int width, height; // lists
     int stacks_wide;
     float first_depth;     // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth; // per world unit
@@ -35,12 +35,11 @@ inline void count_supersegment(const Counted *grid, float front, float back, __g
 }
 
 // One work-item per list.
-__kernel void count_supersegments(
-    __global const OFFSET_T *offsets, // width * height + 1
-    __global const float *fronts,     // view depth less depth_origin
-    __global const float *backs,
-    Counted grid,
-    __global uint *changes)           // of the counts: stacks_high, stacks_wide, SLABS; all 0
+__kernel void
+count_supersegments(__global const OFFSET_T *offsets, // width * height + 1
+                    __global const float *fronts,     // view depth less depth_origin
+                    __global const float *backs, Counted grid,
+                    __global uint *changes) // of the counts: stacks_high, stacks_wide, SLABS; all 0
 {
     const size_t list = get_global_id(0);
     if (list >= (size_t)grid.width * (size_t)grid.height)
@@ -51,14 +50,12 @@ __kernel void count_supersegments(
 }
 
 // The same of lists of 8 bytes, whose faces are codes of depth (model/packing.py).
-__kernel void count_packed(
-    __global const OFFSET_T *offsets,
-    __global const int *origins,    // of the lists' depths, steps
-    __global const ushort *strides, // steps per code
-    __global const uint2 *words,
-    float step,                     // of depth, world units
-    Counted grid,
-    __global uint *changes)
+__kernel void count_packed(__global const OFFSET_T *offsets,
+                           __global const int *origins,    // of the lists' depths, steps
+                           __global const ushort *strides, // steps per code
+                           __global const uint2 *words,
+                           float step, // of depth, world units
+                           Counted grid, __global uint *changes)
 {
     const size_t list = get_global_id(0);
     if (list >= (size_t)grid.width * (size_t)grid.height)

@@ -10,23 +10,25 @@ inline float length_per_depth(__global const float *centre_ray, int i, int j, in
 {
     const float a = (float)i + 0.5f - 0.5f * (float)width;
     const float b = (float)j + 0.5f - 0.5f * (float)height;
-    return length(fma(b, vload3(2, centre_ray), fma(a, vload3(1, centre_ray), vload3(0, centre_ray))));
+    return length(
+        fma(b, vload3(2, centre_ray), fma(a, vload3(1, centre_ray), vload3(0, centre_ray))));
 }
 
 // One work-item per list.
 __kernel void prepare_lists(
-    __global const OFFSET_T *starts,   // of the lists in the arrays, width * height + 1
-    __global const HEADER_T *headers,  // of the bundles of lists
-    __global const float *fronts,      // view depth less depth_origin
+    __global const OFFSET_T *starts,  // of the lists in the arrays, width * height + 1
+    __global const HEADER_T *headers, // of the bundles of lists
+    __global const float *fronts,     // view depth less depth_origin
     __global const float *backs,
-    __global const ulong *colors,      // if packed, words of 11, 11 and 10 bits; straight RGB, 3 floats
+    __global const ulong *colors, // if packed, words of 11, 11 and 10 bits; straight RGB, 3 floats
     __global const float *optical_depths,
-    float depth_origin,                // world units
-    float nearest,                     // least view depth that is in front of the eye, world units
+    float depth_origin, // world units
+    float nearest,      // least view depth that is in front of the eye, world units
     int width, int height,
-    __global const float *centre_ray,  // 9: model-frame direction of the ray of pixel offsets (a, b), rows 1, a, b
-    __global ulong *faces,             // if packed, (front, back, extinction, colour)
-    __global ulong *media)             // straight RGB, extinction per model length; none if packed
+    __global const float
+        *centre_ray, // 9: model-frame direction of the ray of pixel offsets (a, b), rows 1, a, b
+    __global ulong *faces, // if packed, (front, back, extinction, colour)
+    __global ulong *media) // straight RGB, extinction per model length; none if packed
 {
     const size_t place = get_global_id(0);
     if (place >= (size_t)width * (size_t)height)
@@ -58,7 +60,8 @@ __kernel void prepare_lists(
                 color = vload3(k, (__global const float *)colors);
         }
         if (PACKED) {
-            ((__global uint4 *)faces)[entry] = (uint4)(as_uint2(face), as_uint(extinction), packed_color);
+            ((__global uint4 *)faces)[entry] =
+                (uint4)(as_uint2(face), as_uint(extinction), packed_color);
         } else {
             ((__global float2 *)faces)[entry] = face;
             ((__global float4 *)media)[entry] = (float4)(color, extinction);

@@ -20,9 +20,9 @@ typedef struct {
 // A walk along a ray from one non-empty cell to the next.
 typedef struct {
     int stack_i, stack_j; // the stack that is being crossed
-    float r, r_leave;   // where it is entered and left
+    float r, r_leave;     // where it is entered and left
     float z_leave;
-    ulong left;         // its occupied slabs that the ray is still to cross
+    ulong left; // its occupied slabs that the ray is still to cross
 } Walk;
 
 typedef struct {
@@ -30,7 +30,7 @@ typedef struct {
     __global const ulong *masks;
     __global const uint *counts; // supersegments in each cell: stacks_high, stacks_wide, SLABS
     int stacks_wide, stacks_high;
-    float half_wide, half_high;  // lists
+    float half_wide, half_high; // lists
     float first_depth, slabs_per_depth;
 } Cells;
 
@@ -39,7 +39,8 @@ inline int slab_at(const Cells *cells, float z)
     return slab_of(depth_offset(z, cells->ray->depths), cells->first_depth, cells->slabs_per_depth);
 }
 
-// r where the depth coordinate reaches the near face of a slab, or an end of the ray; the ray is not parallel to the slabs.
+// r where the depth coordinate reaches the near face of a slab, or an end of the ray; the ray is
+// not parallel to the slabs.
 inline float reaches_slab(const Cells *cells, int slab)
 {
     const float face = cells->first_depth + (float)slab / cells->slabs_per_depth;
@@ -50,24 +51,28 @@ inline float reaches_slab(const Cells *cells, int slab)
 inline void enter_stack(Walk *walk, const Cells *cells)
 {
     const ListRay *ray = cells->ray;
-    const float edge_u = (float)((walk->stack_i + (ray->along.x > 0.0f ? 1 : 0)) * STACK) - cells->half_wide;
-    const float edge_v = (float)((walk->stack_j + (ray->along.y > 0.0f ? 1 : 0)) * STACK) - cells->half_high;
+    const float edge_u =
+        (float)((walk->stack_i + (ray->along.x > 0.0f ? 1 : 0)) * STACK) - cells->half_wide;
+    const float edge_v =
+        (float)((walk->stack_j + (ray->along.y > 0.0f ? 1 : 0)) * STACK) - cells->half_high;
     const float r_u = ray->along.x != 0.0f ? (edge_u - ray->deep.x) / ray->along.x : INFINITY;
     const float r_v = ray->along.y != 0.0f ? (edge_v - ray->deep.y) / ray->along.y : INFINITY;
     walk->r_leave = fmax(walk->r, fmin(ray->r_begin + 1.0f, fmin(r_u, r_v)));
     walk->z_leave = fma(walk->r_leave, ray->along.z, ray->deep.z);
     const int enters = slab_at(cells, fma(walk->r, ray->along.z, ray->deep.z));
     const int leaves = slab_at(cells, walk->z_leave);
-    walk->left = cells->masks[walk->stack_j * cells->stacks_wide + walk->stack_i]
-               & slabs_from(min(enters, leaves)) & slabs_to(max(enters, leaves));
+    walk->left = cells->masks[walk->stack_j * cells->stacks_wide + walk->stack_i] &
+                 slabs_from(min(enters, leaves)) & slabs_to(max(enters, leaves));
 }
 
 inline Walk begin_walk(const Cells *cells)
 {
     const ListRay *ray = cells->ray;
     Walk walk;
-    walk.stack_i = clamp((int)floor((ray->start.x + cells->half_wide) / STACK), 0, cells->stacks_wide - 1);
-    walk.stack_j = clamp((int)floor((ray->start.y + cells->half_high) / STACK), 0, cells->stacks_high - 1);
+    walk.stack_i =
+        clamp((int)floor((ray->start.x + cells->half_wide) / STACK), 0, cells->stacks_wide - 1);
+    walk.stack_j =
+        clamp((int)floor((ray->start.y + cells->half_high) / STACK), 0, cells->stacks_high - 1);
     walk.r = ray->r_begin;
     enter_stack(&walk, cells);
     return walk;
@@ -80,18 +85,21 @@ inline bool next_cell(Walk *walk, const Cells *cells, CellCrossing *crossing)
     while (walk->left == 0) {
         if (walk->r_leave >= ray->r_begin + 1.0f)
             return false;
-        const float edge_u = (float)((walk->stack_i + (ray->along.x > 0.0f ? 1 : 0)) * STACK) - cells->half_wide;
+        const float edge_u =
+            (float)((walk->stack_i + (ray->along.x > 0.0f ? 1 : 0)) * STACK) - cells->half_wide;
         const float r_u = ray->along.x != 0.0f ? (edge_u - ray->deep.x) / ray->along.x : INFINITY;
         if (r_u <= walk->r_leave)
             walk->stack_i += ray->along.x > 0.0f ? 1 : -1;
         else
             walk->stack_j += ray->along.y > 0.0f ? 1 : -1;
-        if (walk->stack_i < 0 || walk->stack_i >= cells->stacks_wide || walk->stack_j < 0 || walk->stack_j >= cells->stacks_high)
+        if (walk->stack_i < 0 || walk->stack_i >= cells->stacks_wide || walk->stack_j < 0 ||
+            walk->stack_j >= cells->stacks_high)
             return false;
         walk->r = walk->r_leave;
         enter_stack(walk, cells);
     }
-    const int slab = ray->away ? (int)popcount((walk->left & -walk->left) - 1) : SLABS - 1 - (int)clz(walk->left);
+    const int slab = ray->away ? (int)popcount((walk->left & -walk->left) - 1)
+                               : SLABS - 1 - (int)clz(walk->left);
     walk->left &= ~(1UL << slab);
     crossing->from = walk->r;
     crossing->to = walk->r_leave;
@@ -113,8 +121,9 @@ inline bool next_cell(Walk *walk, const Cells *cells, CellCrossing *crossing)
         }
     }
     crossing->length = length_between(ray, crossing->from, crossing->to);
-    crossing->weight = crossing->length
-                     * (float)cells->counts[(walk->stack_j * cells->stacks_wide + walk->stack_i) * SLABS + slab];
+    crossing->weight =
+        crossing->length *
+        (float)cells->counts[(walk->stack_j * cells->stacks_wide + walk->stack_i) * SLABS + slab];
     return true;
 }
 
@@ -147,19 +156,16 @@ inline float4 medium_at(const ListRay *ray, float r, const Lists *lists, int *gu
     return medium_of(lists, list, search.p);
 }
 
-__kernel void preview(
-    __global const HEADER_T *headers,   // these as of raycasting/raycast.cl
-    __global const ulong *faces,
-    __global const ulong *media,
-    __global const float *forms,
-    __global const float *opaque_depth,
-    __global const ulong *masks,
-    Frame frame,
-    __global const uint *counts,        // supersegments in each cell: stacks_high, stacks_wide, SLABS
-    int samples,                        // per ray
-    __global float4 *image)             // premultiplied RGBA, top row first
+__kernel void
+preview(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
+        __global const ulong *faces, __global const ulong *media, __global const float *forms,
+        __global const float *opaque_depth, __global const ulong *masks, Frame frame,
+        __global const uint *counts, // supersegments in each cell: stacks_high, stacks_wide, SLABS
+        int samples,                 // per ray
+        __global float4 *image)      // premultiplied RGBA, top row first
 {
-    const Ray pixel = ray_of_pixel(block_pixel((uint)get_global_id(0), frame.width), frame.width, frame.height);
+    const Ray pixel =
+        ray_of_pixel(block_pixel((uint)get_global_id(0), frame.width), frame.width, frame.height);
     if (!pixel.present)
         return;
     const float t_end = frame.has_opaque_depth ? opaque_depth[pixel.place] : INFINITY;
@@ -170,8 +176,15 @@ __kernel void preview(
         return;
     }
     const Lists lists = LISTS_OF(frame);
-    const Cells cells = {&ray, masks, counts, STACKS_ALONG(lists.wide), STACKS_ALONG(lists.high),
-                         0.5f * (float)lists.wide, 0.5f * (float)lists.high, frame.first_depth, frame.slabs_per_depth};
+    const Cells cells = {&ray,
+                         masks,
+                         counts,
+                         STACKS_ALONG(lists.wide),
+                         STACKS_ALONG(lists.high),
+                         0.5f * (float)lists.wide,
+                         0.5f * (float)lists.high,
+                         frame.first_depth,
+                         frame.slabs_per_depth};
 
     // Sum up the weight of all cells that the ray crosses
     float weight = 0.0f;
@@ -186,7 +199,7 @@ __kernel void preview(
     float4 medium = (float4)(0.0f);
     float weight_before = 0.0f, length_before = 0.0f; // of the cells passed
     float part_begins = 0.0f;                         // length
-    int halves = 1;                                   // the next event: middle of a part where odd, its end where even
+    int halves = 1; // the next event: middle of a part where odd, its end where even
     int guess = 0;
     walk = begin_walk(&cells);
     while (weight > 0.0f && seen.sums.w >= frame.cutoff) {
@@ -194,7 +207,10 @@ __kernel void preview(
         // What rounding left of the last part ends with the ray
         const float weight_until = more ? weight_before + crossing.weight : INFINITY;
         for (; halves <= 2 * samples && (float)halves * half_part < weight_until; ++halves) {
-            const float share = more ? clamp(((float)halves * half_part - weight_before) / crossing.weight, 0.0f, 1.0f) : 0.0f;
+            const float share =
+                more ? clamp(((float)halves * half_part - weight_before) / crossing.weight, 0.0f,
+                             1.0f)
+                     : 0.0f;
             if (halves & 1) {
                 medium = medium_at(&ray, r_at(&crossing, share, &ray), &lists, &guess);
             } else {

@@ -4,7 +4,8 @@
 // the interpolated 1/Z is smallest and its rounding matters most.
 //
 // -D CROPPED=0, 1           only parts of it are drawn, see lib/cropping.cl
-// -D DOUBLE_FLOAT_RAYS=2    r is 0 at the other end, `deep` is that one and Z_deep is its depth: the
+// -D DOUBLE_FLOAT_RAYS=2    r is 0 at the other end, `deep` is that one and Z_deep is its depth:
+// the
 //                           lists lie near it
 #include "lib/list_space.cl"
 #include "lib/cropping.cl"
@@ -53,8 +54,8 @@ inline float form_on_ray(__global const float *form, float a, float b, Time t)
     return form_at(form, a, b, t).x;
 }
 
-inline void set_depths(Depths *depths, __global const float *forms, float a, float b, Time t0, Time t1,
-                       float depth_origin)
+inline void set_depths(Depths *depths, __global const float *forms, float a, float b, Time t0,
+                       Time t1, float depth_origin)
 {
     const float2 start = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t0);
     const float2 end = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t1);
@@ -64,17 +65,19 @@ inline void set_depths(Depths *depths, __global const float *forms, float a, flo
 }
 
 // The offset is handed in: with its form in here, Intel's compiler for CPUs mixes up rays.
-inline float3 point_of_offset(__global const float *forms, float a, float b, Time t, float2 offset, Depths depths)
+inline float3 point_of_offset(__global const float *forms, float a, float b, Time t, float2 offset,
+                              Depths depths)
 {
     const float u = form_on_ray(forms + U_FORM * FORM_SIZE, a, b, t);
     const float v = form_on_ray(forms + V_FORM * FORM_SIZE, a, b, t);
     const float beyond = double_float_sum(offset, -depths.deep).x;
-    const float d = DEPTH == PARALLEL ? 1.0f : form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+    const float d =
+        DEPTH == PARALLEL ? 1.0f : form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
     const float scale = DEPTH == PARALLEL ? 1.0f : depths.reciprocal;
     return (float3)(u / d, v / d, beyond * scale / d);
 }
 
-#define point_on_ray(forms, a, b, t, depths) \
+#define point_on_ray(forms, a, b, t, depths)                                                       \
     point_of_offset(forms, a, b, t, form_at((forms) + DEPTH_FORM * FORM_SIZE, a, b, t), depths)
 #else
 typedef float Time;
@@ -104,8 +107,8 @@ inline Span clip_ray(__global const float *planes, int count, float a, float b, 
 
 // The kept parts of a ray from t_deep, where r is 0, to t_other. Over the homogeneous denominator,
 // what is affine in t is linear in r.
-inline Kept kept_parts_of_ray(__global const float *forms, int planes, float a, float b, Time t_deep, Time t_other,
-                              float r_other, uint regions)
+inline Kept kept_parts_of_ray(__global const float *forms, int planes, float a, float b,
+                              Time t_deep, Time t_other, float r_other, uint regions)
 {
     __global const float *form = forms + (PLANE_FORMS + planes) * FORM_SIZE;
     float at_deep[CROPPING_PLANES], at_other[CROPPING_PLANES];
@@ -123,7 +126,8 @@ inline Kept kept_parts_of_ray(__global const float *forms, int planes, float a, 
 
 // Begin the ray of pixel offsets (a, b), which ends at `t_end`. `forms`: list coordinates, model
 // direction, planes to clip to, then those of cropping if CROPPED.
-inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *frame, float a, float b, float t_end)
+inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *frame, float a,
+                      float b, float t_end)
 {
     // Clip it to the bounds, to V_O's viewport and to planes
     const Span span = clip_ray(forms + PLANE_FORMS * FORM_SIZE, frame->planes, a, b, t_end);
@@ -134,7 +138,8 @@ inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *fr
     ray->start = point_on_ray(forms, a, b, t0, ray->depths);
     const float3 end = point_on_ray(forms, a, b, t1, ray->depths);
     ray->along = end - ray->start;
-    ray->along.x = fabs(ray->along.x) < FLT_MIN ? 0.0f : ray->along.x; // its reciprocal is not finite
+    ray->along.x =
+        fabs(ray->along.x) < FLT_MIN ? 0.0f : ray->along.x; // its reciprocal is not finite
     ray->along.y = fabs(ray->along.y) < FLT_MIN ? 0.0f : ray->along.y;
     ray->away = ray->along.z >= 0.0f;
     // Let r be 0 at the deep end
@@ -147,12 +152,14 @@ inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *fr
     ray->t_scale = span.length;
     ray->scale = span.length * model_speed(forms, a, b);
     if (DEPTH != PARALLEL) {
-        ray->scale *= reciprocal_depth(ray->start.z, ray->depths) * reciprocal_depth(end.z, ray->depths);
+        ray->scale *=
+            reciprocal_depth(ray->start.z, ray->depths) * reciprocal_depth(end.z, ray->depths);
         ray->t_scale *= reciprocal_depth(ends_at_zero ? ray->start.z : end.z, ray->depths);
     }
     if (CROPPED) {
-        ray->kept = kept_parts_of_ray(forms, frame->planes, a, b, ends_at_zero ? t1 : t0, ends_at_zero ? t0 : t1,
-                                     ends_at_zero ? -1.0f : 1.0f, frame->regions);
+        ray->kept =
+            kept_parts_of_ray(forms, frame->planes, a, b, ends_at_zero ? t1 : t0,
+                              ends_at_zero ? t0 : t1, ends_at_zero ? -1.0f : 1.0f, frame->regions);
         ray->present = ray->present && ray->kept.count > 0;
     }
 }
@@ -177,7 +184,8 @@ inline float length_between(const ListRay *ray, float from, float to)
 {
     if (DEPTH == PARALLEL)
         return ray->scale * (to - from);
-    return ray->scale * (to - from) / (reciprocal_depth_at(ray, from) * reciprocal_depth_at(ray, to));
+    return ray->scale * (to - from) /
+           (reciprocal_depth_at(ray, from) * reciprocal_depth_at(ray, to));
 }
 
 // The same of what is kept between them.

@@ -27,16 +27,13 @@ inline Sense sense_of(Real along, Real deep, bool away)
     return sense;
 }
 
-inline Real depth_at(const Sense *sense, Real r)
-{
-    return fma(r, sense->along, sense->deep);
-}
+inline Real depth_at(const Sense *sense, Real r) { return fma(r, sense->along, sense->deep); }
 
 // What lies between depths `near` and `far` of the rays from r to r_next, where depths are `depth`
 // and `next_depth`: clipped to the supersegment by interval; between two faces it never leaves
 // [r, r_next].
-inline void clip_to_faces(Real *from, Real *to, const Sense *sense, Real near, Real far, Real r, Real r_next, Real depth,
-                          Real next_depth)
+inline void clip_to_faces(Real *from, Real *to, const Sense *sense, Real near, Real far, Real r,
+                          Real r_next, Real depth, Real next_depth)
 {
     const Real r_enters = (near - sense->deep) * sense->inverse;
     const Real r_leaves = (far - sense->deep) * sense->inverse;
@@ -78,10 +75,7 @@ inline void take_step(Axis *axis, Steps upwards)
 // Where the rays leave the lists of an index: from the border's number, never accumulated.
 #define CROSSINGS(axis, index) (((index) + (axis)->border - (axis)->zero) * (axis)->inverse)
 
-inline Real crossings(const Axis *axis, Int index)
-{
-    return CROSSINGS(axis, TO_REAL(index));
-}
+inline Real crossings(const Axis *axis, Int index) { return CROSSINGS(axis, TO_REAL(index)); }
 
 // The indices of the lists at a coordinate u or v, or the nearest ones; a shift away from it.
 inline Int list_index(const Axis *axis, Real coordinate, int shift)
@@ -93,11 +87,11 @@ inline Int list_index(const Axis *axis, Real coordinate, int shift)
 typedef struct {
     __global const ulong *masks; // of the stacks
     int stacks_wide;
-    float first_depth;           // where slab 0 begins, view depth less depth_origin
+    float first_depth; // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth;
 } Grid;
 
-#define GRID_OF(frame) \
+#define GRID_OF(frame)                                                                             \
     {masks, STACKS_ALONG((frame).lists_wide), (frame).first_depth, (frame).slabs_per_depth}
 
 // The last index in a stack, in the rays' sense.
@@ -116,7 +110,8 @@ inline Int index_reached(const Axis *axis, Int index, Steps edge, Real r_until)
     reached = clamp(reached, min(index, behind), max(index, behind));
     const Int too_far = reached != index && crossings(axis, reached - axis->step) > r_until;
     const Int farther = !too_far && crossings(axis, reached) <= r_until;
-    reached += SELECT((Int)(0), (Int)(axis->step), farther) - SELECT((Int)(0), (Int)(axis->step), too_far);
+    reached +=
+        SELECT((Int)(0), (Int)(axis->step), farther) - SELECT((Int)(0), (Int)(axis->step), too_far);
     return SELECT(index, reached, axis->along != 0.0f);
 }
 
@@ -128,19 +123,23 @@ inline Real r_entered(const Axis *axis, Real r, Int from, Int to)
 
 // The nearest occupied slab ahead of rays at a depth, in a stack whose mask has these halves.
 // Returns whether rays that look pass by something empty before it.
-inline Int look_ahead(Int *nearest, Int *nothing, Uint low, Uint high, const Sense *sense, Real depth, Int looks,
-                      const Grid *grid, Depths depths)
+inline Int look_ahead(Int *nearest, Int *nothing, Uint low, Uint high, const Sense *sense,
+                      Real depth, Int looks, const Grid *grid, Depths depths)
 {
-    const Int slab = slab_of(depth_offset(sense->sign * depth, depths), grid->first_depth, grid->slabs_per_depth);
+    const Int slab = slab_of(depth_offset(sense->sign * depth, depths), grid->first_depth,
+                             grid->slabs_per_depth);
     *nearest = nearest_slab(low, high, slab, sense->away, nothing);
     return looks && (*nothing || *nearest != slab);
 }
 
 // Up to here nothing is met: the stack's border at r_border, or the face of the nearest occupied
 // slab.
-inline Real empty_until(Real r_border, Int nearest, Int nothing, const Sense *sense, const Grid *grid, Depths depths)
+inline Real empty_until(Real r_border, Int nearest, Int nothing, const Sense *sense,
+                        const Grid *grid, Depths depths)
 {
-    const Real face = grid->first_depth + TO_REAL(sense->away ? nearest : nearest + 1) / grid->slabs_per_depth;
-    const Real r_face = (sense->sign * depth_coordinate(face, depths) - sense->deep) * sense->inverse;
+    const Real face =
+        grid->first_depth + TO_REAL(sense->away ? nearest : nearest + 1) / grid->slabs_per_depth;
+    const Real r_face =
+        (sense->sign * depth_coordinate(face, depths) - sense->deep) * sense->inverse;
     return SELECT(r_border, fmin(r_border, r_face), !nothing && sense->along != 0.0f);
 }

@@ -35,20 +35,27 @@ typedef struct {
     float depth_step, nearest_offset;
 } Lists;
 
-#define LISTS_OF(frame) \
-    {headers, faces, media, (frame).lists_wide, (frame).lists_high, (frame).depth_step, (frame).nearest_offset}
+#define LISTS_OF(frame)                                                                            \
+    {headers,                                                                                      \
+     faces,                                                                                        \
+     media,                                                                                        \
+     (frame).lists_wide,                                                                           \
+     (frame).lists_high,                                                                           \
+     (frame).depth_step,                                                                           \
+     (frame).nearest_offset}
 
 typedef struct {
-    OFFSET_T first; // entry of its first supersegment
-    int count;      // of its supersegments, with what it is filled up with
+    OFFSET_T first;     // entry of its first supersegment
+    int count;          // of its supersegments, with what it is filled up with
     int origin, stride; // if PACKED is 8, and:
     float per_code;     // 1 over a code's model length
 } List;
 
 // Bundle of list (i, j) in a window of so many lists, and the list's place in it.
-#define BUNDLE_OF_LIST(i, j, lists_wide) \
-    (((j) >> LIST_SHIFT) * (((lists_wide) + (1 << LIST_SHIFT) - 1) >> LIST_SHIFT) + ((i) >> LIST_SHIFT))
-#define PLACE_IN_BUNDLE(i, j) \
+#define BUNDLE_OF_LIST(i, j, lists_wide)                                                           \
+    (((j) >> LIST_SHIFT) * (((lists_wide) + (1 << LIST_SHIFT) - 1) >> LIST_SHIFT) +                \
+     ((i) >> LIST_SHIFT))
+#define PLACE_IN_BUNDLE(i, j)                                                                      \
     (((j) & ((1 << LIST_SHIFT) - 1)) << LIST_SHIFT | ((i) & ((1 << LIST_SHIFT) - 1)))
 
 inline OFFSET_T first_of_header(ulong header)
@@ -56,15 +63,9 @@ inline OFFSET_T first_of_header(ulong header)
     return (OFFSET_T)(header & ((1UL << FIRST_BITS) - 1));
 }
 
-inline int count_of_header(ulong header)
-{
-    return (int)(header >> FIRST_BITS);
-}
+inline int count_of_header(ulong header) { return (int)(header >> FIRST_BITS); }
 
-inline OFFSET_T entry_of(List list, int k)
-{
-    return list.first + ((OFFSET_T)k << 2 * LIST_SHIFT);
-}
+inline OFFSET_T entry_of(List list, int k) { return list.first + ((OFFSET_T)k << 2 * LIST_SHIFT); }
 
 // Two floats that were loaded as one word.
 inline float2 two_floats(ulong word)
@@ -103,7 +104,8 @@ inline List list_at(const Lists *lists, int i, int j)
 // two: nothing is rounded before it.
 inline float depth_of_code(const Lists *lists, List list, uint code, Depths depths)
 {
-    const float offset = (float)(list.origin + as_int(code & DEPTH_CODES) * list.stride) * lists->depth_step;
+    const float offset =
+        (float)(list.origin + as_int(code & DEPTH_CODES) * list.stride) * lists->depth_step;
     const float before = DEPTH == PARALLEL ? offset : fmax(offset, lists->nearest_offset);
     return depth_coordinate(before, depths);
 }
@@ -119,7 +121,9 @@ inline float2 face_of(const Lists *lists, List list, int k, Depths depths)
     const float2 face = two_floats(word);
     if (!FACES_ARE_OFFSETS)
         return face;
-    return face.x < INFINITY ? (float2)(depth_coordinate(face.x, depths), depth_coordinate(face.y, depths)) : NO_FACE;
+    return face.x < INFINITY
+               ? (float2)(depth_coordinate(face.x, depths), depth_coordinate(face.y, depths))
+               : NO_FACE;
 }
 
 // Its medium; undefined for NO_FACE.
@@ -127,16 +131,19 @@ inline float4 medium_of(const Lists *lists, List list, int k)
 {
     const OFFSET_T entry = entry_of(list, k);
     if (PACKED == 0)
-        return (float4)(two_floats(lists->media[2 * entry]), two_floats(lists->media[2 * entry + 1]));
+        return (float4)(two_floats(lists->media[2 * entry]),
+                        two_floats(lists->media[2 * entry + 1]));
     const ulong word = lists->faces[PACKED == 16 ? 2 * entry + 1 : entry];
     const uint low = (uint)word, high = (uint)(word >> 32);
     if (PACKED == 16) // extinction, colour
-        return (float4)((float)(high & 2047) * (1.0f / 2047.0f), (float)(high >> 11 & 2047) * (1.0f / 2047.0f),
+        return (float4)((float)(high & 2047) * (1.0f / 2047.0f),
+                        (float)(high >> 11 & 2047) * (1.0f / 2047.0f),
                         (float)(high >> 22) * (1.0f / 1023.0f), as_float(low));
     const uint tau = low >> 28 | (high & 255) << 4;
     const uint thickness = (low >> 14 & DEPTH_CODES) - (low & DEPTH_CODES);
     const float optical_depth = tau > 0 ? as_float((tau + TAU_BASE - 1) << 16) : 0.0f;
-    return (float4)((float)(high >> 8 & 255) * (1.0f / 255.0f), (float)(high >> 16 & 255) * (1.0f / 255.0f),
+    return (float4)((float)(high >> 8 & 255) * (1.0f / 255.0f),
+                    (float)(high >> 16 & 255) * (1.0f / 255.0f),
                     (float)(high >> 24) * (1.0f / 255.0f),
                     fmin(optical_depth * list.per_code / (float)thickness, FLT_MAX));
 }
@@ -147,10 +154,12 @@ inline float4 medium_of(const Lists *lists, List list, int k)
 
 // Prefetch every LISTS_PER_BUNDLE-th line of the cache of a list's bundle, whose entries take so
 // many words, from the share-th line on.
-inline void prefetch_share(__global const ulong *words, OFFSET_T first, int count, int words_per_entry, int share)
+inline void prefetch_share(__global const ulong *words, OFFSET_T first, int count,
+                           int words_per_entry, int share)
 {
     const OFFSET_T end = words_per_entry * (first + count * LISTS_PER_BUNDLE);
-    for (OFFSET_T k = words_per_entry * first + share * WORDS_PER_LINE; k < end; k += LISTS_PER_BUNDLE * WORDS_PER_LINE)
+    for (OFFSET_T k = words_per_entry * first + share * WORDS_PER_LINE; k < end;
+         k += LISTS_PER_BUNDLE * WORDS_PER_LINE)
         prefetch(words + k, 1);
 }
 
@@ -160,7 +169,8 @@ inline void prefetch_list(const Lists *lists, int i, int j)
     const int bundle = BUNDLE_OF_LIST(i, j, lists->wide);
     const ulong header = (ulong)lists->headers[bundle];
     if (PACKED == 8) {
-        prefetch_share(lists->faces, (OFFSET_T)header, (int)((OFFSET_T)lists->headers[bundle + 1] - (OFFSET_T)header), 1, 0);
+        prefetch_share(lists->faces, (OFFSET_T)header,
+                       (int)((OFFSET_T)lists->headers[bundle + 1] - (OFFSET_T)header), 1, 0);
         return;
     }
     const OFFSET_T first = first_of_header(header);

@@ -8,11 +8,12 @@
 //         step_on(&at, ...);                    // Amanatides and Woo
 //     }
 //
-// Each turn makes a guess, meets a supersegment or leaves a list, or the last two: rays side by side
-// need not wait for the one that searches longest or meets most (docs/decisions/rays.md).
+// Each turn makes a guess, meets a supersegment or leaves a list, or the last two: rays side by
+// side need not wait for the one that searches longest or meets most (docs/decisions/rays.md).
 //
 // -D SKIP_EMPTY=0, 1   pass by what the occupancy grid says is empty; the picture is the same
-// -D ONE_LIST=0, 1     the view is V_O: a ray stays in a list, whose supersegments a loop of its own
+// -D ONE_LIST=0, 1     the view is V_O: a ray stays in a list, whose supersegments a loop of its
+// own
 //                      meets (next_in_list)
 #include "lib/lanes.cl"
 typedef int Steps;
@@ -29,7 +30,8 @@ typedef struct {
     Sense sense;
 } Path;
 
-inline void begin_path(Path *path, __global const float *forms, const Frame *frame, float a, float b, float t_end)
+inline void begin_path(Path *path, __global const float *forms, const Frame *frame, float a,
+                       float b, float t_end)
 {
     begin_ray(&path->ray, forms, frame, a, b, t_end);
     path->u = axis_of(path->ray.along.x, path->ray.deep.x, frame->lists_wide);
@@ -39,10 +41,7 @@ inline void begin_path(Path *path, __global const float *forms, const Frame *fra
     path->sense = sense_of(path->ray.along.z, path->ray.deep.z, path->ray.away);
 }
 
-inline float lists_crossed(const Path *path)
-{
-    return fabs(path->u.along) + fabs(path->v.along);
-}
+inline float lists_crossed(const Path *path) { return fabs(path->u.along) + fabs(path->v.along); }
 
 // Bring the lists close that a ray begins and ends in, if it crosses few: those in between are
 // others' ends. With ONE_LIST, those of the next column of blocks.
@@ -95,15 +94,17 @@ inline void skip_empty_cells(Cursor *at, const Path *path, const Grid *grid)
     at->new_stack = false;
     for (bool looks = true; looks;) {
         // Is the cell empty? Which is the nearest that is not, in this stack?
-        const ulong mask = grid->masks[(at->j >> STACK_SHIFT) * grid->stacks_wide + (at->i >> STACK_SHIFT)];
+        const ulong mask =
+            grid->masks[(at->j >> STACK_SHIFT) * grid->stacks_wide + (at->i >> STACK_SHIFT)];
         int nearest, nothing;
-        if (!look_ahead(&nearest, &nothing, (uint)mask, (uint)(mask >> HALF_SLABS), &path->sense, at->depth, true, grid,
-                        path->ray.depths))
+        if (!look_ahead(&nearest, &nothing, (uint)mask, (uint)(mask >> HALF_SLABS), &path->sense,
+                        at->depth, true, grid, path->ray.depths))
             break;
         // Jump to it, or to the stack's border
         const int edge_i = stack_edge(u, at->i), edge_j = stack_edge(v, at->j);
         const float r_border = fmin(crossings(u, edge_i), crossings(v, edge_j));
-        const float r_until = empty_until(r_border, nearest, nothing, &path->sense, grid, path->ray.depths);
+        const float r_until =
+            empty_until(r_border, nearest, nothing, &path->sense, grid, path->ray.depths);
         const int i = index_reached(u, at->i, edge_i, r_until);
         const int j = index_reached(v, at->j, edge_j, r_until);
         if (i != at->i || j != at->j) {
@@ -122,7 +123,7 @@ inline void skip_empty_cells(Cursor *at, const Path *path, const Grid *grid)
 // What a turn has found out.
 typedef struct {
     List list;
-    bool found;               // the first supersegment of the list behind the ray's depth, or none
+    bool found; // the first supersegment of the list behind the ray's depth, or none
     Faces face;
     bool meets;               // the ray crosses it in the list,
     bool stays;               // and is still in the list behind it
@@ -140,17 +141,19 @@ inline void note_face(Crossing *crossing, Faces face)
     crossing->stays = crossing->meets && face.far <= crossing->next_depth;
 }
 
-// Search on for the first supersegment behind the ray's depth, and see where the ray leaves the list.
+// Search on for the first supersegment behind the ray's depth, and see where the ray leaves the
+// list.
 inline Crossing next_crossing(Cursor *at, const Path *path, const Lists *lists)
 {
     Crossing crossing;
     Faces face;
     crossing.list = list_at(lists, at->i, at->j);
-    crossing.found =
-        first_supersegment(&at->search, lists, crossing.list, at->depth, path->sense.away, path->ray.depths, &face);
+    crossing.found = first_supersegment(&at->search, lists, crossing.list, at->depth,
+                                        path->sense.away, path->ray.depths, &face);
     crossing.r_u = crossings(&path->u, at->i);
     crossing.r_v = crossings(&path->v, at->j);
-    crossing.r_next = HIGHER_OF(at->r, LOWER_OF(path->ray.r_begin + 1.0f, LOWER_OF(crossing.r_u, crossing.r_v)));
+    crossing.r_next =
+        HIGHER_OF(at->r, LOWER_OF(path->ray.r_begin + 1.0f, LOWER_OF(crossing.r_u, crossing.r_v)));
     crossing.next_depth = depth_at(&path->sense, crossing.r_next);
     note_face(&crossing, face);
     crossing.meets = crossing.meets && crossing.found;
@@ -166,7 +169,8 @@ inline bool next_in_list(Cursor *at, Crossing *crossing, const Path *path, const
     if (!more)
         return false;
     ++at->search.p;
-    note_face(crossing, faces_met(lists, crossing->list, at->search.p, path->sense.away, path->ray.depths));
+    note_face(crossing,
+              faces_met(lists, crossing->list, at->search.p, path->sense.away, path->ray.depths));
     return crossing->meets;
 }
 
@@ -174,14 +178,16 @@ inline bool next_in_list(Cursor *at, Crossing *crossing, const Path *path, const
 inline float2 ends_inside(const Cursor *at, const Crossing *crossing, const Path *path)
 {
     float from, to;
-    clip_to_faces(&from, &to, &path->sense, crossing->face.near, crossing->face.far, at->r, crossing->r_next, at->depth,
-                  crossing->next_depth);
+    clip_to_faces(&from, &to, &path->sense, crossing->face.near, crossing->face.far, at->r,
+                  crossing->r_next, at->depth, crossing->next_depth);
     return (float2)(from, to);
 }
 
-inline float4 medium_met(const Cursor *at, const Crossing *crossing, const Path *path, const Lists *lists)
+inline float4 medium_met(const Cursor *at, const Crossing *crossing, const Path *path,
+                         const Lists *lists)
 {
-    return medium_of(lists, crossing->list, index_met(crossing->list, at->search.p, path->sense.away));
+    return medium_of(lists, crossing->list,
+                     index_met(crossing->list, at->search.p, path->sense.away));
 }
 
 // Go on to the next supersegment of the list, or step to the next list (Amanatides and Woo); a ray

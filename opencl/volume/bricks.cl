@@ -1,11 +1,13 @@
-// A volume that is on the device brick by brick: the steps of rays are sampled before they are composited.
+// A volume that is on the device brick by brick: the steps of rays are sampled before they are
+// composited.
 //
 // -D: see volume/march.cl
 //
-// A step belongs to the brick of the cell that its midpoint lies in. That position is the one which the step is sampled at
-// in one piece, computed by the same operations, so every step belongs to exactly one brick and its sample is the same to
-// the last bit: bricks may come in any order. A brick holds what the samples in its cells read, which is one point behind
-// its last cell, and for gradients a margin of one before and three behind (a position that 1 is added to may round up to
+// A step belongs to the brick of the cell that its midpoint lies in. That position is the one which
+// the step is sampled at in one piece, computed by the same operations, so every step belongs to
+// exactly one brick and its sample is the same to the last bit: bricks may come in any order. A
+// brick holds what the samples in its cells read, which is one point behind its last cell, and for
+// gradients a margin of one before and three behind (a position that 1 is added to may round up to
 // the cell after the next).
 //
 #include "volume/march.cl"
@@ -27,14 +29,16 @@ typedef struct {
 } Bricks;
 
 // Begin the walk of a work-item; false where it has no steps.
-inline bool begin_walk(Walk *walk, uint item, const RaysOfView *view, const Classified *of, __global const float *forms,
-                       __global const float *opaque_depth)
+inline bool begin_walk(Walk *walk, uint item, const RaysOfView *view, const Classified *of,
+                       __global const float *forms, __global const float *opaque_depth)
 {
     const Rays ray = rays_of_view(view, item);
     if (!ray.present)
         return false;
-    const size_t place = (size_t)(view->height - 1 - (view->first_row + ray.y)) * view->width + ray.x;
-    if (!begin_march(&walk->march, view, of, forms, ray.a, ray.b, opaque_depth ? opaque_depth[place] : INFINITY))
+    const size_t place =
+        (size_t)(view->height - 1 - (view->first_row + ray.y)) * view->width + ray.x;
+    if (!begin_march(&walk->march, view, of, forms, ray.a, ray.b,
+                     opaque_depth ? opaque_depth[place] : INFINITY))
         return false;
     walk->k = view->first_step;
     walk->end = min(view->first_step + view->steps, walk->march.steps);
@@ -45,8 +49,9 @@ inline bool begin_walk(Walk *walk, uint item, const RaysOfView *view, const Clas
 inline int3 cell_of_step(const March *march, const Classified *of, int k)
 {
     const float t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
-    const float3 position = (float3)(fma(t, march->slope.x, march->start.x), fma(t, march->slope.y, march->start.y),
-                                     fma(t, march->slope.z, march->start.z));
+    const float3 position =
+        (float3)(fma(t, march->slope.x, march->start.x), fma(t, march->slope.y, march->start.y),
+                 fma(t, march->slope.z, march->start.z));
     return clamp(convert_int3(position), (int3)(0), of->points.size.xyz - 2);
 }
 
@@ -58,7 +63,8 @@ typedef struct {
     bool transparent;
 } Stretch;
 
-inline Stretch next_stretch(const Walk *walk, const Classified *of, __global const uchar *visible, const Bricks *bricks)
+inline Stretch next_stretch(const Walk *walk, const Classified *of, __global const uchar *visible,
+                            const Bricks *bricks)
 {
     const March *march = &walk->march;
     Stretch stretch;
@@ -66,27 +72,29 @@ inline Stretch next_stretch(const Walk *walk, const Classified *of, __global con
     const int3 macrocell = stretch.cell >> MACROCELL_SHIFT;
     const int3 brick = stretch.cell >> bricks->shift;
     stretch.brick = (brick.z * bricks->counts.y + brick.y) * bricks->counts.x + brick.x;
-    stretch.transparent = !visible[((size_t)macrocell.z * of->macrocells.y + macrocell.y) * of->macrocells.x + macrocell.x];
+    stretch.transparent =
+        !visible[((size_t)macrocell.z * of->macrocells.y + macrocell.y) * of->macrocells.x +
+                 macrocell.x];
     // Positions never turn back: where the last step is in the macrocell as well, all between are
     const int3 first = macrocell << MACROCELL_SHIFT, last = first + (1 << MACROCELL_SHIFT);
-    const int outside = first_step_outside(march, (float)first.x, (float)first.y, (float)first.z, (float)last.x,
-                                           (float)last.y, (float)last.z);
+    const int outside = first_step_outside(march, (float)first.x, (float)first.y, (float)first.z,
+                                           (float)last.x, (float)last.y, (float)last.z);
     stretch.end = max(min(outside, walk->end), walk->k + 1);
     if (any((cell_of_step(march, of, stretch.end - 1) >> MACROCELL_SHIFT) != macrocell))
         stretch.end = walk->k + 1;
     return stretch;
 }
 
-// Which bricks the steps of a chunk lie in, but for those that are transparent: their samples are set to nothing here.
+// Which bricks the steps of a chunk lie in, but for those that are transparent: their samples are
+// set to nothing here.
 __kernel void want_bricks(
-    const Classified classified,
-    const RaysOfView view,
-    __global const float *forms,
-    __global const float *opaque_depth,   // t at which each pixel's ray ends, top row first; 0: none does
-    __global const uchar *visible,        // whether a macrocell holds anything that is not transparent
+    const Classified classified, const RaysOfView view, __global const float *forms,
+    __global const float
+        *opaque_depth,             // t at which each pixel's ray ends, top row first; 0: none does
+    __global const uchar *visible, // whether a macrocell holds anything that is not transparent
     const Bricks bricks,
-    __global uint *wanted,                // per brick; set to 1
-    __global float4 *samples)             // see volume/samples.cl; room for `steps` of each ray
+    __global uint *wanted,    // per brick; set to 1
+    __global float4 *samples) // see volume/samples.cl; room for `steps` of each ray
 {
     const uint item = (uint)get_global_id(0);
     Walk walk;
@@ -107,19 +115,12 @@ __kernel void want_bricks(
 // Sample the steps of a chunk that lie in bricks which are on the device.
 __kernel void sample_steps(
     const Classified classified,
-    __global const VOXEL_T *voxels,       // slots of points cubed, each with a brick or not
-    __global const float4 *table,
-    __global const uchar *distances,
-    __global const uchar *blanked,
-    __global const float *gradient,
-    __global const float *lighting,
-    __global const float *ambient,
-    const RaysOfView view,
-    __global const float *forms,
-    __global const float *opaque_depth,
-    __global const uchar *visible,
-    const Bricks bricks,
-    __global const int *slots,            // of each brick; negative where its steps are not to be sampled now
+    __global const VOXEL_T *voxels, // slots of points cubed, each with a brick or not
+    __global const float4 *table, __global const uchar *distances, __global const uchar *blanked,
+    __global const float *gradient, __global const float *lighting, __global const float *ambient,
+    const RaysOfView view, __global const float *forms, __global const float *opaque_depth,
+    __global const uchar *visible, const Bricks bricks,
+    __global const int *slots, // of each brick; negative where its steps are not to be sampled now
     __global float4 *samples)
 {
     const uint item = (uint)get_global_id(0);
@@ -139,8 +140,8 @@ __kernel void sample_steps(
                 (int4)(bricks.points, bricks.points, bricks.points,
                        (int)(((uint)first.z * points + (uint)first.y) * points + (uint)first.x));
             for (int k = walk.k; k < stretch.end; ++k)
-                sample[(k - view.first_step) * SAMPLE_LANES] =
-                    step_medium(&walk.march, &medium, step_face(&walk.march, k), step_face(&walk.march, k + 1));
+                sample[(k - view.first_step) * SAMPLE_LANES] = step_medium(
+                    &walk.march, &medium, step_face(&walk.march, k), step_face(&walk.march, k + 1));
         }
         walk.k = stretch.end;
     }

@@ -2,15 +2,18 @@
 //
 // -D VOXEL_T, INDEX_T, COMPONENTS: see volume/sampling.cl
 //
-// Macrocell (i, j, k) covers the index positions from MACROCELL i to MACROCELL (i + 1) along x, both included, and likewise along y and
-// z: every point that a sample between them reads, whatever the interpolation.
+// Macrocell (i, j, k) covers the index positions from MACROCELL i to MACROCELL (i + 1) along x,
+// both included, and likewise along y and z: every point that a sample between them reads, whatever
+// the interpolation.
 #include "volume/sampling.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #define MACROCELL (1 << MACROCELL_SHIFT) // points along each axis
 
-// Least and largest scalar of each macrocell, NaN left out (it is transparent); (INFINITY, -INFINITY) where all is NaN.
-__kernel void macrocell_ranges(__global const VOXEL_T *voxels, int4 size, int4 macrocells, __global float2 *ranges)
+// Least and largest scalar of each macrocell, NaN left out (it is transparent); (INFINITY,
+// -INFINITY) where all is NaN.
+__kernel void macrocell_ranges(__global const VOXEL_T *voxels, int4 size, int4 macrocells,
+                               __global float2 *ranges)
 {
     const uint item = (uint)get_global_id(0);
     if (item >= (uint)macrocells.x * (uint)macrocells.y * (uint)macrocells.z)
@@ -33,10 +36,11 @@ __kernel void macrocell_ranges(__global const VOXEL_T *voxels, int4 size, int4 m
     ranges[item] = (float2)(least, largest);
 }
 
-// The distance field of macrocells: how far each is from one that may be visible, in macrocells along the axis on which that is most; 0
-// where it is one itself, `most` where there is none nearer. One axis at a time: `along` macrocells are on it, their numbers `apart`.
-__kernel void macrocell_distances(
-    __global const uchar *before, uint macrocells, uint apart, int along, int most, __global uchar *distances)
+// The distance field of macrocells: how far each is from one that may be visible, in macrocells
+// along the axis on which that is most; 0 where it is one itself, `most` where there is none
+// nearer. One axis at a time: `along` macrocells are on it, their numbers `apart`.
+__kernel void macrocell_distances(__global const uchar *before, uint macrocells, uint apart,
+                                  int along, int most, __global uchar *distances)
 {
     const uint item = (uint)get_global_id(0);
     if (item >= macrocells)
@@ -51,11 +55,11 @@ __kernel void macrocell_distances(
     distances[item] = (uchar)distance;
 }
 
-// Whether anything in a macrocell may be visible. visible_before[e]: how many of the table's entries 0 to e - 1 are not
-// transparent.
-__kernel void macrocell_visibility(
-    __global const float2 *ranges, uint macrocells, __global const uint *visible_before, int entries, float low,
-    float per_scalar, __global uchar *visible)
+// Whether anything in a macrocell may be visible. visible_before[e]: how many of the table's
+// entries 0 to e - 1 are not transparent.
+__kernel void macrocell_visibility(__global const float2 *ranges, uint macrocells,
+                                   __global const uint *visible_before, int entries, float low,
+                                   float per_scalar, __global uchar *visible)
 {
     const uint item = (uint)get_global_id(0);
     if (item >= macrocells)
@@ -65,7 +69,8 @@ __kernel void macrocell_visibility(
         visible[item] = 0;
         return;
     }
-    // So much of an entry on either side covers the rounding of scalars between two different ones, and of their places
+    // So much of an entry on either side covers the rounding of scalars between two different ones,
+    // and of their places
     const float margin = range.x < range.y ? fmax(1e-3f, 2.4e-7f * (float)entries) : 0.0f;
     const float last = (float)(entries - 1);
     const int first_entry = (int)floor(clamp((range.x - low) * per_scalar - margin, 0.0f, last));

@@ -1,10 +1,15 @@
-// The medium around a sample of a classified volume: colour and optical depth (docs/conventions.md).
+// The medium around a sample of a classified volume: colour and optical depth
+// (docs/conventions.md).
 //
-// -D BY_SCALAR  1: with NEAREST and voxels of integers, the table holds the medium of each scalar from `low` on, of which no
+// -D BY_SCALAR  1: with NEAREST and voxels of integers, the table holds the medium of each scalar
+// from `low` on, of which no
 //               voxel is outside (volume/scalar_media.cl); 0: it is classified at each sample
-// -D GRID_PART  1: `voxels` are part of a grid (large/blocks.py). Positions stay the whole grid's, so that no step is taken
-//               twice or left out; less the part's first point, which rounds nothing, they are sampled
-// -D VOXEL_T, INDEX_T, COMPONENTS, NEAREST: see volume/sampling.cl; SHADED, GRADIENT_OPACITY: see volume/shading.cl
+// -D GRID_PART  1: `voxels` are part of a grid (large/blocks.py). Positions stay the whole grid's,
+// so that no step is taken
+//               twice or left out; less the part's first point, which rounds nothing, they are
+//               sampled
+// -D VOXEL_T, INDEX_T, COMPONENTS, NEAREST: see volume/sampling.cl; SHADED, GRADIENT_OPACITY: see
+// volume/shading.cl
 #include "lib/transpose.cl"
 #include "lib/classification.cl"
 #include "volume/sampling.cl"
@@ -16,20 +21,22 @@
 // The numbers of a classified volume: CLASSIFIED of pyvista_vdi/volume/kernels.py.
 typedef struct {
     Points points;
-    int4 macrocells;                // along x, y, z
-    int4 part_first;                // the first point of a part of a grid
-    float4 part_lower, part_upper;  // of its own cells, the upper ones excluded; infinite at the grid's ends
-    int4 nodes;                     // of ambient occlusion, along x, y, z
-    float4 to_nodes;                // nodes per voxel along x, y, z; strength
-    int entries;                    // of the table
-    float low, per_scalar;          // scalar to table position
+    int4 macrocells; // along x, y, z
+    int4 part_first; // the first point of a part of a grid
+    float4 part_lower,
+        part_upper;        // of its own cells, the upper ones excluded; infinite at the grid's ends
+    int4 nodes;            // of ambient occlusion, along x, y, z
+    float4 to_nodes;       // nodes per voxel along x, y, z; strength
+    int entries;           // of the table
+    float low, per_scalar; // scalar to table position
 } Classified;
 
 typedef struct {
     Classified numbers;
     __global const VOXEL_T *voxels;
     __global const float4 *table;    // transfer function, or the media of scalars
-    __global const uchar *distances; // of the macrocells from visible ones, see volume/macrocells.cl; 0: nothing is empty
+    __global const uchar *distances; // of the macrocells from visible ones, see
+                                     // volume/macrocells.cl; 0: nothing is empty
     __global const uchar *blanked;   // see volume/blanking.cl; 0: nothing is
     __global const float *gradient;  // see gradient_opacity
     __global const float *lighting;  // see lit
@@ -37,15 +44,18 @@ typedef struct {
 } Medium;
 
 // An index position of the grid in the part of it that is at hand.
-#define IN_PART(numbers, position, axis) (GRID_PART ? (position) - (float)(numbers).part_first.axis : (position))
+#define IN_PART(numbers, position, axis)                                                           \
+    (GRID_PART ? (position) - (float)(numbers).part_first.axis : (position))
 
-// Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around a position of the voxels at hand.
+// Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around a position
+// of the voxels at hand.
 inline Real4 classified_at(const Medium *medium, Real x, Real y, Real z, Real units)
 {
     const Classified *of = &medium->numbers;
     if (BY_SCALAR) {
         const Int scalar = TO_INT(nearest_component(medium->voxels, &of->points, x, y, z, SCALAR));
-        Real4 known = load_halves(medium->table, AS_INT(min(AS_UINT(scalar - (int)of->low), (uint)(of->entries - 1))));
+        Real4 known = load_halves(
+            medium->table, AS_INT(min(AS_UINT(scalar - (int)of->low), (uint)(of->entries - 1))));
         known.w = scaled_to_step(known.w, units);
         return known;
     }
@@ -57,7 +67,8 @@ inline Real4 classified_at(const Medium *medium, Real x, Real y, Real z, Real un
     return sample;
 }
 
-// Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index position (x, y, z).
+// Colour (rgb) and optical depth (w) of a step of `units` opacity unit distances around index
+// position (x, y, z).
 inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
 {
     const Classified *of = &medium->numbers;
@@ -66,7 +77,8 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
     // Sample the scalar and classify it
     Real4 sample = classified_at(medium, at_x, at_y, at_z, units);
     if (medium->blanked)
-        sample.w = SELECT(sample.w, (Real)(0.0f), is_blank(medium->blanked, of->points.size, x, y, z));
+        sample.w =
+            SELECT(sample.w, (Real)(0.0f), is_blank(medium->blanked, of->points.size, x, y, z));
     const Int visible = sample.w > 0.0f;
     if (!(COMPONENTS > 1 || SHADED || GRADIENT_OPACITY || medium->ambient) || !ANY(visible))
         return sample;
@@ -78,7 +90,8 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
     if (SHADED || GRADIENT_OPACITY) {
         const Real3 differences = scalar_differences(medium->voxels, &of->points, at_x, at_y, at_z);
         if (GRADIENT_OPACITY) {
-            const Real scaled = scaled_optical_depth(sample.w, gradient_opacity(differences, medium->gradient));
+            const Real scaled =
+                scaled_optical_depth(sample.w, gradient_opacity(differences, medium->gradient));
             sample.w = SELECT(sample.w, scaled, visible);
         }
         if (SHADED)
@@ -88,6 +101,6 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
         const Real factor = ambient_factor(medium->ambient, of->nodes, of->to_nodes, x, y, z);
         color = REAL3(color.x * factor, color.y * factor, color.z * factor);
     }
-    return REAL4(SELECT(sample.x, color.x, visible), SELECT(sample.y, color.y, visible), SELECT(sample.z, color.z, visible),
-                 sample.w);
+    return REAL4(SELECT(sample.x, color.x, visible), SELECT(sample.y, color.y, visible),
+                 SELECT(sample.z, color.z, visible), sample.w);
 }

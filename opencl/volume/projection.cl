@@ -1,5 +1,6 @@
-// Projections of a volume, the blend modes of volume rendering beside compositing: along a ray, the greatest or the least
-// scalar, classified; or the mean or the integral of opacity times scalar, as a grey value (docs/conventions.md, "Blending").
+// Projections of a volume, the blend modes of volume rendering beside compositing: along a ray, the
+// greatest or the least scalar, classified; or the mean or the integral of opacity times scalar, as
+// a grey value (docs/conventions.md, "Blending").
 //
 // -D BLEND_MODE: which of them
 #include "volume/cropped_march.cl"
@@ -18,8 +19,8 @@ typedef struct {
 } Projection;
 
 // Take the samples that count into projections; `steps`: lengths that they stand for.
-inline void project_sample(Projection *so_far, const Medium *medium, Real scalar, Real steps, float per_range, float at_zero,
-                           Int counts)
+inline void project_sample(Projection *so_far, const Medium *medium, Real scalar, Real steps,
+                           float per_range, float at_zero, Int counts)
 {
     so_far->length = SELECT(so_far->length, so_far->length + steps, counts);
     if (BLEND_MODE == MAXIMUM) {
@@ -28,8 +29,10 @@ inline void project_sample(Projection *so_far, const Medium *medium, Real scalar
         so_far->extreme = SELECT(so_far->extreme, fmin(so_far->extreme, scalar), counts);
     } else {
         const Classified *of = &medium->numbers;
-        const Real opacity = classify(scalar, medium->table, of->entries, of->low, of->per_scalar).w;
-        const Real more = opacity * fma(scalar, (Real)(per_range), (Real)(at_zero)) * steps - so_far->lost;
+        const Real opacity =
+            classify(scalar, medium->table, of->entries, of->low, of->per_scalar).w;
+        const Real more =
+            opacity * fma(scalar, (Real)(per_range), (Real)(at_zero)) * steps - so_far->lost;
         const Real next = so_far->sum + more;
         so_far->lost = SELECT(so_far->lost, (next - so_far->sum) - more, counts);
         so_far->sum = SELECT(so_far->sum, next, counts);
@@ -41,10 +44,12 @@ inline Real4 projected(const Projection *whole, const Medium *medium, const Marc
 {
     if (BLEND_MODE == MAXIMUM || BLEND_MODE == MINIMUM) {
         const Classified *of = &medium->numbers;
-        const Real4 color = classify(whole->extreme, medium->table, of->entries, of->low, of->per_scalar);
+        const Real4 color =
+            classify(whole->extreme, medium->table, of->entries, of->low, of->per_scalar);
         return REAL4(color.x * color.w, color.y * color.w, color.z * color.w, color.w);
     }
-    const Real mean = BLEND_MODE == AVERAGE ? whole->sum / whole->length : whole->sum * (march->units * march->step);
+    const Real mean = BLEND_MODE == AVERAGE ? whole->sum / whole->length
+                                            : whole->sum * (march->units * march->step);
     const Int some = whole->length > 0.0f;
     const Real grey = SELECT((Real)(0.0f), clamp(mean, 0.0f, 1.0f), some);
     return REAL4(grey, grey, grey, SELECT((Real)(0.0f), (Real)(1.0f), some));

@@ -2,17 +2,19 @@
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// The numbers of rays: RAYS of pyvista_vdi/volume/kernels.py. Work-items are the pixels in columns first_column ..
-// first_column + columns - 1 of rows first_row .. first_row + rows - 1, in blocks of 4 x 4.
+// The numbers of rays: RAYS of pyvista_vdi/volume/kernels.py. Work-items are the pixels in columns
+// first_column .. first_column + columns - 1 of rows first_row .. first_row + rows - 1, in blocks
+// of 4 x 4.
 typedef struct {
-    int width, height;                       // of the window
+    int width, height; // of the window
     int first_column, columns, first_row, rows;
-    int first_step, steps;                   // to be taken of each ray
-    int planes;                              // forms that clip
-    float sample_distance, unit_distance;    // model units
+    int first_step, steps;                // to be taken of each ray
+    int planes;                           // forms that clip
+    float sample_distance, unit_distance; // model units
 } RaysOfView;
 
 inline Rays rays_of_view(const RaysOfView *view, uint first)
 {
-    return rays_of_part(first, view->width, view->height, view->first_column, view->columns, view->first_row, view->rows);
+    return rays_of_part(first, view->width, view->height, view->first_column, view->columns,
+                        view->first_row, view->rows);
 }

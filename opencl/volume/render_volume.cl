@@ -1,30 +1,27 @@
-// Direct volume rendering: the baseline that a VDI is measured against, by the same march as generation. One ray for each
-// work-item; sixteen: cpu16/volume_render.cl.
+// Direct volume rendering: the baseline that a VDI is measured against, by the same march as
+// generation. One ray for each work-item; sixteen: cpu16/volume_render.cl.
 //
-// -D CROPPED: see lib/cropping.cl; COMPENSATED: see lib/compositing.cl; the volume's: see volume/march.cl
+// -D CROPPED: see lib/cropping.cl; COMPENSATED: see lib/compositing.cl; the volume's: see
+// volume/march.cl
 #include "volume/cropped_march.cl"
 #include "volume/samples.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 __kernel void render_volume(
-    const Classified classified,
-    __global const VOXEL_T *voxels,
-    __global const float4 *table,
-    __global const uchar *distances,
-    __global const uchar *blanked,
-    __global const float *gradient,
-    __global const float *lighting,
-    __global const float *ambient,
-    const RaysOfView view,
+    const Classified classified, __global const VOXEL_T *voxels, __global const float4 *table,
+    __global const uchar *distances, __global const uchar *blanked, __global const float *gradient,
+    __global const float *lighting, __global const float *ambient, const RaysOfView view,
     __global const float *forms,
-    __global const float *opaque_depth, // t at which each pixel's ray ends, top row first; 0: none does
-    float transmittance_cutoff,         // a ray ends where no more than this is left; negative: never
-    float opacity_multiplier,           // of optical depths
-    uint regions,                       // that cropping keeps; its planes are forms behind the others
-    __global const float4 *samples,     // see volume/samples.cl; 0: steps are sampled here
-    __global float4 *states,            // of each ray behind a part of its steps: what has been seen; 0: all steps are taken
-    __global float4 *image)             // premultiplied RGBA, top row first
+    __global const float
+        *opaque_depth,              // t at which each pixel's ray ends, top row first; 0: none does
+    float transmittance_cutoff,     // a ray ends where no more than this is left; negative: never
+    float opacity_multiplier,       // of optical depths
+    uint regions,                   // that cropping keeps; its planes are forms behind the others
+    __global const float4 *samples, // see volume/samples.cl; 0: steps are sampled here
+    __global float4 *states, // of each ray behind a part of its steps: what has been seen; 0: all
+                             // steps are taken
+    __global float4 *image)  // premultiplied RGBA, top row first
 {
     const uint item = (uint)get_global_id(0);
     const Rays ray = rays_of_view(&view, item);
@@ -37,8 +34,10 @@ __kernel void render_volume(
         seen.compensation = states[2 * (size_t)item + 1];
     }
     March march;
-    if (begin_march(&march, &view, &classified, forms, ray.a, ray.b, opaque_depth ? opaque_depth[place] : INFINITY)) {
-        const Medium medium = {classified, voxels, table, distances, blanked, gradient, lighting, ambient};
+    if (begin_march(&march, &view, &classified, forms, ray.a, ray.b,
+                    opaque_depth ? opaque_depth[place] : INFINITY)) {
+        const Medium medium = {classified, voxels,   table,    distances,
+                               blanked,    gradient, lighting, ambient};
         __global const float4 *sampled = samples + samples_start(item, view.steps);
         Kept kept;
         if (CROPPED)
@@ -54,7 +53,8 @@ __kernel void render_volume(
                 continue;
             }
             // Sample the step's midpoint, classify and shade it
-            float4 step = samples ? sampled[(k - view.first_step) * SAMPLE_LANES] : step_medium(&march, &medium, front, back);
+            float4 step = samples ? sampled[(k - view.first_step) * SAMPLE_LANES]
+                                  : step_medium(&march, &medium, front, back);
             if (CROPPED)
                 step.w *= kept_share(&kept, front, back);
             step.w *= opacity_multiplier;

@@ -1,6 +1,8 @@
-// Steps that are sampled before they are composited (volume/bricks.cl): of a volume that is on the device brick by brick.
+// Steps that are sampled before they are composited (volume/bricks.cl): of a volume that is on the
+// device brick by brick.
 //
-// Rays are stored in blocks of 16, step by step, so that neighbouring work-items touch neighbouring words.
+// Rays are stored in blocks of 16, step by step, so that neighbouring work-items touch neighbouring
+// words.
 #define SAMPLE_LANES 16
 
 // Where the samples of a work-item begin, of which there is room for `held`.

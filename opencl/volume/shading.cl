@@ -1,22 +1,30 @@
-// Shading and gradient opacity, as VTK's GPU volume mapper computes them (docs/conventions.md, "Lighting").
+// Shading and gradient opacity, as VTK's GPU volume mapper computes them (docs/conventions.md,
+// "Lighting").
 //
-// -D SHADED            0: samples are not lit; 1: they are; 2: by one headlight and nothing else, which VTK shades its own way
-// -D GRADIENT_OPACITY  1: opacity depends on how fast the scalar changes
+// -D SHADED            0: samples are not lit; 1: they are; 2: by one headlight and nothing else,
+// which VTK shades its own way -D GRADIENT_OPACITY  1: opacity depends on how fast the scalar
+// changes
 //
-// Lights are in a frame of their own, "the lights' frame", whose origin is the eye: the model frame's axes for a headlight,
-// the view's otherwise.
+// Lights are in a frame of their own, "the lights' frame", whose origin is the eye: the model
+// frame's axes for a headlight, the view's otherwise.
 #include "lib/classification.cl"
 #include "lib/directions.cl"
 #include "volume/sampling.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Differences of the scalar between a voxel ahead and a voxel behind along each index axis; 0 where one is NaN.
-inline Real3 scalar_differences(__global const VOXEL_T *voxels, const Points *points, Real x, Real y, Real z)
+// Differences of the scalar between a voxel ahead and a voxel behind along each index axis; 0 where
+// one is NaN.
+inline Real3 scalar_differences(__global const VOXEL_T *voxels, const Points *points, Real x,
+                                Real y, Real z)
 {
-    const Real along_x = sample_volume(voxels, points, x + 1.0f, y, z) - sample_volume(voxels, points, x - 1.0f, y, z);
-    const Real along_y = sample_volume(voxels, points, x, y + 1.0f, z) - sample_volume(voxels, points, x, y - 1.0f, z);
-    const Real along_z = sample_volume(voxels, points, x, y, z + 1.0f) - sample_volume(voxels, points, x, y, z - 1.0f);
-    return REAL3(SELECT(along_x, (Real)(0.0f), isnan(along_x)), SELECT(along_y, (Real)(0.0f), isnan(along_y)),
+    const Real along_x = sample_volume(voxels, points, x + 1.0f, y, z) -
+                         sample_volume(voxels, points, x - 1.0f, y, z);
+    const Real along_y = sample_volume(voxels, points, x, y + 1.0f, z) -
+                         sample_volume(voxels, points, x, y - 1.0f, z);
+    const Real along_z = sample_volume(voxels, points, x, y, z + 1.0f) -
+                         sample_volume(voxels, points, x, y, z - 1.0f);
+    return REAL3(SELECT(along_x, (Real)(0.0f), isnan(along_x)),
+                 SELECT(along_y, (Real)(0.0f), isnan(along_y)),
                  SELECT(along_z, (Real)(0.0f), isnan(along_z)));
 }
 
@@ -30,10 +38,12 @@ inline Real3 scalar_differences(__global const VOXEL_T *voxels, const Points *po
 // Factor of the opacity where the scalar has these differences.
 inline Real gradient_opacity(Real3 differences, __global const float *gradient)
 {
-    const Real3 along = REAL3(differences.x * gradient[TO_TABLE], differences.y * gradient[TO_TABLE + 1],
-                              differences.z * gradient[TO_TABLE + 2]);
+    const Real3 along =
+        REAL3(differences.x * gradient[TO_TABLE], differences.y * gradient[TO_TABLE + 1],
+              differences.z * gradient[TO_TABLE + 2]);
     const float last = gradient[TABLE_ENTRIES] - 1.0f;
-    const Real x = clamp(fmin(length_of(along), gradient[LAST_POSITION]) + gradient[FIRST_POSITION], 0.0f, last);
+    const Real x = clamp(fmin(length_of(along), gradient[LAST_POSITION]) + gradient[FIRST_POSITION],
+                         0.0f, last);
     const Int i = min(TO_INT(x), max((int)last - 1, 0));
     __global const float *table = gradient + TABLE;
     const Places here = {i}, next = {min(i + 1, (int)last)};
@@ -47,16 +57,16 @@ inline Real gradient_opacity(Real3 differences, __global const float *gradient)
 
 FUNCTION_OF_LANES(expm1_of, expm1)
 
-// Optical depth of a step whose opacity is multiplied by `factor`, 0 to 1: VTK multiplies what the step has, not its
-// extinction.
+// Optical depth of a step whose opacity is multiplied by `factor`, 0 to 1: VTK multiplies what the
+// step has, not its extinction.
 inline Real scaled_optical_depth(Real tau, Real factor)
 {
     return SELECT(tau, -log1p_of(factor * expm1_of(-tau)), factor < 1.0f);
 }
 
 // Places in `lighting`
-#define NORMAL 0        // rows of the matrix from differences along the index axes to the lights' frame
-#define POSITION 9      // rows of the affine map from index positions to the lights' frame
+#define NORMAL 0   // rows of the matrix from differences along the index axes to the lights' frame
+#define POSITION 9 // rows of the affine map from index positions to the lights' frame
 #define AMBIENT 21
 #define DIFFUSE 22
 #define SPECULAR 23
@@ -73,7 +83,7 @@ inline Real scaled_optical_depth(Real tau, Real factor)
 #define LIGHT_POSITIONAL 12
 #define LIGHT_POSITION 13
 #define LIGHT_ATTENUATION 16
-#define LIGHT_CONE 19     // cosine of the cone's half angle; below -1 it shines everywhere
+#define LIGHT_CONE 19 // cosine of the cone's half angle; below -1 it shines everywhere
 #define LIGHT_EXPONENT 20
 #define LIGHT_SIZE 21
 
@@ -94,10 +104,12 @@ inline Real sharp_highlight(Real lost, float power)
     return exp(power * log1p_of(-fmin(lost, 1.0f)));
 }
 
-// Colour that a sample sends to the eye. `differences`: see scalar_differences. `x`, `y`, `z`: its index position.
-// The normal points to where the scalar grows, so that it looks away from a light in front of a denser inside: vectors
-// towards lights and eye are taken the other way round throughout.
-inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __global const float *lighting)
+// Colour that a sample sends to the eye. `differences`: see scalar_differences. `x`, `y`, `z`: its
+// index position. The normal points to where the scalar grows, so that it looks away from a light
+// in front of a denser inside: vectors towards lights and eye are taken the other way round
+// throughout.
+inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z,
+                 __global const float *lighting)
 {
 #define NORMAL_ALONG(c, n) dot_with(lighting + NORMAL + 3 * n, differences)
     const Real3 normal = unit_or_zero(OF_AXES(NORMAL_ALONG));
@@ -111,23 +123,25 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
     if (SHADED == 2) {
         __global const float *light = lighting + FIRST_LIGHT;
         Real facing = dot_of(normal, view);
-        const Real reflected = fmax(2.0f * facing * facing - 1.0f, 0.0f); // cosine between the reflected ray and the eye's
+        const Real reflected = fmax(2.0f * facing * facing - 1.0f,
+                                    0.0f); // cosine between the reflected ray and the eye's
         if (two_sided)
             facing = fabs(facing);
         Real specular;
         if (sharp) {
-            const Real3 across = cross_of(normal, view); // as long as the sine of half the angle to the reflected ray
+            const Real3 across = cross_of(
+                normal, view); // as long as the sine of half the angle to the reflected ray
             specular = sharp_highlight(2.0f * dot_of(across, across), power);
         } else {
             specular = pow_of(reflected, power);
         }
         // The light's own ambient colour has no part in it
-#define LIT(c, n)                                                                                                          \
-    clamp(lighting[AMBIENT] * color.c +                                                                                    \
-              SELECT((Real)(0.0f),                                                                                         \
-                     facing * lighting[DIFFUSE] * light[LIGHT_DIFFUSE + n] * color.c +                                     \
-                         specular * lighting[SPECULAR] * light[LIGHT_SPECULAR + n],                                        \
-                     facing > 0.0f),                                                                                       \
+#define LIT(c, n)                                                                                  \
+    clamp(lighting[AMBIENT] * color.c +                                                            \
+              SELECT((Real)(0.0f),                                                                 \
+                     facing * lighting[DIFFUSE] * light[LIGHT_DIFFUSE + n] * color.c +             \
+                         specular * lighting[SPECULAR] * light[LIGHT_SPECULAR + n],                \
+                     facing > 0.0f),                                                               \
           0.0f, 1.0f)
         return OF_AXES(LIT);
 #undef LIT
@@ -153,17 +167,20 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
                                light[LIGHT_ATTENUATION + 2] * distance * distance);
             if (light[LIGHT_CONE] >= -1.0f) {
                 const Real inside = dot_of(direction, axis);
-                strength *= SELECT((Real)(0.0f), pow_of(fmax(inside, 0.0f), light[LIGHT_EXPONENT]), inside >= light[LIGHT_CONE]);
+                strength *= SELECT((Real)(0.0f), pow_of(fmax(inside, 0.0f), light[LIGHT_EXPONENT]),
+                                   inside >= light[LIGHT_CONE]);
             }
         }
         Real facing = dot_of(normal, direction);
         if (two_sided)
             facing = SELECT(facing, -facing, facing < 0.0f);
         const Int faces = facing > 0.0f;
-#define DIFFUSE_OF(c, n) SELECT(diffuse.c, diffuse.c + strength * facing * light[LIGHT_DIFFUSE + n], faces)
+#define DIFFUSE_OF(c, n)                                                                           \
+    SELECT(diffuse.c, diffuse.c + strength * facing * light[LIGHT_DIFFUSE + n], faces)
         diffuse = OF_AXES(DIFFUSE_OF);
 #undef DIFFUSE_OF
-        // VTK turns the cosine of a side that faces away, and not its normal: its highlights lie elsewhere
+        // VTK turns the cosine of a side that faces away, and not its normal: its highlights lie
+        // elsewhere
 #define MIRRORED(c, n) (2.0f * facing * normal.c - direction.c)
         const Real3 mirrored = unit_or_zero(OF_AXES(MIRRORED));
 #undef MIRRORED
@@ -179,14 +196,17 @@ inline Real3 lit(Real3 color, Real3 differences, Real x, Real y, Real z, __globa
         } else {
             shines = strength * pow_of(reflected, power);
         }
-#define SPECULAR_OF(c, n) SELECT(specular.c, specular.c + shines * light[LIGHT_SPECULAR + n], faces & (reflected > 0.0f))
+#define SPECULAR_OF(c, n)                                                                          \
+    SELECT(specular.c, specular.c + shines * light[LIGHT_SPECULAR + n], faces & (reflected > 0.0f))
         specular = OF_AXES(SPECULAR_OF);
 #undef SPECULAR_OF
         ambient += vload3(0, light + LIGHT_AMBIENT);
     }
     // The lights' ambient colours are not multiplied by the sample's: so does VTK
-#define LIT(c, n) \
-    clamp(lighting[AMBIENT] * ambient.c + lighting[DIFFUSE] * diffuse.c * color.c + lighting[SPECULAR] * specular.c, 0.0f, 1.0f)
+#define LIT(c, n)                                                                                  \
+    clamp(lighting[AMBIENT] * ambient.c + lighting[DIFFUSE] * diffuse.c * color.c +                \
+              lighting[SPECULAR] * specular.c,                                                     \
+          0.0f, 1.0f)
     return OF_AXES(LIT);
 #undef LIT
 }

@@ -34,9 +34,9 @@ ON_A_DEVICE = {
 ON_THE_HOST = {
     "devices": ("devices", "device.describe_devices"),
     "info": ("info a.vdi", "io.vdi_file.reader.from_json"),
-    "info of an .exr": ("info a.exr", "io.deep_exr.files.media"),
-    "convert": ("convert a.vdi -o out.exr", "io.deep_exr.files.write_image"),
-    "convert back": ("convert a.exr -o out.vdi", "io.deep_exr.files.read_image"),
+    "info of an .exr": ("info a.exr", "extensions.deep_exr.files.media"),
+    "convert": ("convert a.vdi -o out.exr", "extensions.deep_exr.files.write_image"),
+    "convert back": ("convert a.exr -o out.vdi", "extensions.deep_exr.files.read_image"),
 }
 
 
