@@ -11,6 +11,7 @@ import sys
 import nrrd
 import numpy as np
 import pytest
+from command_line import complaint, outcome, run
 from extension_marks import cases
 from PIL import Image
 
@@ -64,39 +65,14 @@ def folder(tmp_path_factory):
     return path
 
 
-def run(capsys, *arguments):
-    """Run the command line in this process; return status, output and the error's lines."""
-    status = cli.main([str(a) for a in arguments])
-    captured = capsys.readouterr()
-    return status, captured.out, captured.err
-
-
-def said(capsys, *arguments):
-    """Run what must succeed; return its output, and what it has said beside it."""
-    status, out, err = run(capsys, *arguments)
-    assert status == 0, err
-    return out + err
-
-
-def complaint(capsys, *arguments, status=1):
-    """Run what must fail; return the message after checking that it is one line."""
-    found, out, err = run(capsys, *arguments)
-    assert found == status
-    assert out == ""
-    assert err.count("\n") == 1, err
-    prefix = "pyvista-vdi: error: "
-    assert err.startswith(prefix)
-    return err[len(prefix) :].strip()
-
-
 def test_help_names_every_verb(capsys):
-    out = said(capsys, "--help")
+    out = run(capsys, "--help")
     # argparse begins a new line behind a long one
     assert set(VERBS) == set(re.findall(r"^    ([a-z]+)(?:\s|$)", out, re.MULTILINE))
 
 
 def test_without_a_verb_it_shows_commands_that_parse(capsys):
-    out = said(capsys)
+    out = run(capsys)
     shown = re.findall(r"^  pyvista-vdi (.+?)(?:  .*)?$", out, re.MULTILINE)
     assert [line.split()[0] for line in shown][:2] == ["generate", "view"]
     assert len(shown) == 6
@@ -106,14 +82,14 @@ def test_without_a_verb_it_shows_commands_that_parse(capsys):
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_each_verb_explains_itself_with_an_example(verb, capsys):
-    out = said(capsys, verb, "--help")
+    out = run(capsys, verb, "--help")
     example = out.partition("Example:\n  pyvista-vdi ")[2].split()
     assert example[0] == verb
     assert parser.parse(example) is not None
 
 
 def test_version(capsys):
-    assert run(capsys, "--version")[:2] == (0, f"pyvista-vdi {pvdi.__version__}\n")
+    assert outcome(capsys, "--version")[:2] == (0, f"pyvista-vdi {pvdi.__version__}\n")
 
 
 @pytest.mark.parametrize(
@@ -295,11 +271,11 @@ def test_nothing_that_a_file_says_reaches_the_terminal_raw(capsys, tmp_path):
     """Names and text in a file may hold what moves the cursor, or what cannot be written."""
     path = tmp_path / "\udcff.vdi"  # a byte that is no UTF-8
     vdi_of(200, metadata={"\x1b[31mred\n": "\x1b]0;title\x07"}).save(path)
-    out = said(capsys, "info", path)
+    out = run(capsys, "info", path)
     assert r"\udcff.vdi" in out
     assert r"\x1b[31mred\n" in out
     assert all(c.isprintable() for c in out.replace("\n", ""))
-    said(capsys, "convert", path, "-o", tmp_path / "\udcfe.vdi")
+    run(capsys, "convert", path, "-o", tmp_path / "\udcfe.vdi")
     assert complaint(capsys, "info", tmp_path / "\x1b[2J.vdi").startswith(str(tmp_path))
 
 
@@ -313,7 +289,7 @@ def test_no_zero_has_a_sign(capsys, tmp_path):
         depth_origin=-0.0,
     )
     vdi.save(tmp_path / "a.vdi")
-    out = said(capsys, "info", tmp_path / "a.vdi")
+    out = run(capsys, "info", tmp_path / "a.vdi")
     assert re.search(r"^depth origin +0$", out, re.MULTILINE)
     assert re.search(r"^eye +\(0, 0, 5\)$", out, re.MULTILINE)
     # The file's own path may end a number so: pytest's first folder on a machine is pytest-0
@@ -321,12 +297,12 @@ def test_no_zero_has_a_sign(capsys, tmp_path):
 
 
 def test_info(folder, capsys):
-    out = said(capsys, "info", folder / "a.vdi")
+    out = run(capsys, "info", folder / "a.vdi")
     lines = dict(line.split("  ", 1) for line in out.splitlines())
     assert lines["lists"].strip() == "24 x 16"
     assert lines["supersegments"].strip() == "200, 0.52 per list"
     assert lines["criterion"].strip() == '"none"'
-    out = said(capsys, "info", folder / "a.vdi", "--json")
+    out = run(capsys, "info", folder / "a.vdi", "--json")
     about = json.loads(out)
     assert about["n_supersegments"] == 200
     assert pvdi.Camera.from_dict(about["camera"]) == io.read(folder / "a.vdi").camera
@@ -334,7 +310,7 @@ def test_info(folder, capsys):
 
 def test_info_of_a_volume(folder, capsys):
     arguments = ("info", folder / "v.nrrd", "--spacing", "1", "2", "3", "--origin", "0", "0", "5")
-    out = said(capsys, *arguments)
+    out = run(capsys, *arguments)
     lines = {name: text.strip() for name, text in (x.split("  ", 1) for x in out.splitlines())}
     volume = read_file(folder / "v.nrrd")
     nx, ny, nz = volume.dimensions
@@ -342,7 +318,7 @@ def test_info_of_a_volume(folder, capsys):
     assert lines["spacing"] == "(1, 2, 3)"
     assert lines["origin"] == "(0, 0, 5)"
     assert lines["bounds"] == f"(0, {nx - 1}, 0, {2 * (ny - 1)}, 5, {5 + 3 * (nz - 1)})"
-    about = json.loads(run(capsys, *arguments, "--json")[1])
+    about = json.loads(outcome(capsys, *arguments, "--json")[1])
     assert about["range"] == [*volume.finite_range()]
     assert about["dimensions"] == [nx, ny, nz]
 
@@ -352,9 +328,9 @@ def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
     pv = pytest.importorskip("pyvista")
     looks = ("--cmap", "bone", "--opacity", "linear", "--size", "40x30")
     direct, file, by_file = (tmp_path / name for name in ("a.png", "v.vdi", "b.png"))
-    said(capsys, "view", folder / "v.nrrd", "--screenshot", direct, *looks)
-    said(capsys, "generate", folder / "v.nrrd", "-o", file, *looks)
-    said(capsys, "view", file, "--screenshot", by_file)
+    run(capsys, "view", folder / "v.nrrd", "--screenshot", direct, *looks)
+    run(capsys, "generate", folder / "v.nrrd", "-o", file, *looks)
+    run(capsys, "view", file, "--screenshot", by_file)
     one, other = (pv.read(name).active_scalars.astype(int) for name in (direct, by_file))
     below = one.reshape(30, 40, -1)[12:]  # scalar bars may differ in what they are told
     assert np.abs(below - other.reshape(30, 40, -1)[12:]).max() <= 1
@@ -364,35 +340,35 @@ def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
 @pytest.mark.extension("web")
 def test_a_page_is_taken_as_a_vdi_is(folder, capsys, default_runtime, tmp_path):
     page, file = folder / "a.html", tmp_path / "a.vdi"
-    said(capsys, "convert", page, "-o", file)
+    run(capsys, "convert", page, "-o", file)
     assert io.read(file).equals(io.read(page))
     again = tmp_path / "again.html"
-    said(capsys, "convert", file, "-o", again)
+    run(capsys, "convert", file, "-o", again)
     assert io.read(again).equals(io.read(page))
     for verb, option in (("render", "-o"), ("view", "--screenshot")):
         if verb == "view":
             pytest.importorskip("pyvista")
         pictures = [tmp_path / f"{verb}-{kind}.png" for kind in ("page", "file")]
         for source, picture in zip((page, file), pictures, strict=True):
-            said(capsys, verb, source, option, picture)
+            run(capsys, verb, source, option, picture)
         assert pictures[0].read_bytes() == pictures[1].read_bytes()
-    about = [json.loads(run(capsys, "info", name, "--json")[1]) for name in (page, file)]
+    about = [json.loads(outcome(capsys, "info", name, "--json")[1]) for name in (page, file)]
     own = ("path", "file_bytes")
     one, other = ({k: v for k, v in state.items() if k not in own} for state in about)
     assert one == {**other, "codec": "deflate", "format_version": 4}
 
 
 def test_devices(capsys, default_runtime):
-    out = said(capsys, "devices")
+    out = run(capsys, "devices")
     assert default_runtime.info.name in out
-    out = said(capsys, "devices", "--json")
+    out = run(capsys, "devices", "--json")
     assert default_runtime.info.name in [device["name"] for device in json.loads(out)]
 
 
 def test_devices_fails_where_none_is_usable(capsys, monkeypatch):
     monkeypatch.setattr(pvdi.device, "list_devices", list)
     monkeypatch.setattr(pvdi.device, "describe_devices", lambda: "No device.")
-    assert run(capsys, "devices")[:2] == (1, "No device.\n")
+    assert outcome(capsys, "devices")[:2] == (1, "No device.\n")
 
 
 def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
@@ -400,7 +376,7 @@ def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     arguments = ("generate", folder / "v.nrrd", "--transfer-function", folder / "tf.json")
     arguments = (*arguments, "--size", "60x40", "-o", target)
     asked = ("--quality", "fast", "--max-bytes", "1e9", "--target-angle", "20")
-    out = said(capsys, *arguments, *asked)
+    out = run(capsys, *arguments, *asked)
     assert "settings are chosen by a measurement" in out
     vdi = io.read(target)
     width, height = vdi.window_size
@@ -412,9 +388,9 @@ def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     # Pictures have the window that was asked for, not that of the lists
     assert vdi.window_size != (60, 40)
     picture = tmp_path / "a.png"
-    assert said(capsys, "render", target, "-o", picture) == f"{picture}: 60 x 40\n"
+    assert run(capsys, "render", target, "-o", picture) == f"{picture}: 60 x 40\n"
     # The precision alone is no dial
-    assert "chosen" not in said(capsys, *arguments, "--precision", "16-byte")
+    assert "chosen" not in run(capsys, *arguments, "--precision", "16-byte")
     assert io.read(target).precision == "16-byte"
 
 
@@ -423,7 +399,7 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     options = "--azimuth 30 --size 20x12 --max-supersegments 7 --compression lz4"
     options += " --criterion homogeneity --ambient-occlusion --occlusion-strength 0.4"
     table = ("--transfer-function", folder / "tf.json")
-    out = said(capsys, "generate", folder / "v.nrrd", "-o", target, *table, *options.split())
+    out = run(capsys, "generate", folder / "v.nrrd", "-o", target, *table, *options.split())
     assert "20 x 12 lists" in out
     assert "up to" in out
     vdi = io.read(target)
@@ -433,7 +409,7 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     occlusion = vdi.metadata["ambient_occlusion"]
     assert (occlusion["strength"], occlusion["directions"]) == (0.4, 32)
     assert vdi.camera == filling_camera(vdi.bounds, (20, 12), azimuth=30)
-    out = said(capsys, "render", target, "-o", picture, "--size", "30x10")
+    out = run(capsys, "render", target, "-o", picture, "--size", "30x10")
     assert out == f"{picture}: 30 x 10\n"
     with Image.open(picture) as image:
         assert (image.mode, image.size) == ("RGBA", (30, 10))
@@ -448,11 +424,11 @@ def test_generate_within_a_memory_limit(folder, capsys, default_runtime, tmp_pat
     arguments = ["generate", tmp_path / "v.nrrd", "--transfer-function", folder / "tf.json"]
     arguments += ["--size", "12x8"]
     for name, more in (("whole", []), ("bricks", ["--memory-limit", "2.3 MiB"])):
-        out = said(capsys, *arguments, "-o", tmp_path / f"{name}.vdi", *more)
+        out = run(capsys, *arguments, "-o", tmp_path / f"{name}.vdi", *more)
     assert "up to 2 MiB" in out
     assert io.read(tmp_path / "bricks.vdi").equals(io.read(tmp_path / "whole.vdi"))
     few = [*arguments, "-o", tmp_path / "few.vdi", "--memory-limit", "900KB"]
-    status, _, err = run(capsys, *few)
+    status, _, err = outcome(capsys, *few)
     assert status == 1
     assert "brick by brick" in err
     assert "memory_limit is 878.91 KiB" in err
@@ -466,7 +442,7 @@ def test_render_several(capsys, default_runtime, tmp_path):
     other = vdi_of(384, moved, front=27.0, thickness=2.0, color=(0.0, 0.5, 1.0))
     files = (one.save(tmp_path / "a.vdi"), other.save(tmp_path / "b.vdi"))
     picture = tmp_path / "both.png"
-    said(capsys, "render", *files, "-o", picture)
+    run(capsys, "render", *files, "-o", picture)
     expected = pvdi.render([one, other], one.camera, model_transforms=[np.eye(4), matrix])
     with Image.open(picture) as image:
         assert np.array_equal(np.asarray(image), io.to_bytes(expected))
@@ -476,7 +452,7 @@ def test_render_several(capsys, default_runtime, tmp_path):
 def test_render_over_a_background(folder, capsys, default_runtime, tmp_path):
     picture = tmp_path / "a.png"
     for text, corner in (("white", 255), ("#ff0000", (255, 0, 0)), ("0,0,0.2", (0, 0, 51))):
-        said(capsys, "render", folder / "a.vdi", "-o", picture, "--background", text)
+        run(capsys, "render", folder / "a.vdi", "-o", picture, "--background", text)
         with Image.open(picture) as image:
             assert image.mode == "RGB"
             assert (np.asarray(image)[0, 0] == corner).all()
@@ -486,7 +462,7 @@ def test_render_rays_that_end_earlier(folder, capsys, default_runtime, tmp_path)
     file, picture = folder / "a.vdi", tmp_path / "a.png"
 
     def rendered(*files, cutoff):
-        return run(capsys, "render", *files, "-o", picture, "--transmittance-cutoff", cutoff)
+        return outcome(capsys, "render", *files, "-o", picture, "--transmittance-cutoff", cutoff)
 
     status, _, error = rendered(file, cutoff="1")
     assert status == 1

@@ -9,34 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import complaint, outcome, run
 
-from pyvista_vdi import cli
 from pyvista_vdi.extensions.paraview import cli as verb
-
-
-def run(capsys, *arguments):
-    """Run the command line in this process; return status, output and the error's lines."""
-    status = cli.main([str(a) for a in arguments])
-    captured = capsys.readouterr()
-    return status, captured.out, captured.err
-
-
-def said(capsys, *arguments):
-    """Run what must succeed; return its output, and what it has said beside it."""
-    status, out, err = run(capsys, *arguments)
-    assert status == 0, err
-    return out + err
-
-
-def complaint(capsys, *arguments, status=1):
-    """Run what must fail; return the message after checking that it is one line."""
-    found, out, err = run(capsys, *arguments)
-    assert found == status
-    assert out == ""
-    assert err.count("\n") == 1, err
-    prefix = "pyvista-vdi: error: "
-    assert err.startswith(prefix)
-    return err[len(prefix) :].strip()
 
 
 @pytest.fixture
@@ -56,12 +31,12 @@ def plain_installation(tmp_path, monkeypatch):
 
 
 def test_paraview_prints_the_plugins_path(capsys):
-    out = said(capsys, "paraview")
+    out = run(capsys, "paraview")
     assert Path(out.strip()).is_file()
 
 
 def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
-    out = said(capsys, "paraview", "--environment")
+    out = run(capsys, "paraview", "--environment")
     shown = subprocess.run(
         ["sh", "-c", f'{out}echo "$PYTHONPATH"; echo "$PV_PLUGIN_PATH"'],
         env={"PYTHONPATH": "/before"},
@@ -95,7 +70,7 @@ def test_paraview_is_asked_whether_it_finds_a_device(
     if message is None:
         site = plain_installation.parent
         expected = f"{site}:/before:{site}/pyvista_vdi/extensions/paraview/plugin\n"
-        assert run(capfd, "paraview", "--check", pvpython) == (0, expected, "")
+        assert outcome(capfd, "paraview", "--check", pvpython) == (0, expected, "")
     else:
         assert message in complaint(capfd, "paraview", "--check", pvpython)
 
