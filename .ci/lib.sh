@@ -34,16 +34,24 @@ step() {
     shift
     printf '\n==== %s\n' "$name"
     set +e
-    (set -euo pipefail && "$@") </dev/null
+    (
+        (set -euo pipefail && "$@")
+        status=$?
+        times >"$work/times"
+        exit "$status"
+    ) </dev/null
     status=$?
     set -e
-    report "$name" "$status" $((SECONDS - start))
+    report "$name" "$status" $((SECONDS - start)) "$work/times"
 }
 
+# report NAME STATUS SECONDS TIMES: the last is a file with what `times` printed. Steps that run beside
+# each other take longer by the others, but no more of the processors.
 report() {
-    local word=passed
+    local word=passed processors
+    processors=$(awk 'NR == 2 { gsub(/[ms]/, " "); print int($1 * 60 + $2 + $3 * 60 + $4) }' "$4")
     (($2 == 0)) || word=FAILED failed=1
-    results+=("$(printf '%s  %-22s %5d s' "$word" "$1" "$3")")
+    results+=("$(printf '%s  %-22s %5d s, %5d s of processors' "$word" "$1" "$3" "$processors")")
     printf '==== %s\n' "${results[-1]}"
 }
 
@@ -63,6 +71,7 @@ beside() {
         set +e
         (set -euo pipefail && "$@") </dev/null >"$work/$name.log" 2>&1
         status=$?
+        times >"$work/$name.times"
         printf '%d %d' "$status" $((SECONDS - start)) >"$work/$name.status"
     ) &
     begun+=("$name")
@@ -77,7 +86,7 @@ finish() {
         printf '\n==== %s\n' "$name"
         # The cause of a failure stands at the end, where a long log would bury it
         if ((status == 0)); then tail -n 15 "$work/$name.log"; else tail -n 300 "$work/$name.log"; fi
-        report "$name" "$status" "$seconds"
+        report "$name" "$status" "$seconds" "$work/$name.times"
     done
     begun=()
 }
@@ -198,13 +207,13 @@ checks() {
     nox --no-venv --no-install -s "$@"
 }
 
-# The plugin in a real ParaView; tools/ installs one where there is none.
+# paraview_tests [arguments of pytest]: in a real ParaView; tools/ installs one where there is none
 paraview_tests() {
     # PYTHON is the tests' interpreter, ParaView has its own
     env -u PYTHON EXTRAS=cpu,mpi bash "$work/source/tools/install_paraview.sh" \
         "$work/paraview" "$(compgen -G "$work/dist/*.whl")"
     export PYVISTA_VDI_PARAVIEW=$work/paraview PYVISTA_VDI_REQUIRE_PARAVIEW=1
-    tests_of "$work/venv" -m paraview -n 0 # one ParaView at a time
+    tests_of "$work/venv" -m paraview -n 0 "$@" # one ParaView at a time
 }
 
 # readme_command NAME: to the letter, in a copy of its own, the block after  <!-- NAME command -->

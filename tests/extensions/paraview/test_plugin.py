@@ -200,7 +200,7 @@ def test_picture_is_what_render_returns(made, default_runtime):
     assert compare_images(shown, over_black(expected)).ssim > 0.999
 
 
-@pytest.mark.parametrize("state", ["state.pvsm", "state.py"])
+@pytest.mark.parametrize("state", ["state.pvsm", pytest.param("state.py", marks=pytest.mark.slow)])
 def test_states_come_back(made, paraview, state):
     folder, scene = made
     assert paraview("load", folder, state).strip() == ""
@@ -220,6 +220,7 @@ def test_vdi_looks_like_paraviews_own_volume(paraview, tmp_path):
     assert compare_images(judge, found).ssim > 0.998
 
 
+@pytest.mark.slow
 def test_vdi_in_a_scene_stands_for_paraviews_own_volume(paraview, tmp_path):
     """With a ball half inside it: seen where its outline is visible, and gone with its filter."""
     paraview("scene", tmp_path)
@@ -235,6 +236,7 @@ def test_vdi_in_a_scene_stands_for_paraviews_own_volume(paraview, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_settings_reach_the_vdi(paraview, tmp_path):
     paraview("settings", tmp_path)
     found = json.loads((tmp_path / "settings.json").read_text())
@@ -289,6 +291,7 @@ def by_one_process(paraview, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["", " --symmetric"])
 def test_ranks_make_one_vdi_together(by_one_process, paraview, tmp_path, mode, default_runtime):
     """Of points, of cells at blocks' borders, of a source that gives parts, and of time steps."""
@@ -336,6 +339,7 @@ def assert_alike(found, expected):
     assert (apart > BLENDED).mean() <= SHARE_OF_BORDER_PIXELS, apart.max()
 
 
+@pytest.mark.slow
 def test_a_series_plays_with_paraviews_animation(paraview, tmp_path, default_runtime):
     """In a scene, as a picture and in a saved animation: the step nearest to the time."""
     times, camera = (0.5, 1.0, 4.0), filling_camera(ball_at(0).bounds, SCREEN)
@@ -367,6 +371,7 @@ def test_a_series_plays_with_paraviews_animation(paraview, tmp_path, default_run
         assert_alike(screenshot(path), picture)
 
 
+@pytest.mark.slow
 def test_vdis_are_made_of_the_time_that_paraview_shows(paraview, tmp_path, default_runtime):
     balls = save_steps(tmp_path)
     assert paraview("temporal", tmp_path).strip() == ""
@@ -405,6 +410,7 @@ def test_paraviews_own_python_bears_our_numpy(paraview, tmp_path):
     np.testing.assert_allclose(copied, (37.35310363769531, 276.8288269042969), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_guides_script_runs(paraview, tmp_path, default_runtime):
     """What docs/guide_paraview.md shows, to the letter."""
     checkout = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).parents[3])
