@@ -213,7 +213,7 @@ paraview_tests() {
     env -u PYTHON EXTRAS=cpu,mpi bash "$work/source/tools/install_paraview.sh" \
         "$work/paraview" "$(compgen -G "$work/dist/*.whl")"
     export PYVISTA_VDI_PARAVIEW=$work/paraview PYVISTA_VDI_REQUIRE_PARAVIEW=1
-    tests_of "$work/venv" -m paraview -n 0 "$@" # one ParaView at a time
+    tests_of "$work/venv" -m paraview -n 0 "$@" tests/extensions/paraview # one at a time
 }
 
 # readme_command NAME: to the letter, in a copy of its own, the block after  <!-- NAME command -->

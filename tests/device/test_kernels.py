@@ -155,6 +155,7 @@ def compiler():
     return max(found, key=lambda each: each.info.platform.startswith("Portable")).device
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("declaration", "defines"), list(declared()))
 def test_declarations_are_as_compilers_see_kernels(compiler, declaration, defines):
     """Programs from a cache have no names on Intel's, so that every one is compiled here."""

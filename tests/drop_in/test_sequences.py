@@ -176,7 +176,7 @@ def same(script, judge, way, drawn, what):
 
 
 @pytest.mark.filterwarnings("ignore::pyvista_vdi.errors.VDIWarning")  # VDIs made inside a volume
-@pytest.mark.every(10)
+@pytest.mark.every(25)
 @pytest.mark.parametrize("way", ["auto", "volume", "vdi"])
 @pytest.mark.parametrize("seed", range(100))
 def test_every_picture_is_as_with_add_volume(seed, way, record_property, default_runtime):

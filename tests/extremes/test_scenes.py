@@ -98,6 +98,7 @@ WORLDS = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("world", WORLDS)
 def test_worlds(runtime, worst, world):
     """A plate is a staircase of lists: rays in its plane, at larger angles, may pass between."""

@@ -168,6 +168,7 @@ SCENES = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", SCENES)
 def test_it_is_drawn_as_a_volume_is(name):
     scene, options = SCENES[name]

@@ -257,7 +257,7 @@ PAIRS = [
 ]
 
 
-@pytest.mark.every(12)
+@pytest.mark.every(24)
 @pytest.mark.usefixtures("dealt")
 @pytest.mark.parametrize(("kind", "origin", "name"), PAIRS)
 def test_sparse_vdis(runtime, kind, origin, name):

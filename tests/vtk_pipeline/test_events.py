@@ -403,6 +403,7 @@ def hidden(scene):
     yield "shown again"
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("way", ["auto", "volume", "vdi", "watched"])
 @pytest.mark.parametrize("name", EVENTS)
 def test_it_is_as_with_vtks_mapper(name, way, expected_messages, recwarn):

@@ -187,6 +187,7 @@ def as_we_draw(volume, prop):
 
 
 @pytest.mark.gl
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", PROPERTIES)
 def test_pictures_are_vtks(name):
     volume, prop = ball(), PROPERTIES[name]()
@@ -255,6 +256,7 @@ def labels_of(n, dtype):
     return pvdi.Volume(values)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("dtype", [np.uint16, np.float32, np.int32])
 @pytest.mark.parametrize("steps", [False, True], ids=["nodes", "steps"])
 @pytest.mark.parametrize("n", [4097, 5023])
