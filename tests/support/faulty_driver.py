@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import weakref
 
 import numpy as np
 from drawing import generate_vdi, raycast_volume, render_vdi
@@ -109,15 +110,24 @@ class Driver:
         self._names, self._fail_at = (), None
 
 
+#: Those that nobody has let go of; not by ``gc.get_objects``, which spoils the tuples that other
+#: threads are making (tuple() of a generator then raises SystemError, or worse).
+_BUFFERS = weakref.WeakSet()
+
+
+def _noted(self, *args, _init=DeviceBuffer.__init__, **kwargs):
+    _init(self, *args, **kwargs)
+    _BUFFERS.add(self)
+
+
+DeviceBuffer.__init__ = _noted
+
+
 def state_of(runtime):
     """What must be as before when something went wrong: buffers, memory, command queues."""
     gc.collect()
-    objects = gc.get_objects()
-    living = (o for o in objects if type(o) is DeviceBuffer and not o.released)
-    buffers = sorted((o.name, o.nbytes) for o in living)
-    # By type: to ask a proxy whose object is gone raises
-    queues = sum(issubclass(type(o), devices.opencl().CommandQueue) for o in objects)
-    return buffers, runtime.allocated, queues
+    living = sorted((buffer.name, buffer.nbytes) for buffer in _BUFFERS if not buffer.released)
+    return living, runtime.allocated, len(runtime._queues)
 
 
 def same(first, second):
