@@ -127,14 +127,8 @@ def generate_chunked(
 ) -> VDI:
     """Make a VDI of a volume block by block, each of which is read twice.
 
-    Parameters
-    ----------
-    request : GenerationRequest
-        As for :func:`~pyvista_vdi.generation.generate.generate_vdi`.
-    chunks : (int, int, int), optional
-        Where blocks may be cut: points along z, y and x; the array's own by default.
-    block_bytes : int, optional
-        Most bytes of a block's points, unless a chunk has more.
+    ``chunks``: where blocks may be cut, points along z, y and x; the array's own by default.
+    ``block_bytes``: most bytes of a block that has more than one chunk.
     """
     volume, device, progress = request.volume, request.device, request.progress
     task = task_of(request, chunks_of(volume, chunks), block_bytes)

@@ -74,29 +74,8 @@ def generate_on_dask(
 ) -> VDI:
     """Make a VDI of a chunked volume on the workers of a cluster.
 
-    Parameters are those of :func:`~pyvista_vdi.extensions.large.generate.generate_chunked`, and:
-
-    client : distributed.Client
-        Of the cluster. ``device`` is a selector that each worker understands.
-    workers : sequence of str, optional
-        Addresses of those that may be taken; all by default.
-
-    Raises
-    ------
-    NoDeviceError
-        If no worker has an OpenCL device.
-    InvalidVolumeError
-        If a worker does not find the volume's files, or others than this process; the message names
-        it.
-    DeviceError
-        If a block could not be made; the message names it.
-    Cancelled
-        If ``progress`` returned ``False``.
-
-    Warns
-    -----
-    VDIWarning
-        If some workers have no device: they do nothing.
+    The request's ``device`` is a selector that each worker understands; ``workers`` are the
+    addresses of those that may be taken. The others are as for :func:`generate_chunked`.
     """
     volume, device = request.volume, request.device
     able = _workers_with_device(client, device, workers)
@@ -236,13 +215,7 @@ class _Run:
             )
 
     def _check_ranges(self, seen: Mapping[Indices, Seen]) -> None:
-        """Read a chunk of the widest range and one of the narrowest here, too, before all are kept.
-
-        Raises
-        ------
-        InvalidVolumeError
-            If they hold other values here.
-        """
+        """Read the chunks of the widest and the narrowest range here, too, before all are kept."""
         array, blocks = self._volume.chunks, self._task.blocks
         if array is None or array.lazy is not None:
             return

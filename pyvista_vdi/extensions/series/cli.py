@@ -140,13 +140,7 @@ def _steps_of_vdis(files: Sequence[str]) -> list[Step]:
 
 
 def _timed(steps: Sequence[Step], given: Sequence[float] | None) -> list[Step]:
-    """Return steps with the times that are given, else with the files' where these ascend.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If others are given than there are steps.
-    """
+    """Return steps with the times that are given, else with the files' where these ascend."""
     if given is not None:
         if len(given) != len(steps):
             raise InvalidArgumentError(

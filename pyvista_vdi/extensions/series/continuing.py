@@ -66,15 +66,7 @@ class Begun:
 
 
 def begun(path: Path, append: Any, overwrite: Any) -> Begun | None:
-    """Return what there is of a file to go on with; ``None`` if it is to be written anew.
-
-    Raises
-    ------
-    VDIFileError
-        If there is a file that is neither to be appended to nor to be replaced, or it is damaged.
-    InvalidArgumentError
-        If both are asked for.
-    """
+    """Return what there is of a file to go on with; ``None`` if it is to be written anew."""
     append, overwrite = checked_way(append, overwrite)
     if overwrite or not path.exists() or path.stat().st_size == 0:
         return None

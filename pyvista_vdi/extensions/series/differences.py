@@ -41,24 +41,13 @@ Arrays = dict[str, NDArray[Any]]
 
 @dataclass
 class Stepped:
-    """A step as a reader has it, from which another may be guessed.
+    """A step as a reader has it, from which another may be guessed."""
 
-    Parameters
-    ----------
-    codes : Codes
-        Its supersegments, their entries known.
-    tables : Tables
-        Those that it was written with.
-    samples : Samples or None
-        Where its faces were taken to be; None where nothing is known of samples.
-    window_size : (int, int)
-        Lists along each edge.
-    """
-
-    codes: Codes
-    tables: Tables
+    codes: Codes  # its supersegments, their entries known
+    tables: Tables  # those that it was written with
+    #: Where its faces were taken to be; None where nothing is known of samples
     samples: Samples | None
-    window_size: tuple[int, int]
+    window_size: tuple[int, int]  # lists along each edge
 
     def packed(self) -> tuple[NDArray[np.uint64], Packed8]:
         """Return offsets and the packed form, checked."""
@@ -73,13 +62,7 @@ def decoded(
     window_size: tuple[int, int],
     before: Stepped | None,
 ) -> Stepped:
-    """Return the step that :func:`~pyvista_vdi.extensions.series.encoder.encoded` made arrays of.
-
-    Raises
-    ------
-    InvalidVDIError
-        If no step gives such arrays; what is returned is still to be checked.
-    """
+    """Return the step that the encoder made arrays of; its codes are still to be checked."""
     n_lists = window_size[0] * window_size[1]
     kinds = {array.dtype.kind for name, array in arrays.items() if name != "extinctions"}
     _require(kinds == {"u"}, "all arrays")

@@ -32,20 +32,7 @@ def write_steps(
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
-    """Read a series from a .vdis file; steps are decoded when they are asked for.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    progress : callable, optional
-        Called with 1: opening reads no step.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
-    """
+    """Read a series from a .vdis file; steps are decoded when they are asked for."""
     steps = StepsReader(path)
     Pieces(progress, 1)()
     return VDISeries(steps, steps.times)

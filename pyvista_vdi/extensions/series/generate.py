@@ -140,19 +140,7 @@ def generate_series(
 
 
 class StepMaker:
-    """Makes a VDI of each volume that it is called with, all by what the first one implied.
-
-    Parameters
-    ----------
-    function : str
-        Name of the caller's function, for messages.
-    camera, window_size, device, client
-        As for :func:`generate_series`.
-    default_precision : str
-        Of the VDIs, unless it is given or a dial chooses it.
-    **given
-        The options, as there.
-    """
+    """Makes a VDI of each volume that it is called with, all by what the first one implied."""
 
     def __init__(
         self,
@@ -190,17 +178,7 @@ class StepMaker:
         camera: Any = None,
         window_size: Sequence[int] | None = None,
     ) -> VDI:
-        """Return a step's VDI.
-
-        Parameters
-        ----------
-        volume : object
-            See :func:`generate_series`.
-        progress : callable, optional
-            As for :func:`pyvista_vdi.generate`.
-        camera, window_size : optional
-            In place of the series' own.
-        """
+        """Return a step's VDI."""
         volume = self.volume(volume)
         # The first step's range is all steps', while a property's functions have theirs in each
         if self._table is None or self._looks.in_place:

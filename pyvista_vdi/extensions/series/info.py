@@ -11,52 +11,20 @@ from pyvista_vdi.model.camera import Camera
 
 @dataclass(frozen=True)
 class SeriesInfo:
-    """What a .vdis file says about itself.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    format_version : int
-        Version of the format.
-    written_by : str
-        Program and version.
-    camera : Camera
-        The first step's generating view V_O.
-    window_size : (int, int)
-        The first step's lists along each edge of the viewport.
-    bounds : tuple of float
-        The first step's, in the model frame.
-    metadata : dict
-        What made the first step.
-    times : tuple of float
-        Of the steps.
-    step_bytes : tuple of int
-        What each step takes.
-    keys : tuple of int
-        Steps that need no other.
-    precision, codec : str
-        As written.
-    tolerance : float
-        As written.
-    closed : bool
-        Whether the writer came to its end: otherwise it is still at work, or was killed.
-    file_bytes : int
-        Size of the file.
-    """
+    """What a .vdis file says about itself."""
 
     path: Path
     format_version: int
-    written_by: str
-    camera: Camera
-    window_size: tuple[int, int]
-    bounds: tuple[float, ...]
-    metadata: dict[str, Any]
-    times: tuple[float, ...]
-    step_bytes: tuple[int, ...]
-    keys: tuple[int, ...]
+    written_by: str  # program and version
+    camera: Camera  # the first step's generating view V_O
+    window_size: tuple[int, int]  # the first step's lists along each edge of the viewport
+    bounds: tuple[float, ...]  # the first step's, in the model frame
+    metadata: dict[str, Any]  # what made the first step
+    times: tuple[float, ...]  # of the steps
+    step_bytes: tuple[int, ...]  # what each step takes
+    keys: tuple[int, ...]  # steps that need no other
     precision: str
     codec: str
     tolerance: float
-    closed: bool
+    closed: bool  # whether the writer came to its end: otherwise it is still at work, or was killed
     file_bytes: int

@@ -84,17 +84,10 @@ class FrameHeader(NamedTuple):
 
 @dataclass(frozen=True)
 class Content:
-    """What a frame holds.
+    """What a frame holds."""
 
-    Parameters
-    ----------
-    text : dict
-        What is to be said in JSON.
-    arrays : dict of str to numpy.ndarray
-        Numbers, one-dimensional; or one named ``"vdi"``, uint8: a whole .vdi file.
-    """
-
-    text: dict[str, Any]
+    text: dict[str, Any]  # what is to be said in JSON
+    #: Numbers, one-dimensional; or one named ``"vdi"``, uint8: a whole .vdi file
     arrays: Mapping[str, NDArray[Any]]
 
     def to_bytes(self, codec: str, level: int) -> bytes:
@@ -117,13 +110,7 @@ class Content:
 
 
 def read_text(data: memoryview) -> tuple[dict[str, Any], int, int]:
-    """Return what a frame's content says, where its index begins, and that one's entries.
-
-    Raises
-    ------
-    ValueError
-        If it is no such content.
-    """
+    """Return what a frame's content says, where its index begins, and that one's entries."""
     if len(data) < _TEXT.size:
         raise ValueError("its content is too short")
     n_text, n_chunks = _TEXT.unpack_from(data)
@@ -137,25 +124,13 @@ def read_text(data: memoryview) -> tuple[dict[str, Any], int, int]:
 
 
 class FrameArrays(dict[str, NDArray[Any]]):
-    """The arrays of a frame, all in one memory, which a device may use as it lies.
-
-    Attributes
-    ----------
-    memory : numpy.ndarray
-        uint8.
-    """
+    """The arrays of a frame, all in one memory, which a device may use as it lies."""
 
     memory: NDArray[np.uint8]
 
 
 def read_arrays(data: memoryview, codec: str) -> FrameArrays:
-    """Return the arrays of a frame's content, decompressed.
-
-    Raises
-    ------
-    ValueError, DamagedChunkError
-        If they are not what the content says.
-    """
+    """Return the arrays of a frame's content, decompressed."""
     text, begin, n_chunks = read_text(data)
     index = np.frombuffer(data, _INDEX, n_chunks, begin)
     body = data[begin + index.nbytes :]
@@ -207,13 +182,7 @@ def _layout(dtype: np.dtype[Any], n_rows: int) -> Layout:
 
 
 def unpacked(data: memoryview | bytes) -> bytes:
-    """Return a text that zlib has compressed, which may not be longer than descriptions are.
-
-    Raises
-    ------
-    ValueError
-        If it is longer, or no such text.
-    """
+    """Return a text that zlib has compressed, which may not be longer than descriptions are."""
     stream = zlib.decompressobj()
     try:
         text = stream.decompress(data, MAX_DESCRIPTION_BYTES)

@@ -44,19 +44,7 @@ _GROUP = 64
 
 
 class PackedStep(Stepped):
-    """A step in its 8-byte form; whole numbers by themselves are made of it when they are needed.
-
-    Parameters
-    ----------
-    offsets : numpy.ndarray
-        int32 (W * H + 1,): where each list begins.
-    packing : Packed8
-        Its supersegments.
-    entries : numpy.ndarray
-        uint8 (n,): which of the tables' colours each is nearest to.
-    tables, samples, window_size
-        See :class:`Stepped`.
-    """
+    """A step in its 8-byte form; whole numbers are made of it when they are needed."""
 
     def __init__(
         self,

@@ -92,18 +92,7 @@ class _Recent(Generic[_Value]):
 
 
 class StepsReader(Sequence[VDI]):
-    """The steps of a .vdis file: read and decoded when they are asked for, from any thread.
-
-    Parameters
-    ----------
-    path : path-like
-        The file, or a page with one.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
-    """
+    """The steps of a .vdis file: read and decoded when they are asked for, from any thread."""
 
     _MAGIC, _PART = layout.MAGIC, "step"
     _FOREIGN = (

@@ -86,13 +86,7 @@ def write_all(
 
 
 class StepsWriter:
-    """Writes frames to a stream, and remembers the steps that others may be written by.
-
-    Parameters
-    ----------
-    precision, tolerance, key_every, compression, level
-        As for :class:`SeriesWriter`.
-    """
+    """Writes frames to a stream, and remembers the steps that others may be written by."""
 
     def __init__(
         self,

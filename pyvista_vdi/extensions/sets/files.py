@@ -29,18 +29,7 @@ MAGIC = b"\x89VDIV\r\n\x1a"
 
 
 class SetReader(StepsReader):
-    """The VDIs of a .vdiset file: read and decoded when they are asked for, from any thread.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-
-    Raises
-    ------
-    VDIFileError
-        As for :class:`~pyvista_vdi.extensions.series.reader.StepsReader`.
-    """
+    """The VDIs of a .vdiset file: read and decoded when they are asked for, from any thread."""
 
     _MAGIC, _PART = MAGIC, "view"
     _FOREIGN = (
@@ -133,20 +122,7 @@ def _begin(writer: StepsWriter, stream: BinaryIO, vdi_set: VDISet) -> None:
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISet:
-    """Read a set from a .vdiset file; VDIs are decoded when they are asked for.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    progress : callable, optional
-        Called with 1: opening reads no VDI.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished view.
-    """
+    """Read a set from a .vdiset file; VDIs are decoded when they are asked for."""
     views = SetReader(path)
     Pieces(progress, 1)()
     return VDISet(

@@ -37,15 +37,7 @@ _LARGEST_FONT = 100
 
 
 def annotations_of(prop: Any, renderer: Any) -> list[dict[str, Any]] | None:
-    """Return what a 2D prop draws; ``None`` if it is none that is known.
-
-    Parameters
-    ----------
-    prop : vtkProp
-        Visible; drawn before.
-    renderer : vtkRenderer
-        Which shows it.
-    """
+    """Return what a visible 2D prop that was drawn draws; ``None`` if it is none that is known."""
     if isinstance(prop, vtkScalarBarActor):
         return list(scalar_bar(prop, renderer))
     if isinstance(prop, vtkCaptionActor2D):

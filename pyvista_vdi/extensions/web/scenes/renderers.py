@@ -40,22 +40,9 @@ def others_of(
 ) -> Iterator[dict[str, Any]]:
     """Describe what other renderers of a plotter's window draw within one's viewport.
 
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        Which has been drawn. Only PyVista's have others.
-    keep : callable
-        Takes an array that is sent.
-    texts : list of dict
-        What is written in them is added here.
-    left_out : list of str
-        What cannot be drawn is said here.
-
-    Yields
-    ------
-    dict
-        ``place`` (parts of the viewport: left, bottom, right, top), ``camera``, ``bounds``,
-        ``lights``, ``shapes``; whether it ``turns`` with the scene, and is ``behind`` it.
+    ``place`` (parts of the viewport: left, bottom, right, top), ``camera``, ``bounds``, ``lights``,
+    ``shapes``; whether it ``turns`` with the scene, and is ``behind`` it. Texts, and what cannot be
+    drawn, are added to the lists.
     """
     low, high = np.reshape(renderer.GetViewport(), (2, 2))
     for number, other in enumerate(around(renderer)):
