@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -165,3 +166,17 @@ def generate_chunked(
         "runs_merged": sum(len(piece.runs) for piece in pieces),
     }
     return vdi_of(task, request, [rows], get_runtime(device).info.name, counted)
+
+
+#: Rows of lists are shared out in multiples of this.
+ROWS = 4
+
+
+def balanced(weights: NDArray[np.int64], parts: int) -> Iterator[tuple[int, int]]:
+    """Cut rows into ranges of like weight, each of whole groups of four rows but the last."""
+    groups = -(-len(weights) // ROWS)
+    sums = np.add.reduceat(weights, np.arange(0, len(weights), ROWS)).cumsum()
+    wanted = np.arange(1, parts) * (sums[-1] / parts)
+    cuts = np.unique([0, *np.searchsorted(sums, wanted, side="right"), groups])
+    for first, last in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        yield first * ROWS, min(last * ROWS, len(weights))

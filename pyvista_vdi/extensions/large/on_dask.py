@@ -35,6 +35,7 @@ from pyvista_vdi.extensions.large import dask_tasks as work
 from pyvista_vdi.extensions.large.blocks import Indices, ends_of
 from pyvista_vdi.extensions.large.generate import (
     NOWHERE,
+    balanced,
     chunks_of,
     keep_ranges,
     known_ranges,
@@ -43,7 +44,6 @@ from pyvista_vdi.extensions.large.generate import (
 )
 from pyvista_vdi.extensions.large.passes import Rows, Seen, Task, light_entering
 from pyvista_vdi.extensions.large.reading import Plan, Read
-from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.generation.generate import Progress, report
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.ray_forms import Rectangle

@@ -30,9 +30,8 @@ from pyvista_vdi.errors import (
     with_article,
 )
 from pyvista_vdi.extensions.large.blocks import Blocks, Indices, Offset, Values
-from pyvista_vdi.extensions.large.generate import NOWHERE, vdi_of
+from pyvista_vdi.extensions.large.generate import NOWHERE, balanced, vdi_of
 from pyvista_vdi.extensions.large.passes import Piece, Task, light_entering
-from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import three_wholes
 from pyvista_vdi.model.grid import Grid

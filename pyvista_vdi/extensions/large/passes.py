@@ -210,7 +210,29 @@ class Task:
 
         ``pieces`` come in the order in which V_O sees the blocks.
         """
-        return _merged(self, get_runtime(device), y0, y1, [p.rows(y0, y1) for p in pieces])
+        runtime, width, options = get_runtime(device), self.size[0], self.options
+        window, within = Rectangle(0, width, y0, y1), [piece.rows(y0, y1) for piece in pieces]
+        slices = _slices_to_merge(self, runtime, y1 - y0)
+        with (
+            Records(runtime, self.rays(), self.camera, self.size, slices, options, window) as made,
+            growing_lists(
+                runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
+            ) as lists,
+        ):
+            for part in slices:
+                made.begin(part)
+                first = y0 + part.first_row
+                for piece in within:
+                    of_part = piece.rows(first, first + part.rows)
+                    if len(of_part.runs):
+                        _append(made, of_part)
+                        made.make_room()  # each ray by what it has itself, whatever the rows
+                made.fit()
+                if part.number > 0:
+                    lists.wait()
+                made.pack(lists)
+            offsets, *arrays = lists.finished()
+        return Rows(np.diff(offsets).astype(np.uint32), *arrays)
 
     def may_be_visible(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
         """Whether anything between two scalars is not transparent; not where they are NaN."""
@@ -417,32 +439,6 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
     else:
         found = np.zeros((0, RUN_WORDS), np.float32)
     return counts.reshape(part.rows, columns).astype(np.uint16), found
-
-
-def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece]) -> Rows:
-    width = task.size[0]
-    window, options = Rectangle(0, width, y0, y1), task.options
-    slices = _slices_to_merge(task, runtime, y1 - y0)
-    with (
-        Records(runtime, task.rays(), task.camera, task.size, slices, options, window) as records,
-        growing_lists(
-            runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
-        ) as lists,
-    ):
-        for part in slices:
-            records.begin(part)
-            first = y0 + part.first_row
-            for piece in pieces:
-                of_part = piece.rows(first, first + part.rows)
-                if len(of_part.runs):
-                    _append(records, of_part)
-                    records.make_room()  # each ray by what it has itself, whatever the rows
-            records.fit()
-            if part.number > 0:
-                lists.wait()
-            records.pack(lists)
-        offsets, *arrays = lists.finished()
-    return Rows(np.diff(offsets).astype(np.uint32), *arrays)
 
 
 def _append(records: Records, piece: Piece) -> None:

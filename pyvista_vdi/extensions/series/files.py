@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.extensions.series.info import SeriesInfo
-from pyvista_vdi.extensions.series.reader import StepsReader
+from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.steps_writer import write
 from pyvista_vdi.io.files import format_named

@@ -11,7 +11,6 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from io import BytesIO
 from typing import Any, NamedTuple
 
@@ -82,31 +81,27 @@ class FrameHeader(NamedTuple):
         return cls(*_HEADER.unpack(data[: _HEADER.size]))
 
 
-@dataclass(frozen=True)
-class Content:
-    """What a frame holds."""
+def content_bytes(
+    text: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], codec: str, level: int
+) -> bytes:
+    """Return what a frame holds: what is to be said in JSON, and numbers, compressed by themselves.
 
-    text: dict[str, Any]  # what is to be said in JSON
-    #: Numbers, one-dimensional; or one named ``"vdi"``, uint8: a whole .vdi file
-    arrays: Mapping[str, NDArray[Any]]
-
-    def to_bytes(self, codec: str, level: int) -> bytes:
-        """Return it as it is written; arrays are compressed by themselves."""
-        stream, index = BytesIO(), []
-        for array in self.arrays.values():
-            layout = _layout(array.dtype, len(array))
-            index += write_chunks(
-                stream,
-                layout,
-                codec,
-                level,
-                lambda first, last, rows=array: np.ascontiguousarray(rows[first:last]),  # type: ignore[misc]
-                lambda: None,
-            )
-        arrays = {name: [array.dtype.str, len(array)] for name, array in self.arrays.items()}
-        text = zlib.compress(to_json({**self.text, "arrays": arrays}).encode(), 9)
-        chunks = np.array(index, _INDEX).tobytes()
-        return _TEXT.pack(len(text), len(index)) + text + chunks + stream.getvalue()
+    The arrays are one-dimensional; or there is one named ``"vdi"``, uint8: a whole .vdi file.
+    """
+    stream, index = BytesIO(), []
+    for array in arrays.values():
+        index += write_chunks(
+            stream,
+            _layout(array.dtype, len(array)),
+            codec,
+            level,
+            lambda first, last, rows=array: np.ascontiguousarray(rows[first:last]),  # type: ignore[misc]
+            lambda: None,
+        )
+    kinds = {name: [array.dtype.str, len(array)] for name, array in arrays.items()}
+    packed = zlib.compress(to_json({**text, "arrays": kinds}).encode(), 9)
+    chunks = np.array(index, _INDEX).tobytes()
+    return _TEXT.pack(len(packed), len(index)) + packed + chunks + stream.getvalue()
 
 
 def read_text(data: memoryview) -> tuple[dict[str, Any], int, int]:

@@ -6,6 +6,7 @@ import io
 import os
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -73,10 +74,11 @@ def write_all(
     steps: Sequence[VDI],
     times: Sequence[float],
     progress: Progress | None,
+    **head: Any,
 ) -> int:
-    """Write a whole file to a stream; return how many bytes show its first step."""
+    """Write a whole file, with what its head says; return how many bytes show its first step."""
     done, first = Pieces(progress, len(times)), 0
-    writer.begin(stream)
+    writer.begin(stream, **head)
     for i, time in enumerate(times):
         writer.write(stream, steps[i], time)
         first = first or stream.tell()
@@ -149,7 +151,7 @@ class StepsWriter:
             key_every=self._key_every,
             codec=self._codec,
         )
-        self._entries, self._last_time = list(begun.entries), begun.last_time
+        self._entries, self._last_time = begun.entries, begun.times[-1]
 
     def checked_time(self, time: float | None) -> float:
         """Return the next step's time, or raise InvalidArgumentError."""
@@ -272,26 +274,29 @@ class StepsWriter:
             text["step"] = step.codes.step
             if old is None:
                 text["samples"] = step.samples and step.samples.coefficients
-        found = _Known(new.number, new.vdi, new.description)
-        found.kind, found.step = kind, step
-        found.by = -1 if old is None else old.number
-        found.depth = 1 if old is None else old.depth + (kind != layout.AGAIN)
         codec = "none" if kind == layout.VDI_FILE else self._codec  # that is compressed already
-        found.content = layout.Content(text, arrays).to_bytes(codec, self._level)
-        return found
+        return replace(
+            new,
+            kind=kind,
+            by=-1 if old is None else old.number,
+            depth=1 if old is None else old.depth + (kind != layout.AGAIN),
+            step=step,
+            content=layout.content_bytes(text, arrays, codec, self._level),
+        )
 
 
+@dataclass(eq=False)
 class _Known:
     """A step that was written, or will be."""
 
-    kind = layout.VDI_FILE
-    by = -1
-    depth = 1
-    content = b""
+    number: int
+    vdi: VDI
+    description: dict[str, Any]
+    kind: int = layout.VDI_FILE
+    by: int = -1
+    depth: int = 1
     step: Stepped | None = None
-
-    def __init__(self, number: int, vdi: VDI, description: dict[str, Any]) -> None:
-        self.number, self.vdi, self.description = number, vdi, description
+    content: bytes = b""
 
     def goes_with(self, other: _Known) -> bool:
         """Whether both have the same lists and depths."""

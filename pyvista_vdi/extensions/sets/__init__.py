@@ -26,7 +26,7 @@ EXTENSION = Extension(
             "set",
             "write VDIs of a volume from as many sides as pictures from everywhere need",
             "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
-            "pyvista_vdi.extensions.sets.options:add_options",
+            "pyvista_vdi.extensions.sets.cli:add_options",
             "pyvista_vdi.extensions.sets.cli:generate",
         ),
     ),

@@ -115,10 +115,8 @@ def page(
 
     ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6.
     """
-    sent = vdi.with_precision(precision or "8-byte")
-    percents = " ".join(f"{100 * channel:g}%" for channel in background)
-    still = over_background(_from_generating_view(vdi), background)
-    view = View(sent, f"rgb({percents})", np.rint(still * 255).astype(np.uint8), vdi.picture_size)
+    view = _view_of(vdi, background)
+    view.vdi = vdi.with_precision(precision or "8-byte")
     return assembled([view], title=title, level=level, progress=progress)
 
 
@@ -219,19 +217,11 @@ def write_series(
     With ``autoplay`` it plays as soon as it is opened.
     """
     target = Path(os.path.realpath(check_writable(Path(path))))
-    percents = " ".join(f"{100 * channel:g}%" for channel in background)
-    first = series[0]
-    still = over_background(_from_generating_view(first), background)
+    view = _view_of(series[0], background)
+    view.attributes = {"autoplay": ""} if autoplay else {}
     writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
     cut = write_all(stream, writer, series, series.times, progress)
-    view = View(
-        None,
-        f"rgb({percents})",
-        np.rint(still * 255).astype(np.uint8),
-        first.picture_size,
-        attributes={"autoplay": ""} if autoplay else {},
-        series=in_parts(stream.getvalue(), cut),
-    )
+    view.series = in_parts(stream.getvalue(), cut)
     content = assembled([view], title=target.stem if title is None else title)
     with whole_file(target) as out:
         out.write(content)
@@ -315,6 +305,13 @@ def _jpeg(pixels: NDArray[np.uint8], size: Sequence[int]) -> bytes:
     stream = io.BytesIO()
     Image.fromarray(pixels).resize(small).save(stream, format="jpeg", quality=_STILL_QUALITY)
     return stream.getvalue()
+
+
+def _view_of(vdi: VDI, background: Sequence[float]) -> View:
+    """Return what shows a VDI from its generating view, which is still to be added."""
+    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    still = np.rint(over_background(_from_generating_view(vdi), background) * 255)
+    return View(None, f"rgb({percents})", still.astype(np.uint8), vdi.picture_size)
 
 
 def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:

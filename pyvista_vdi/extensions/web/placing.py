@@ -1,12 +1,15 @@
-"""A plotter's VDI as a viewer can show it, which knows of VDIs, planes and a camera alone."""
+"""VDIs as viewers are sent them, and a plotter's as one that knows of no actors can show it."""
 
 from __future__ import annotations
 
+import copy
+import io
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.vdi import VDI
 
 #: Largest departure of a rotation from one, by rounding of its matrix.
@@ -78,3 +81,20 @@ def _motion(actor: Any) -> Any:
 def _matrix(actor: Any) -> NDArray[np.float64]:
     matrix = actor.GetMatrix()
     return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+
+
+#: Of deflate: files are a hundredth longer than by 6, its default, in half the time.
+_EFFORT = 4
+
+
+def encoded(vdi: VDI, *, coarse: bool = False) -> bytes:
+    """Return the file of a VDI in the 8-byte form, deflated.
+
+    It has no metadata: a table of 4096 colours would be longer than a small VDI, and a page need
+    not know what made it. Nor has it a coarse level, unless that is asked for.
+    """
+    bare = copy.copy(vdi.with_precision("8-byte"))
+    bare.metadata = {}
+    stream = io.BytesIO()
+    write_to(stream, bare, "deflate", _EFFORT, coarse=coarse)
+    return stream.getvalue()

@@ -15,8 +15,8 @@ from concurrent.futures import Executor
 from typing import Any
 
 from pyvista_vdi.errors import Cancelled, VDIError
-from pyvista_vdi.extensions.web.encode import encoded
 from pyvista_vdi.extensions.web.messages import Wish
+from pyvista_vdi.extensions.web.placing import encoded
 from pyvista_vdi.extensions.web.source import Made, Source
 from pyvista_vdi.quality.regeneration_policy import AT_HOME, estimate_is_old, is_poor
 

@@ -195,11 +195,12 @@ def test_a_finger_turns_all_ways_where_nothing_scrolls(around):
     assert swipe(page, (0, -250))[1] != still
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("body", "attributes", "key", "zooms"),
     [
-        ("{viewer}", "", None, True),
         (SCROLLED, "", None, False),
+        ("{viewer}", "", None, True),
         (SCROLLED, "", "Control", True),
         (SCROLLED, 'gestures="all"', None, True),
         ("{viewer}", 'gestures="shared"', None, False),

@@ -14,9 +14,16 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.extensions.web.camera import viewer_camera
 from pyvista_vdi.extensions.web.scenes.annotations import annotations_of
-from pyvista_vdi.extensions.web.scenes.lighting import bounds_of, lights_of
 from pyvista_vdi.extensions.web.scenes.meshes import Keep, shapes_of
-from pyvista_vdi.extensions.web.scenes.props import array_of, collected, image_quad, parts_of, unlit
+from pyvista_vdi.extensions.web.scenes.props import (
+    array_of,
+    bounds_of,
+    collected,
+    image_quad,
+    lights_of,
+    parts_of,
+    unlit,
+)
 from pyvista_vdi.extensions.web.scenes.texts import described_text
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,

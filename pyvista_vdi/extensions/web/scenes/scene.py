@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
-from pyvista_vdi.extensions.web.encode import encoded
-from pyvista_vdi.extensions.web.placing import look_of, planes_of, thinned
+from pyvista_vdi.extensions.web.placing import encoded, look_of, planes_of, thinned
 from pyvista_vdi.extensions.web.scenes.annotations import annotations_of
-from pyvista_vdi.extensions.web.scenes.lighting import MOST_LIGHTS, bounds_of, lights_of
 from pyvista_vdi.extensions.web.scenes.meshes import shapes_of
 from pyvista_vdi.extensions.web.scenes.names import Names, is_silhouette, passes_of, widgets_of
-from pyvista_vdi.extensions.web.scenes.props import image_quad, parts_of
+from pyvista_vdi.extensions.web.scenes.props import (
+    MOST_LIGHTS,
+    bounds_of,
+    image_quad,
+    lights_of,
+    parts_of,
+)
 from pyvista_vdi.extensions.web.scenes.renderers import around, flat_of, others_of
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
