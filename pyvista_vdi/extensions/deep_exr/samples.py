@@ -40,10 +40,7 @@ class Samples(NamedTuple):
 
 
 def media(
-    lists: NDArray[np.int64],
-    channels: dict[str, NDArray[Any]],
-    thickness: float | None,
-    name: str,
+    lists: NDArray[np.int64], channels: dict[str, NDArray[Any]], thickness: float | None, name: str
 ) -> Samples:
     """Return the media that a foreign file's channels stand for, sorted and disjoint.
 

@@ -168,10 +168,7 @@ class InSitu:
         """Begin the file, or find where single files go on; on the first rank."""
         if self._series:
             self._writer = SeriesWriter(
-                self._path,
-                precision=self._options.precision,
-                append=append,
-                overwrite=overwrite,
+                self._path, precision=self._options.precision, append=append, overwrite=overwrite
             )
             return
         numbers = [] if overwrite else _numbers(self._path)

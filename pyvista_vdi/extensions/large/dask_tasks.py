@@ -8,10 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from distributed import (
-    Worker,
-    get_worker,
-)
+from distributed import Worker, get_worker
 from distributed.protocol.pickle import dumps, loads
 from numpy.typing import NDArray
 

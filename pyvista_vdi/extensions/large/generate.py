@@ -82,12 +82,7 @@ def vdi_of(
         optical_depth,
         task.blocks.grid.bounds,
         depth_origin=depth_origin,
-        metadata={
-            **made_by,
-            "blocks": list(task.blocks.counts),
-            **counted,
-            **request.metadata,
-        },
+        metadata={**made_by, "blocks": list(task.blocks.counts), **counted, **request.metadata},
     ).with_precision(task.options.precision)
 
 

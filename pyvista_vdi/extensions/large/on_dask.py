@@ -14,14 +14,7 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from distributed import (
-    CancelledError,
-    Client,
-    Future,
-    KilledWorker,
-    as_completed,
-    wait,
-)
+from distributed import CancelledError, Client, Future, KilledWorker, as_completed, wait
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import (
@@ -132,12 +125,7 @@ class _Run:
         values = self._values(reads)
         in_window = [windows.get(block, NOWHERE) for block in order]
         first = self._mapped(
-            "first-pass",
-            order,
-            self._bound(work.first_pass),
-            order,
-            values.values(),
-            in_window,
+            "first-pass", order, self._bound(work.first_pass), order, values.values(), in_window
         )
         seen = self._gathered("seen", first, work.without_slabs, _SHARES[0])
         if known is None and len(seen) == len(blocks):

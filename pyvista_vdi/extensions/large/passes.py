@@ -266,11 +266,7 @@ class Task:
         low, high = zip(*ends, strict=True)
         return bool(self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)))
 
-    def to_read(
-        self,
-        windows: Mapping[Indices, Rectangle],
-        ranges: Ranges | None,
-    ) -> list[Indices]:
+    def to_read(self, windows: Mapping[Indices, Rectangle], ranges: Ranges | None) -> list[Indices]:
         """Return the blocks that the first pass must read, in the order in which V_O sees them.
 
         ``ranges``: least and largest scalar of each chunk, where they are known. A block in the

@@ -22,7 +22,7 @@ EXTENSION = Extension(
     shown={
         "pyvista_vdi.extensions.series.series:VDISeries": (
             "pyvista_vdi.extensions.series.shown:SeriesInput"
-        ),
+        )
     },
     verbs=(
         Verb(

@@ -121,11 +121,7 @@ def _connected(address: str | None) -> Any:
 
 
 def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
-    return {
-        **of_the_file(options),
-        "tolerance": options.tolerance,
-        "key_every": options.key_every,
-    }
+    return {**of_the_file(options), "tolerance": options.tolerance, "key_every": options.key_every}
 
 
 def _steps_of_vdis(files: Sequence[str]) -> list[Step]:

@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.packing import (
-    DEPTH_CODES,
-    TAU_BASE,
-    TAU_CODES,
-    Packed8,
-    packed_8,
-)
+from pyvista_vdi.model.packing import DEPTH_CODES, TAU_BASE, TAU_CODES, Packed8, packed_8
 from pyvista_vdi.model.vdi import VDI
 
 Integers = NDArray[np.int64]

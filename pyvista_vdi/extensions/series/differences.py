@@ -334,11 +334,7 @@ def guessed_media(
 
 
 def _running(
-    gap: Integers,
-    length: Integers,
-    kept: NDArray[np.bool_],
-    old_back: Integers,
-    view: View,
+    gap: Integers, length: Integers, kept: NDArray[np.bool_], old_back: Integers, view: View
 ) -> Integers:
     """Return backs in samples: gaps and lengths added up from the last one that is known."""
     n = len(gap)

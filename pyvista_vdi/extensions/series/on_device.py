@@ -18,13 +18,7 @@ from pyvista_vdi.device import (
 )
 from pyvista_vdi.errors import DeviceError, InvalidVDIError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.extensions.series.codes import Codes, Integers, Samples, Tables
-from pyvista_vdi.extensions.series.differences import (
-    KEPT,
-    Arrays,
-    Lists,
-    Stepped,
-    unfolded,
-)
+from pyvista_vdi.extensions.series.differences import KEPT, Arrays, Lists, Stepped, unfolded
 from pyvista_vdi.extensions.series.kernels import DECODE_LISTS
 from pyvista_vdi.model.packing import GRID, TAU_BASE, TAU_CODES, Packed8, check_grid
 
@@ -182,10 +176,7 @@ def decoded_on(
         if runtime.download(trouble)[0]:
             return None
         packing = Packed8(
-            step,
-            runtime.download(origins),
-            runtime.download(strides),
-            runtime.download(words)[:n],
+            step, runtime.download(origins), runtime.download(strides), runtime.download(words)[:n]
         )
         return PackedStep(
             starts, packing, runtime.download(entries)[:n], tables, samples, window_size

@@ -91,12 +91,7 @@ class StepsWriter:
     """Writes frames to a stream, and remembers the steps that others may be written by."""
 
     def __init__(
-        self,
-        precision: str,
-        tolerance: float,
-        key_every: int,
-        compression: str,
-        level: int | None,
+        self, precision: str, tolerance: float, key_every: int, compression: str, level: int | None
     ) -> None:
         self._precision = check_precision(precision)
         if isinstance(tolerance, bool) or not isinstance(tolerance, int | float):
@@ -168,13 +163,7 @@ class StepsWriter:
         new = self._written(vdi.with_precision(self._precision))
         number = len(self._entries)
         header = layout.FrameHeader(
-            layout.STEP,
-            number,
-            new.kind,
-            new.by,
-            time,
-            len(new.content),
-            zlib.crc32(new.content),
+            layout.STEP, number, new.kind, new.by, time, len(new.content), zlib.crc32(new.content)
         ).to_bytes()
         begin = stream.tell()
         stream.write(header + new.content)

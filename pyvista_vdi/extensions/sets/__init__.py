@@ -19,7 +19,7 @@ EXTENSION = Extension(
         ),
     ),
     shown={
-        "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput",
+        "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput"
     },
     verbs=(
         Verb(

@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidArgumentTypeError,
-)
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.extensions.sets.placing import Placing, Progress
 from pyvista_vdi.extensions.sets.sphere import orbit, spiral, spread
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
@@ -21,11 +18,7 @@ from pyvista_vdi.model.checks import as_float, check_callback
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.metrics import SSIM_WINDOW
-from pyvista_vdi.model.options import (
-    GENERATION_NAMES,
-    GenerationOptions,
-    check_max_supersegments,
-)
+from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions, check_max_supersegments
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import CameraLike, DeviceLike, VolumeLike, WindowSize
 

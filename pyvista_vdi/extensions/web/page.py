@@ -121,11 +121,7 @@ def page(
 
 
 def assembled(
-    views: Sequence[View],
-    *,
-    title: str,
-    level: int | None = None,
-    progress: Progress | None = None,
+    views: Sequence[View], *, title: str, level: int | None = None, progress: Progress | None = None
 ) -> bytes:
     """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
     title = html.escape(title)
