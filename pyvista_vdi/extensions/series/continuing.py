@@ -36,8 +36,8 @@ class Begun(StepsReader):
         if not steps.times:
             return None  # there is nothing to lose
         if not append:
-            with_what = f" with {len(steps)} steps, the last at time {steps.times[-1]:g}"
-            raise refused(path, with_what)
+            last = steps.times[-1]
+            raise refused(path, f" with {len(steps)} steps, the last at time {last:g}")
         if steps._frames[-1][1].number != len(steps) - 1:
             raise VDIFileError(
                 f"{path} has lost steps and cannot be gone on with: write what it has to another "

@@ -58,7 +58,7 @@ class Stepped:
 class Lists:
     """How the lists of a frame are written, and their lengths: what both decoders begin with."""
 
-    way: NDArray[np.uint8]
+    way: NDArray[Any]
     coded: NDArray[np.bool_]  # lists that are not as they were
     placed: NDArray[np.bool_]  # lists that are written by what they were
     counts: Integers

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.extensions.web.placing import array_of
 from pyvista_vdi.vtk_pipeline.vtk import (
     numpy_to_vtk,
     vtk_to_numpy,
@@ -54,13 +55,6 @@ def collected(get: Callable[[Any], None]) -> list[Any]:
     collection = vtkPropCollection()
     get(collection)
     return list(dict.fromkeys(collection))
-
-
-def array_of(matrix: Any) -> Matrix:
-    """Return a ``vtkMatrix4x4``, or the identity for ``None``."""
-    if matrix is None:
-        return np.eye(4)
-    return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
 
 
 def _paths(prop: Any) -> Iterator[tuple[Any, Matrix]]:

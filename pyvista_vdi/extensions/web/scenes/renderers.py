@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.extensions.web.camera import viewer_camera
+from pyvista_vdi.extensions.web.placing import array_of
 from pyvista_vdi.extensions.web.scenes.annotations import annotations_of
 from pyvista_vdi.extensions.web.scenes.meshes import Keep, shapes_of
 from pyvista_vdi.extensions.web.scenes.props import (
-    array_of,
     bounds_of,
     collected,
     image_quad,
