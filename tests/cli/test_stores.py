@@ -82,7 +82,7 @@ def test_generate_on_a_cluster(image, tmp_path, default_runtime):
     np.testing.assert_array_equal(one.color, other.color)
 
 
-@pytest.mark.extension("series")
+@pytest.mark.extension("series", "large")
 def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
     target = tmp_path / "x.vdis"
     command = ["series", str(image), str(image), "-o", str(target), "--size", "16x9", *LOOK]
