@@ -229,7 +229,7 @@ def wrong_values(verb, every, capsys):
     right = shlex.split(RIGHT[verb])
     taking, others = options_of(verb, capsys)
     for option in taking:
-        wrong = OF_A_VERB.get((verb, option), WRONG[option])
+        wrong = OF_A_VERB[verb, option] if (verb, option) in OF_A_VERB else WRONG[option]
         first = zlib.crc32((verb + option).encode()) % every
         for value in wrong[first::every] or wrong[:1]:
             values = shlex.split(value)
