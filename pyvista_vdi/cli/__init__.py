@@ -24,18 +24,10 @@ _MISUSED = 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Run the command line; return its exit status.
 
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Without the program's name; those of the process by default.
-
-    Returns
-    -------
-    int
-        Exit status: 0 if all went well, 2 for a mistake in the arguments, 130 after Ctrl-C, and
-        1 for anything else that went wrong.
+    That is 0 if all went well, 2 for a mistake in the arguments, 130 after Ctrl-C, and 1 for
+    anything else that went wrong.
     """
     debug = os.environ.get(DEBUG_VARIABLE) == "1"
     try:

@@ -49,13 +49,7 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Read a VDI and write it in the format of another name."""
     from pyvista_vdi.api import read
-    from pyvista_vdi.cli.inputs import (
-        file_options,
-        given_camera,
-        measuring,
-        part,
-        say_vdi,
-    )
+    from pyvista_vdi.cli.inputs import file_options, given_camera, measuring, part, say_vdi
     from pyvista_vdi.io import checked_target
 
     if (own := _own_verbs(options.file)) is not None:

@@ -226,8 +226,7 @@ def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
     except KeyboardInterrupt:
         if results is not None and results.exists():
             print(
-                f"\nWhat was measured is in {printable(results)}: --resume goes on",
-                file=sys.stderr,
+                f"\nWhat was measured is in {printable(results)}: --resume goes on", file=sys.stderr
             )
         raise
     finally:

@@ -97,11 +97,6 @@ def camera_path(
     The point looked at, the logarithm of the distance and the angle of view follow cubic splines;
     the orientation a spline of rotations whose angular acceleration is continuous. Views are passed
     at equal intervals of time.
-
-    Raises
-    ------
-    MissingDependencyError
-        If SciPy is not installed.
     """
     try:
         from scipy.interpolate import CubicSpline

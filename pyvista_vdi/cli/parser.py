@@ -49,22 +49,9 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(arguments: list[str]) -> argparse.Namespace | None:
-    """Parse the command line.
+    """Parse the command line; ``None`` if help or the version was asked for.
 
-    Parameters
-    ----------
-    arguments : list of str
-        Without the program's name.
-
-    Returns
-    -------
-    argparse.Namespace or None
-        Options, and ``run``, the verb's function; ``None`` if help or the version was asked for.
-
-    Raises
-    ------
-    UsageError
-        If they make no sense; the message suggests what may have been meant.
+    Raises UsageError, which suggests what may have been meant.
     """
     parser, verbs = _make_parser(arguments[0] if arguments else "")
     if not arguments:

@@ -59,6 +59,15 @@ def with_pyvista(plotter: pvdi.Plotter, grid: pv.ImageData) -> pvdi.VDI:
     return vdi
 
 
+def of_several(folder: Path, volumes: list[pvdi.Volume], camera: pvdi.Camera) -> None:
+    """Make VDIs of several times, and of several views."""
+    series = pvdi.generate_series(volumes, camera, (64, 48), cmap="bone", quality="high")
+    with pvdi.SeriesWriter(folder / "a.vdis", camera, (64, 48), tolerance=0.01, clim=(0, 9)) as out:
+        out.append(volumes[0], 0.5)
+    views = pvdi.generate_set(volumes[0], [camera], max_views=9, ambient_occlusion=True)
+    assert len(series) == len(views)
+
+
 def mistakes(grid: pv.ImageData, camera: pvdi.Camera, plotter: pvdi.Plotter) -> None:
     """Make mistakes that a checker of types finds: each is silenced, and would be useless else."""
     pvdi.generate(grid, camera, (64, 48), max_supersegments="many")  # type: ignore[arg-type]
@@ -66,3 +75,6 @@ def mistakes(grid: pv.ImageData, camera: pvdi.Camera, plotter: pvdi.Plotter) -> 
     pvdi.generate(grid, 5, (64, 48))  # type: ignore[arg-type]
     pvdi.render("a.vdi", camera)  # type: ignore[arg-type]
     plotter.add_vdi(grid, precision="half")  # type: ignore[arg-type]
+    pvdi.generate_series([grid], camera, (64, 48), colour_map="bone")  # type: ignore[call-arg]
+    pvdi.generate_series([grid], camera, (64, 48), clim="all", shade=3)  # type: ignore[arg-type]
+    pvdi.generate_set(grid, precision="exact")  # type: ignore[call-arg]

@@ -149,10 +149,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ("render a.vdi -o a.png --camera-json v.nrrd", "is no camera in JSON"),
         ("render a.vdi -o a.png --camera-json tf.json", "unknown entries"),
         ("render a.vdi -o a.png --view-angle 180", "between 0 and 180 degrees"),
-        (
-            "generate v.nrrd -o b.png",
-            "the name must end in .vdi or .vti.*, for instance 'b.vdi'",
-        ),
+        ("generate v.nrrd -o b.png", "the name must end in .vdi or .vti.*, for instance 'b.vdi'"),
         ("generate v.nrrd -o no/b.vdi", "the folder .*no does not exist; create it"),
         ("generate --example nothing -o b.vdi", "no example volume is called 'noth"),
         (

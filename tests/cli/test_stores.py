@@ -55,6 +55,7 @@ def test_info_tells_levels_and_reads_no_voxel(image, capsys):
     assert about["store"]["channels"] == ["dapi", "gfp"]
 
 
+@pytest.mark.extension("large")
 def test_generate_says_the_level_and_why(image, tmp_path, capsys, default_runtime):
     target = tmp_path / "x.vdi"
     files = (str(image), "-o", str(target), "--size", "8x4", "--channel", "gfp", *LOOK)
@@ -65,6 +66,7 @@ def test_generate_says_the_level_and_why(image, tmp_path, capsys, default_runtim
     assert "level 0 of 2 (32 x 24 x 16 points): asked for" in capsys.readouterr().err
 
 
+@pytest.mark.extension("large")
 def test_generate_on_a_cluster(image, tmp_path, default_runtime):
     distributed = pytest.importorskip("distributed")
     files = (str(image), "--size", "16x9", *LOOK)
@@ -80,7 +82,7 @@ def test_generate_on_a_cluster(image, tmp_path, default_runtime):
     np.testing.assert_array_equal(one.color, other.color)
 
 
-@pytest.mark.extension("series")
+@pytest.mark.extension("series", "large")
 def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
     target = tmp_path / "x.vdis"
     command = ["series", str(image), str(image), "-o", str(target), "--size", "16x9", *LOOK]

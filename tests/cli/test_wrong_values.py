@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import shlex
+import zlib
 
 import numpy as np
 import pytest
@@ -220,13 +221,17 @@ def options_of(verb, capsys):
     return found[True], found[False]
 
 
-def wrong_values(verb, capsys):
-    """Yield an option, or none for a file, one of its wrong values, and the whole command line."""
+def wrong_values(verb, every, capsys):
+    """Yield an option, or none for a file, one of its wrong values, and the whole command line.
+
+    Of each option's values every so manieth, beginning with another one in each verb.
+    """
     right = shlex.split(RIGHT[verb])
     taking, others = options_of(verb, capsys)
     for option in taking:
-        wrong = OF_A_VERB.get((verb, option))
-        for value in WRONG[option] if wrong is None else wrong:
+        wrong = OF_A_VERB[verb, option] if (verb, option) in OF_A_VERB else WRONG[option]
+        first = zlib.crc32((verb + option).encode()) % every
+        for value in wrong[first::every] or wrong[:1]:
             values = shlex.split(value)
             given = [option, *values] if len(values) > 1 else [f"{option}={values[0]}"]
             kept = right[1:] if option == "--example" and right[0] == "v.npy" else right
@@ -249,9 +254,10 @@ def is_named(option, value, message):
     return (named or called) and all(part.lower() in message.lower() for part in parts)
 
 
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("verb", cases(*RIGHT, by=lambda verb: f"{verb} {RIGHT[verb]}"))
 def test_wrong_values_are_named_and_nothing_is_written(
-    verb, folder, capsys, monkeypatch, default_runtime
+    verb, every, folder, capsys, monkeypatch, default_runtime
 ):
     monkeypatch.delenv(cli.DEBUG_VARIABLE, raising=False)
     if verb == "serve":
@@ -259,7 +265,7 @@ def test_wrong_values_are_named_and_nothing_is_written(
         monkeypatch.setattr(server.Server, "wait", lambda server: server.close())  # accepted
     monkeypatch.chdir(folder)
     before, found = contents(folder), []
-    for option, value, arguments in wrong_values(verb, capsys):
+    for option, value, arguments in wrong_values(verb, every, capsys):
         try:
             status = cli.main(arguments)
         except Exception as error:

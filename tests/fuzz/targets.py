@@ -246,7 +246,7 @@ def vdis_frames(data: bytes) -> None:
                 arrays[name] = np.frombuffer(patched[:whole], kind)
         codec = "none" if header.kind == layout.VDI_FILE else compression
         with contextlib.suppress(VDIError):  # what JSON does not hold
-            frame = layout.Content(text, arrays).to_bytes(codec, 1)
+            frame = layout.content_bytes(text, arrays, codec, 1)
             kind, by = header.kind, header.by
             if choices.chance(6):
                 by, kind = choices.integer(-1, 4), choices.integer(0, 3)

@@ -269,6 +269,7 @@ def test_two_renderers(gate):
 
 
 @row("a series plays")
+@pytest.mark.extension("series")
 def test_plays(plotter):
     actor = plotter.add_vdi(pvdi.VDISeries.of([small_vdi() for _ in range(3)]))
     actor.mapper.SetInteractiveOffScreen(True)
@@ -284,6 +285,7 @@ def test_plays(plotter):
 
 
 @row("a set of VDIs is turned")
+@pytest.mark.extension("sets")
 def test_set(plotter):
     cameras = [pvdi.Camera((5, y, 0), (0, 0, 0), (0, 0, 1)) for y in (-4, 4)]
     vdis = [pvdi.generate(soft_ball(12), each, (60, 50), **CLASSIFICATION) for each in cameras]

@@ -13,5 +13,5 @@ EXTENSION = Extension(
             write_options=("exact", "linear"),
             compressions=("zips", "none"),
         ),
-    ),
+    )
 )

@@ -69,32 +69,21 @@ class OtherFormError(Exception):
 
 @dataclass(frozen=True)
 class DeepImage:
-    """The samples of a deep image, list by list in our order.
+    """The samples of a deep image, list by list in our order."""
 
-    Parameters
-    ----------
-    attributes : dict
-        Of the header, by name: text, numbers and matrices (float64 (4, 4), as the file has them,
-        for row vectors); others are left out.
-    data_window, display_window : tuple of int
-        (x_min, y_min, x_max, y_max), y downwards, both ends included.
-    compression : str
-        What the header names.
-    channel_types : dict
-        dtype of every channel in the file, also of those that were not read.
-    counts : numpy.ndarray
-        int64 (H, W), samples per pixel of the data window, bottom row first.
-    channels : dict
-        Arrays (n,) by name, in the order of the lists.
-    """
-
+    #: Of the header, by name: text, numbers and matrices (float64 (4, 4), as the file has them, for
+    #: row vectors); others are left out
     attributes: dict[str, Any]
+    #: (x_min, y_min, x_max, y_max), y downwards, both ends included
     data_window: tuple[int, int, int, int]
+    #: (x_min, y_min, x_max, y_max), y downwards, both ends included
     display_window: tuple[int, int, int, int]
-    compression: str
+    compression: str  # what the header names
+    #: dtype of every channel in the file, also of those that were not read
     channel_types: dict[str, np.dtype[Any]]
+    #: int64 (H, W), samples per pixel of the data window, bottom row first
     counts: NDArray[np.int64]
-    channels: dict[str, NDArray[Any]]
+    channels: dict[str, NDArray[Any]]  # arrays (n,) by name, in the order of the lists
 
 
 def write_image(
@@ -108,26 +97,11 @@ def write_image(
     level: int,
     progress: Progress | None = None,
 ) -> None:
-    """Write a deep scan line image.
+    """Write a deep scan line image to a seekable stream.
 
-    Parameters
-    ----------
-    stream : file-like
-        Seekable, at its beginning.
-    counts : numpy.ndarray
-        (H, W), samples per pixel, bottom row first.
-    channel_types : mapping
-        dtype of every channel by name: uint32, float16 or float32.
-    samples : callable
-        ``samples(first, last)`` gives those samples of all channels; called from several threads.
-    attributes : mapping
-        Further attributes of the header: type and value by name.
-    compression : str
-        One of :data:`COMPRESSIONS`, not ``"rle"``.
-    level : int
-        zlib's effort, 1 to 9.
-    progress : callable, optional
-        Called with the finished fraction.
+    ``counts``: samples per pixel, bottom row first. ``samples(first, last)`` gives those
+    samples of all channels, and is called from several threads. ``attributes``: type and value
+    of further ones.
     """
     height, width = counts.shape
     ends = np.cumsum(counts.sum(axis=1, dtype=np.int64))
@@ -213,26 +187,7 @@ def read_image(
 ) -> DeepImage:
     """Read a deep scan line image, trusting nothing that it says before it is checked.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    wanted : callable
-        Which channels are read, by name.
-    progress : callable, optional
-        Called with the finished fraction.
-
-    Returns
-    -------
-    DeepImage
-        Its samples.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, not a deep OpenEXR image, truncated or damaged.
-    OtherFormError
-        If it is a deep image in another form; the message says which.
+    Raises OtherFormError if it is a deep image in another form.
     """
     return _Image(path).read(wanted, progress)
 

@@ -23,27 +23,6 @@ def read_by_package(path: Path, wanted: set[str], form: str) -> DeepImage:
 
     The package holds every pixel's samples as an array of its own, which takes about a hundred
     bytes per pixel and channel: this is for files that nothing else reads.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    wanted : set of str
-        Channels to keep.
-    form : str
-        Why the package is needed, for the error where it is missing.
-
-    Returns
-    -------
-    DeepImage
-        Its samples.
-
-    Raises
-    ------
-    MissingDependencyError
-        If the package is not installed.
-    VDIFileError
-        If the package cannot read the file, or no part is deep.
     """
     try:
         import OpenEXR

@@ -92,15 +92,7 @@ def record_text(
 
 
 def parsed_record(text: str, path: Any) -> Record:
-    """Return what a file's attribute says.
-
-    Raises
-    ------
-    VDIFileError
-        If it is of a newer version.
-    ValueError
-        If it is incomplete or wrong.
-    """
+    """Return what a file's attribute says."""
     try:
         entries = from_json(text)
         if entries["format"] != FORMAT_NAME or isinstance(entries["version"], bool):

@@ -26,24 +26,12 @@ _COLOR_ROUNDING = 2.0**-8
 
 
 class Samples(NamedTuple):
-    """Media of all lists.
+    """Media of all lists."""
 
-    Attributes
-    ----------
-    lists : numpy.ndarray
-        int64 (n,), which list each belongs to; never falls.
-    front, back : numpy.ndarray
-        float32 (n,), absolute view depth.
-    color : numpy.ndarray
-        float64 (n, 3), straight.
-    optical_depth : numpy.ndarray
-        float64 (n,).
-    """
-
-    lists: NDArray[np.int64]
-    front: NDArray[np.float32]
-    back: NDArray[np.float32]
-    color: NDArray[np.float64]
+    lists: NDArray[np.int64]  # int64 (n,), which list each belongs to; never falls
+    front: NDArray[np.float32]  # float32 (n,), absolute view depth
+    back: NDArray[np.float32]  # float32 (n,), absolute view depth
+    color: NDArray[np.float64]  # float64 (n, 3), straight
     optical_depth: NDArray[np.float64]
 
     def take(self, which: NDArray[Any]) -> Samples:
@@ -52,34 +40,12 @@ class Samples(NamedTuple):
 
 
 def media(
-    lists: NDArray[np.int64],
-    channels: dict[str, NDArray[Any]],
-    thickness: float | None,
-    name: str,
+    lists: NDArray[np.int64], channels: dict[str, NDArray[Any]], thickness: float | None, name: str
 ) -> Samples:
     """Return the media that a foreign file's channels stand for, sorted and disjoint.
 
-    Parameters
-    ----------
-    lists : numpy.ndarray
-        int64 (n,), which list each sample belongs to; never falls.
-    channels : dict
-        Z, A, R, G, B, and ZBack and tau where the file has them.
-    thickness : float, optional
-        World units, given to samples without one.
-    name : str
-        Of the file, for errors.
-
-    Returns
-    -------
-    Samples
-        Without samples of opacity 0, which show nothing.
-
-    Raises
-    ------
-    VDIFileError
-        If a value is none, an opacity lies outside 0..1, a depth is negative, or a sample has no
-        thickness and none is given.
+    ``lists``: which list each sample belongs to, never falling. ``thickness``: world units,
+    given to samples without one. Samples of opacity 0, which show nothing, are left out.
     """
     alpha = channels["A"].astype(np.float64)
     front = channels["Z"].astype(np.float32)

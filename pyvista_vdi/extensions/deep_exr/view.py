@@ -30,15 +30,7 @@ def view_matrices(
 ) -> tuple[Matrix, Matrix]:
     """Return worldToCamera and worldToNDC for column vectors, float64 (4, 4) each.
 
-    Parameters
-    ----------
-    camera : Camera
-        The view; world coordinates are those behind its model transform.
-    window_size : (int, int)
-        Width and height in pixels.
-    depth_shift : float
-        World units by which the eye is moved back, for parallel projections whose depths would
-        be negative.
+    ``depth_shift``: world units by which the eye is moved back, for parallel projections.
     """
     to_camera = camera.view_matrix
     to_camera[2, 3] += depth_shift
@@ -50,27 +42,10 @@ def view_matrices(
 def camera_from_matrices(
     to_camera: Any, to_ndc: Any, window_size: tuple[int, int], depth: float
 ) -> Camera:
-    """Return the view that a foreign file describes.
+    """Return the view that a foreign file's matrices for column vectors describe.
 
-    Parameters
-    ----------
-    to_camera, to_ndc : numpy.ndarray or None
-        worldToCamera and worldToNDC for column vectors. The second says all of a perspective
-        view; a parallel one needs both.
-    window_size : (int, int)
-        Of the display window.
-    depth : float
-        View depth of the focal point, about which the view is turned.
-
-    Returns
-    -------
-    Camera
-        With the identity as model transform.
-
-    Raises
-    ------
-    InvalidCameraError
-        If a matrix is missing or describes no view with square pixels.
+    ``to_ndc`` says all of a perspective view; a parallel one needs both. ``depth`` is that of
+    the focal point, about which the view is turned.
     """
     if to_ndc is None:
         raise InvalidCameraError("the attribute worldToNDC is missing")
@@ -110,16 +85,8 @@ def bounds_of_lists(
 ) -> NDArray[np.float64]:
     """Return axis-aligned bounds of everything in the lists, in the model frame; float64 (6,).
 
-    Parameters
-    ----------
-    camera : Camera
-        The generating view.
-    window_size : (int, int)
-        W and H.
-    counts : numpy.ndarray
-        (H, W), bottom row first.
-    nearest, farthest : numpy.ndarray
-        View depth of the first front and the last back of every list that is not empty.
+    ``nearest`` and ``farthest``: view depth of the first front and the last back of every list
+    that is not empty.
     """
     width, height = window_size
     rows, columns = np.nonzero(counts)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,14 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from pyvista_vdi.extensions.series.keywords import InSituOptions
 
 
 class InSitu:
@@ -100,8 +106,8 @@ class InSitu:
     def __init__(
         self,
         path: str | os.PathLike[str],
-        camera: Any,
-        window_size: Sequence[int],
+        camera: CameraLike,
+        window_size: WindowSize,
         dimensions: Sequence[int],
         spacing: Sequence[float] = (1.0, 1.0, 1.0),
         origin: Sequence[float] = (0.0, 0.0, 0.0),
@@ -110,8 +116,8 @@ class InSitu:
         every: int = 1,
         append: bool = False,
         overwrite: bool = False,
-        device: Any = None,
-        **options: Any,
+        device: DeviceLike | None = None,
+        **options: Unpack[InSituOptions],
     ) -> None:
         self._comm = comm = mpi().COMM_WORLD if comm is None else checked_ranks(comm)
         self._device, self._closed, self._step = device, False, 0
@@ -122,7 +128,7 @@ class InSitu:
         with together(comm, "InSitu", InvalidArgumentError):
             self._path = _checked_path(path)
             self._every = _checked_every(every)
-            self._check(camera, window_size, dimensions, spacing, origin, options)
+            self._check(camera, window_size, dimensions, spacing, origin, dict(options))
             append, overwrite = checked_way(append, overwrite)
         require_same(comm, every=self._every, kind_of_file=self._series)
         with together(comm, "InSitu"):
@@ -162,10 +168,7 @@ class InSitu:
         """Begin the file, or find where single files go on; on the first rank."""
         if self._series:
             self._writer = SeriesWriter(
-                self._path,
-                precision=self._options.precision,
-                append=append,
-                overwrite=overwrite,
+                self._path, precision=self._options.precision, append=append, overwrite=overwrite
             )
             return
         numbers = [] if overwrite else _numbers(self._path)

@@ -9,5 +9,5 @@ EXTENSION = Extension(
         "blocks": "pyvista_vdi.extensions.large.entrance:generate_in_blocks",
         "clients": "pyvista_vdi.extensions.large.entrance:connected",
         "ranks": "pyvista_vdi.extensions.large.on_mpi:generate_on_mpi",
-    },
+    }
 )

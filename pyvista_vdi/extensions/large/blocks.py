@@ -80,21 +80,12 @@ class Halo:
 
 @dataclass(frozen=True)
 class Blocks:
-    """A grid in blocks.
-
-    Attributes
-    ----------
-    grid : Grid
-        The grid.
-    cuts : tuple of tuple of int
-        Along z, y and x: the first point of each block, and behind them the number of points.
-    chunks : (int, int, int)
-        Points of a chunk along z, y and x: blocks begin where chunks do.
-    """
+    """A grid in blocks."""
 
     grid: Grid
+    #: Along z, y and x: the first point of each block, and behind them the number of points
     cuts: tuple[tuple[int, ...], ...]
-    chunks: Indices
+    chunks: Indices  # points of a chunk along z, y and x: blocks begin where chunks do
 
     @classmethod
     def of(
@@ -104,19 +95,7 @@ class Blocks:
         point_bytes: int,
         block_bytes: int = BLOCK_BYTES,
     ) -> Blocks:
-        """Cut a grid where its chunks end.
-
-        Parameters
-        ----------
-        geometry : Geometry
-            The grid.
-        chunks : (int, int, int)
-            Points of a chunk along z, y and x.
-        point_bytes : int
-            Bytes of a point.
-        block_bytes : int
-            Most bytes of a block that is more than one chunk.
-        """
+        """Cut a grid where its chunks end, into blocks of so many bytes at most."""
         points = tuple(reversed(geometry.dimensions))
         lengths = [min(chunk, n) for chunk, n in zip(chunks, points, strict=True)]
         while True:

@@ -8,10 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from distributed import (
-    Worker,
-    get_worker,
-)
+from distributed import Worker, get_worker
 from distributed.protocol.pickle import dumps, loads
 from numpy.typing import NDArray
 
@@ -60,15 +57,6 @@ class Sent:
     """A chunked array on its way to workers: unpickled where a part is read.
 
     Dask waits for ever where arguments cannot be unpickled, as arrays of files that are not there.
-
-    Parameters
-    ----------
-    array : ChunkedArray
-        The array.
-    identity : StoreIdentity, optional
-        Of its files, if there are any.
-    run : str
-        Tells one generation from the next.
     """
 
     def __init__(self, array: ChunkedArray, identity: StoreIdentity | None, run: str) -> None:

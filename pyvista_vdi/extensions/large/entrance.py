@@ -19,17 +19,7 @@ from pyvista_vdi.model.vdi import VDI
 
 
 def generate_in_blocks(request: GenerationRequest, client: ClientLike | None = None) -> VDI:
-    """Make a VDI block by block on the local device, or on the workers of a cluster.
-
-    Raises
-    ------
-    MissingDependencyError
-        If ``client`` is given and dask.distributed is not installed.
-    InvalidArgumentError
-        If no scheduler answers at the address that ``client`` is.
-    InvalidArgumentTypeError
-        If ``client`` is neither a client nor an address.
-    """
+    """Make a VDI block by block on the local device, or on the workers of a cluster."""
     if client is None:
         return generate_chunked(request)
     if isinstance(client, str):
@@ -51,15 +41,7 @@ def generate_in_blocks(request: GenerationRequest, client: ClientLike | None = N
 
 @contextmanager
 def connected(address: str | None) -> Iterator[Any]:
-    """Connect to the Dask scheduler at an address; ``None`` is the client of none.
-
-    Raises
-    ------
-    MissingDependencyError
-        If dask.distributed is not installed.
-    InvalidArgumentError
-        If no scheduler answers.
-    """
+    """Connect to the Dask scheduler at an address; ``None`` is the client of none."""
     if address is None:
         yield None
         return

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -81,12 +82,7 @@ def vdi_of(
         optical_depth,
         task.blocks.grid.bounds,
         depth_origin=depth_origin,
-        metadata={
-            **made_by,
-            "blocks": list(task.blocks.counts),
-            **counted,
-            **request.metadata,
-        },
+        metadata={**made_by, "blocks": list(task.blocks.counts), **counted, **request.metadata},
     ).with_precision(task.options.precision)
 
 
@@ -127,14 +123,8 @@ def generate_chunked(
 ) -> VDI:
     """Make a VDI of a volume block by block, each of which is read twice.
 
-    Parameters
-    ----------
-    request : GenerationRequest
-        As for :func:`~pyvista_vdi.generation.generate.generate_vdi`.
-    chunks : (int, int, int), optional
-        Where blocks may be cut: points along z, y and x; the array's own by default.
-    block_bytes : int, optional
-        Most bytes of a block's points, unless a chunk has more.
+    ``chunks``: where blocks may be cut, points along z, y and x; the array's own by default.
+    ``block_bytes``: most bytes of a block that has more than one chunk.
     """
     volume, device, progress = request.volume, request.device, request.progress
     task = task_of(request, chunks_of(volume, chunks), block_bytes)
@@ -171,3 +161,17 @@ def generate_chunked(
         "runs_merged": sum(len(piece.runs) for piece in pieces),
     }
     return vdi_of(task, request, [rows], get_runtime(device).info.name, counted)
+
+
+#: Rows of lists are shared out in multiples of this.
+ROWS = 4
+
+
+def balanced(weights: NDArray[np.int64], parts: int) -> Iterator[tuple[int, int]]:
+    """Cut rows into ranges of like weight, each of whole groups of four rows but the last."""
+    groups = -(-len(weights) // ROWS)
+    sums = np.add.reduceat(weights, np.arange(0, len(weights), ROWS)).cumsum()
+    wanted = np.arange(1, parts) * (sums[-1] / parts)
+    cuts = np.unique([0, *np.searchsorted(sums, wanted, side="right"), groups])
+    for first, last in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        yield first * ROWS, min(last * ROWS, len(weights))

@@ -14,14 +14,7 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from distributed import (
-    CancelledError,
-    Client,
-    Future,
-    KilledWorker,
-    as_completed,
-    wait,
-)
+from distributed import CancelledError, Client, Future, KilledWorker, as_completed, wait
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import (
@@ -35,6 +28,7 @@ from pyvista_vdi.extensions.large import dask_tasks as work
 from pyvista_vdi.extensions.large.blocks import Indices, ends_of
 from pyvista_vdi.extensions.large.generate import (
     NOWHERE,
+    balanced,
     chunks_of,
     keep_ranges,
     known_ranges,
@@ -43,7 +37,6 @@ from pyvista_vdi.extensions.large.generate import (
 )
 from pyvista_vdi.extensions.large.passes import Rows, Seen, Task, light_entering
 from pyvista_vdi.extensions.large.reading import Plan, Read
-from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.generation.generate import Progress, report
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.ray_forms import Rectangle
@@ -74,29 +67,8 @@ def generate_on_dask(
 ) -> VDI:
     """Make a VDI of a chunked volume on the workers of a cluster.
 
-    Parameters are those of :func:`~pyvista_vdi.extensions.large.generate.generate_chunked`, and:
-
-    client : distributed.Client
-        Of the cluster. ``device`` is a selector that each worker understands.
-    workers : sequence of str, optional
-        Addresses of those that may be taken; all by default.
-
-    Raises
-    ------
-    NoDeviceError
-        If no worker has an OpenCL device.
-    InvalidVolumeError
-        If a worker does not find the volume's files, or others than this process; the message names
-        it.
-    DeviceError
-        If a block could not be made; the message names it.
-    Cancelled
-        If ``progress`` returned ``False``.
-
-    Warns
-    -----
-    VDIWarning
-        If some workers have no device: they do nothing.
+    The request's ``device`` is a selector that each worker understands; ``workers`` are the
+    addresses of those that may be taken. The others are as for :func:`generate_chunked`.
     """
     volume, device = request.volume, request.device
     able = _workers_with_device(client, device, workers)
@@ -153,12 +125,7 @@ class _Run:
         values = self._values(reads)
         in_window = [windows.get(block, NOWHERE) for block in order]
         first = self._mapped(
-            "first-pass",
-            order,
-            self._bound(work.first_pass),
-            order,
-            values.values(),
-            in_window,
+            "first-pass", order, self._bound(work.first_pass), order, values.values(), in_window
         )
         seen = self._gathered("seen", first, work.without_slabs, _SHARES[0])
         if known is None and len(seen) == len(blocks):
@@ -236,13 +203,7 @@ class _Run:
             )
 
     def _check_ranges(self, seen: Mapping[Indices, Seen]) -> None:
-        """Read a chunk of the widest range and one of the narrowest here, too, before all are kept.
-
-        Raises
-        ------
-        InvalidVolumeError
-            If they hold other values here.
-        """
+        """Read the chunks of the widest and the narrowest range here, too, before all are kept."""
         array, blocks = self._volume.chunks, self._task.blocks
         if array is None or array.lazy is not None:
             return

@@ -30,9 +30,8 @@ from pyvista_vdi.errors import (
     with_article,
 )
 from pyvista_vdi.extensions.large.blocks import Blocks, Indices, Offset, Values
-from pyvista_vdi.extensions.large.generate import NOWHERE, vdi_of
+from pyvista_vdi.extensions.large.generate import NOWHERE, balanced, vdi_of
 from pyvista_vdi.extensions.large.passes import Piece, Task, light_entering
-from pyvista_vdi.extensions.large.rows import balanced
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import three_wholes
 from pyvista_vdi.model.grid import Grid
@@ -51,13 +50,7 @@ _FIRST = "first must be the index x, y, z of the block's first point in the whol
 
 
 def mpi() -> Any:
-    """Return mpi4py's module ``MPI``.
-
-    Raises
-    ------
-    MissingDependencyError
-        If mpi4py is not installed.
-    """
+    """Return mpi4py's module ``MPI``."""
     try:
         from mpi4py import MPI
     except ImportError as error:
@@ -69,13 +62,7 @@ def mpi() -> Any:
 
 
 def checked_ranks(comm: Any) -> Any:
-    """Return a communicator, or tell all ranks that one of them was given something else.
-
-    Raises
-    ------
-    InvalidArgumentTypeError
-        If it is none.
-    """
+    """Return a communicator, or tell all ranks that one of them was given something else."""
     if all(hasattr(comm, name) for name in ("rank", "size", "allgather", "alltoall", "scatter")):
         return comm
     with together(mpi().COMM_WORLD, "reading the arguments"):  # where the others most likely are
@@ -233,23 +220,9 @@ def generate_on_mpi(
 def together(comm: Any, what: str, otherwise: type[VDIError] = DeviceError) -> Iterator[None]:
     """Do something on all ranks; if one fails, all raise, so that nobody waits for it.
 
-    What is done may do something together itself. Between a failure and the end of the block the
-    others meet no other collective call than that of such a block.
-
-    Parameters
-    ----------
-    comm : mpi4py.MPI.Comm
-        The ranks.
-    what : str
-        What is done, for the message.
-    otherwise : type
-        What is raised where the error is none of this package's.
-
-    Raises
-    ------
-    VDIError
-        On all ranks, of the kind that the first of those has that fail; the message says what
-        failed, on how many of them, and why on the first.
+    What is done may do something together itself. Between a failure and the end of the block
+    the others meet no other collective call than that of such a block. The error is of the kind
+    that the first rank has that fails, or ``otherwise`` if that is none of this package's.
     """
     error: Exception | None = None
     try:

@@ -54,48 +54,28 @@ _DARK = 80.0
 
 
 class Seen(NamedTuple):
-    """What the first pass finds of a block.
+    """What the first pass finds of a block."""
 
-    Attributes
-    ----------
-    depths : numpy.ndarray or None
-        Optical depth of each ray of the block's window, float16 (rows, columns); ``None`` where
-        the block is transparent.
-    slabs : dict
-        What neighbours need of its points, by axis (z, y, x) and side.
-    ends : dict
-        Least and largest scalar of each slab, and by ``None`` of all its own points; NaN left out,
-        and where there is nothing else.
-    ranges : (numpy.ndarray, numpy.ndarray)
-        Least and largest scalar of each of its chunks, float64.
-    opacities : ((int, int, int), numpy.ndarray) or None
-        Where there is ambient occlusion: the first node along x, y and z, and what the block has of
-        the opacities of nodes from it on, float32 (nz, ny, nx); ``None`` where that is nothing.
-    """
-
+    #: Optical depth of each ray of the block's window, float16 (rows, columns); ``None`` where the
+    #: block is transparent
     depths: NDArray[np.float16] | None
+    #: What neighbours need of its points, by axis (z, y, x) and side
     slabs: dict[tuple[int, int], Values]
+    #: Least and largest scalar of each slab, and by ``None`` of all its own points; NaN left out,
+    #: and where there is nothing else
     ends: dict[tuple[int, int] | None, Ends]
-    ranges: Ranges
+    ranges: Ranges  # least and largest scalar of each of its chunks, float64
+    #: Where there is ambient occlusion: the first node along x, y and z, and what the block has of
+    #: the opacities of nodes from it on, float32 (nz, ny, nx); ``None`` where that is nothing
     opacities: Opacities | None = None
 
 
 class Piece(NamedTuple):
-    """Lists of a block's rays, or of some rows of them.
+    """Lists of a block's rays, or of some rows of them."""
 
-    Attributes
-    ----------
-    window : Rectangle
-        Which lists of V_O's window they are.
-    counts : numpy.ndarray
-        Runs of each list, uint16 (rows, columns).
-    runs : numpy.ndarray
-        The runs of ``generation/runs.cl``, list by list, float32 (n, 8).
-    """
-
-    window: Rectangle
-    counts: NDArray[np.uint16]
-    runs: NDArray[np.float32]
+    window: Rectangle  # which lists of V_O's window they are
+    counts: NDArray[np.uint16]  # runs of each list, uint16 (rows, columns)
+    runs: NDArray[np.float32]  # the runs of ``generation/runs.cl``, list by list, float32 (n, 8)
 
     def rows(self, y0: int, y1: int) -> Piece:
         """Return the lists in rows y0 to y1 - 1 of V_O's window."""
@@ -121,42 +101,20 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """A VDI that is to be made in blocks: all that whoever does a part of it needs to know.
-
-    Attributes
-    ----------
-    blocks : Blocks
-        The grid, and how it is cut.
-    camera : Camera
-        V_O.
-    size : (int, int)
-        Lists along its window's width and height.
-    transfer_function : TransferFunction
-        With its unit distance.
-    options : GenerationOptions
-        With the sample distance.
-    scalar_range : (float, float)
-        Of all values.
-    """
+    """A VDI that is to be made in blocks: all that whoever does a part of it needs to know."""
 
     blocks: Blocks
-    camera: Camera
-    size: tuple[int, int]
-    transfer_function: TransferFunction
-    options: GenerationOptions
+    camera: Camera  # V_O
+    size: tuple[int, int]  # lists along the width and the height of its window
+    transfer_function: TransferFunction  # with its unit distance
+    options: GenerationOptions  # with the sample distance
     scalar_range: tuple[float, float]
 
     @classmethod
     def of(
         cls, blocks: Blocks, request: GenerationRequest, scalar_range: tuple[float, float]
     ) -> Task:
-        """Make defaults that follow from the whole grid explicit.
-
-        Raises
-        ------
-        DeviceMemoryError
-            If ambient occlusion is asked for, and its grid is too large to be made in one piece.
-        """
+        """Make defaults that follow from the whole grid explicit."""
         grid, options = blocks.grid, request.options
         if options.ambient_occlusion is not None:
             asked = options.ambient_occlusion
@@ -252,7 +210,29 @@ class Task:
 
         ``pieces`` come in the order in which V_O sees the blocks.
         """
-        return _merged(self, get_runtime(device), y0, y1, [p.rows(y0, y1) for p in pieces])
+        runtime, width, options = get_runtime(device), self.size[0], self.options
+        window, within = Rectangle(0, width, y0, y1), [piece.rows(y0, y1) for piece in pieces]
+        slices = _slices_to_merge(self, runtime, y1 - y0)
+        with (
+            Records(runtime, self.rays(), self.camera, self.size, slices, options, window) as made,
+            growing_lists(
+                runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
+            ) as lists,
+        ):
+            for part in slices:
+                made.begin(part)
+                first = y0 + part.first_row
+                for piece in within:
+                    of_part = piece.rows(first, first + part.rows)
+                    if len(of_part.runs):
+                        _append(made, of_part)
+                        made.make_room()  # each ray by what it has itself, whatever the rows
+                made.fit()
+                if part.number > 0:
+                    lists.wait()
+                made.pack(lists)
+            offsets, *arrays = lists.finished()
+        return Rows(np.diff(offsets).astype(np.uint32), *arrays)
 
     def may_be_visible(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
         """Whether anything between two scalars is not transparent; not where they are NaN."""
@@ -286,11 +266,7 @@ class Task:
         low, high = zip(*ends, strict=True)
         return bool(self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)))
 
-    def to_read(
-        self,
-        windows: Mapping[Indices, Rectangle],
-        ranges: Ranges | None,
-    ) -> list[Indices]:
+    def to_read(self, windows: Mapping[Indices, Rectangle], ranges: Ranges | None) -> list[Indices]:
         """Return the blocks that the first pass must read, in the order in which V_O sees them.
 
         ``ranges``: least and largest scalar of each chunk, where they are known. A block in the
@@ -459,32 +435,6 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
     else:
         found = np.zeros((0, RUN_WORDS), np.float32)
     return counts.reshape(part.rows, columns).astype(np.uint16), found
-
-
-def _merged(task: Task, runtime: Runtime, y0: int, y1: int, pieces: list[Piece]) -> Rows:
-    width = task.size[0]
-    window, options = Rectangle(0, width, y0, y1), task.options
-    slices = _slices_to_merge(task, runtime, y1 - y0)
-    with (
-        Records(runtime, task.rays(), task.camera, task.size, slices, options, window) as records,
-        growing_lists(
-            runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
-        ) as lists,
-    ):
-        for part in slices:
-            records.begin(part)
-            first = y0 + part.first_row
-            for piece in pieces:
-                of_part = piece.rows(first, first + part.rows)
-                if len(of_part.runs):
-                    _append(records, of_part)
-                    records.make_room()  # each ray by what it has itself, whatever the rows
-            records.fit()
-            if part.number > 0:
-                lists.wait()
-            records.pack(lists)
-        offsets, *arrays = lists.finished()
-    return Rows(np.diff(offsets).astype(np.uint32), *arrays)
 
 
 def _append(records: Records, piece: Piece) -> None:

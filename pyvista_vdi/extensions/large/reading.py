@@ -20,23 +20,13 @@ Box = tuple[slice, ...]
 
 @dataclass(frozen=True)
 class Read:
-    """A box of an array, read when it is called, but for chunks whose values are known.
-
-    Attributes
-    ----------
-    array : array_like
-        What is read.
-    box : tuple of slice
-        Of its points (z, y, x).
-    known : dict
-        Values of chunks that need not be read, by their boxes in the box.
-    others : list
-        The boxes of the other chunks, where there are any that are known.
-    """
+    """A box of an array, read when it is called, but for chunks whose values are known."""
 
     array: Any
-    box: Box
+    box: Box  # of its points (z, y, x)
+    #: Values of chunks that need not be read, by their boxes in the box
     known: dict[tuple[tuple[int, int], ...], float] = field(default_factory=dict)
+    #: The boxes of the other chunks, where there are any that are known
     others: list[tuple[tuple[int, int], ...]] = field(default_factory=list)
 
     def __call__(self) -> Values:
@@ -65,24 +55,12 @@ class Read:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is read of an array for a task.
-
-    Attributes
-    ----------
-    array : array_like
-        The array.
-    blocks : Blocks
-        How it is cut.
-    needed : numpy.ndarray or None
-        Whether a chunk is read; ``None`` where all are.
-    low : numpy.ndarray or None
-        The value of those that are not.
-    """
+    """What is read of an array for a task."""
 
     array: Any
     blocks: Blocks
-    needed: NDArray[np.bool_] | None = None
-    low: NDArray[np.float64] | None = None
+    needed: NDArray[np.bool_] | None = None  # whether a chunk is read; ``None`` where all are
+    low: NDArray[np.float64] | None = None  # the value of those that are not
 
     @classmethod
     def of(cls, task: Task, array: Any, ranges: Ranges | None) -> Plan:

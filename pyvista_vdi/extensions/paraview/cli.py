@@ -63,15 +63,7 @@ def paraview(options: argparse.Namespace) -> int:
 
 
 def _check(pvpython: str) -> None:
-    """Print what ParaView's Python finds: this package, the plugin, the devices.
-
-    Raises
-    ------
-    MissingDependencyError
-        If there is no such ``pvpython``, or it does not load the plugin.
-    NoDeviceError
-        If it finds no device that can be used.
-    """
+    """Print what ParaView's Python finds: this package, the plugin, the devices."""
     environment = dict(os.environ)
     for variable, folders in _variables().items():
         before = [environment[variable]] if environment.get(variable) else []
@@ -92,13 +84,7 @@ def _check(pvpython: str) -> None:
 
 
 def _variables() -> dict[str, list[Path]]:
-    """Return what to put in front of ParaView's search paths.
-
-    Raises
-    ------
-    UnsupportedError
-        If that would show ParaView a second VTK, or not all of this package.
-    """
+    """Return what to put in front of ParaView's search paths."""
     installed = [Path(sysconfig.get_path(name)).resolve() for name in ("purelib", "platlib")]
     folders = list(dict.fromkeys([_PACKAGE.parent, *installed]))
     for folder in folders:

@@ -22,14 +22,14 @@ EXTENSION = Extension(
     shown={
         "pyvista_vdi.extensions.series.series:VDISeries": (
             "pyvista_vdi.extensions.series.shown:SeriesInput"
-        ),
+        )
     },
     verbs=(
         Verb(
             "series",
             "write VDIs, or those of volumes, that are time steps to one file",
             "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
-            "pyvista_vdi.extensions.series.options:add_options",
+            "pyvista_vdi.extensions.series.cli:add_options",
             "pyvista_vdi.extensions.series.cli:series",
         ),
     ),

@@ -1,4 +1,4 @@
-"""The verb ``series``, and what ``info`` and ``convert`` do with files of series."""
+"""The verb ``series``, its options, and what ``info`` and ``convert`` do with files of series."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi import registry
+from pyvista_vdi.cli import declare
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     OF_ANY_VOLUME,
@@ -39,6 +40,8 @@ from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.standard_cases import WINDOW_SIZE
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
@@ -118,11 +121,7 @@ def _connected(address: str | None) -> Any:
 
 
 def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
-    return {
-        **of_the_file(options),
-        "tolerance": options.tolerance,
-        "key_every": options.key_every,
-    }
+    return {**of_the_file(options), "tolerance": options.tolerance, "key_every": options.key_every}
 
 
 def _steps_of_vdis(files: Sequence[str]) -> list[Step]:
@@ -140,13 +139,7 @@ def _steps_of_vdis(files: Sequence[str]) -> list[Step]:
 
 
 def _timed(steps: Sequence[Step], given: Sequence[float] | None) -> list[Step]:
-    """Return steps with the times that are given, else with the files' where these ascend.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If others are given than there are steps.
-    """
+    """Return steps with the times that are given, else with the files' where these ascend."""
     if given is not None:
         if len(given) != len(steps):
             raise InvalidArgumentError(
@@ -231,3 +224,39 @@ def write_each(vdis: Sequence[VDI], target: Path, arguments: dict[str, Any]) -> 
             bar((i + 1) / len(files))
     print(f"Written: {printable(files[0])} to {printable(files[-1].name)}, {len(files)} files")
     return 0
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the verb ``series``."""
+    text = (
+        f"VDIs, or other series, .vdis; or volumes, each {declare.VOLUME_FILE}. Of a store, a "
+        ".pvd, a .vti.series and other files with time steps all are taken. Names in a shell's "
+        "order are put in that of their numbers, step_2 before step_10"
+    )
+    declare.option(parser, "files", text, "FILE", nargs="+")
+    declare.output(parser, ".vdis to write")
+    times = "of the steps, ascending (default: those in the files, else 0,1,2,...)"
+    declare.option(parser, "--times", times, "A,B,...", declare.parse_numbers)
+    group = parser.add_argument_group("file")
+    text = (
+        "what colours times opacity, and opacities, of a supersegment may differ by, 0 to 1, where "
+        "that saves bytes (default: 0, every bit is kept)"
+    )
+    declare.option(group, "--tolerance", text, "T", declare.parse_number, default=0.0)
+    text = "most steps from one that needs no other to the next (default: 16)"
+    declare.option(group, "--key-every", text, "N", declare.parse_count, default=16)
+    text = "of the supersegments (default: 8-byte, the only one that is written by differences)"
+    declare.option(group, "--precision", text, choices=PRECISIONS)
+    text = "zstd (default), lz4, deflate or none"
+    declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))
+    declare.option(group, "--compression-level", "1 (fast) to 9 (small)", "N", declare.parse_whole)
+    group = parser.add_argument_group("volumes", "What VDIs are made of them; not for VDIs.")
+    declare.grid(group)
+    declare.size(group, WINDOW_SIZE)
+    declare.longest(group)
+    declare.step(group)
+    declare.memory_limit(group)
+    declare.scheduler(group)
+    declare.camera(parser, "the view that the first volume fills")
+    declare.classification(parser)
+    declare.device(parser)

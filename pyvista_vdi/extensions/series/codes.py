@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.packing import (
-    DEPTH_CODES,
-    TAU_BASE,
-    TAU_CODES,
-    Packed8,
-    packed_8,
-)
+from pyvista_vdi.model.packing import DEPTH_CODES, TAU_BASE, TAU_CODES, Packed8, packed_8
 from pyvista_vdi.model.vdi import VDI
 
 Integers = NDArray[np.int64]
@@ -30,30 +24,17 @@ ENTRIES = 256
 
 @dataclass
 class Codes:
-    """The 8-byte form of a VDI, each field by itself; int64 and so free to be computed with.
+    """The 8-byte form of a VDI, each field by itself; int64 and so free to be computed with."""
 
-    Parameters
-    ----------
-    step : float
-        Of the depth grid, world units.
-    counts, origins, strides : numpy.ndarray
-        Per list: its length, where its codes begin and how many steps a code takes.
-    front, back, tau : numpy.ndarray
-        Per supersegment.
-    color : numpy.ndarray
-        uint8 (n, 3).
-    entries : numpy.ndarray
-        uint8 (n,): which of the tables' colours each is nearest to; empty until that is known.
-    """
-
-    step: float
-    counts: Integers
-    origins: Integers
-    strides: Integers
-    front: Integers
-    back: Integers
-    tau: Integers
-    color: NDArray[np.uint8]
+    step: float  # of the depth grid, world units
+    counts: Integers  # per list: its length
+    origins: Integers  # where its codes begin
+    strides: Integers  # how many steps a code takes
+    front: Integers  # per supersegment
+    back: Integers  # per supersegment
+    tau: Integers  # per supersegment
+    color: NDArray[np.uint8]  # uint8 (n, 3)
+    #: uint8 (n,): which of the tables' colours each is nearest to; empty until that is known
     entries: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
 
     @cached_property
@@ -86,13 +67,7 @@ class Codes:
         )
 
     def packed(self) -> tuple[NDArray[np.uint64], Packed8]:
-        """Return offsets and the packed form, checked.
-
-        Raises
-        ------
-        InvalidVDIError
-            If packing gives no such codes.
-        """
+        """Return offsets and the packed form, checked."""
         gaps = self.front.copy()
         gaps[1:] -= self.back[:-1]
         gaps[self.starts[:-1][self.counts > 0]] = 0
@@ -110,17 +85,10 @@ class Codes:
 
 @dataclass(frozen=True)
 class Tables:
-    """256 colours, and the optical depth of a sample of each.
+    """256 colours, and the optical depth of a sample of each."""
 
-    Parameters
-    ----------
-    colors : numpy.ndarray
-        uint8 (256, 3).
-    extinctions : numpy.ndarray
-        float32 (256,): optical depth per unit of length, see :class:`Samples`.
-    """
-
-    colors: NDArray[np.uint8]
+    colors: NDArray[np.uint8]  # uint8 (256, 3)
+    #: float32 (256,): optical depth per unit of length, see :class:`Samples`
     extinctions: NDArray[np.float32]
 
     def nearest(self, color: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -170,15 +138,10 @@ class Tables:
 
 @dataclass(frozen=True)
 class Samples:
-    """Where the samples lie that lists were made of: their faces are at whole ones.
+    """Where the samples lie that lists were made of: their faces are at whole ones."""
 
-    Parameters
-    ----------
-    coefficients : tuple of float
-        Nine: the constant, and the shares of u and v, of a vector whose length is the number of
-        samples to a world unit of view depth along a list's centre ray.
-    """
-
+    #: Nine: the constant, and the shares of u and v, of a vector whose length is the number of
+    #: samples to a world unit of view depth along a list's centre ray
     coefficients: tuple[float, ...]
 
     @classmethod

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,92 +16,60 @@ from pyvista_vdi.model.checks import as_flag
 _SAME = ("transfer_function", "lights", "ambient_occlusion")
 
 
-class _Frames(StepsReader):
-    """The steps of a file that may have none yet."""
+class Begun(StepsReader):
+    """A file with which a writer goes on: the steps that it has, of which there may be none."""
 
     _LEAST = 0
 
+    @classmethod
+    def of(cls, path: Path, append: Any, overwrite: Any) -> Begun | None:
+        """Return what there is of a file to go on with; ``None`` if it is to be written anew."""
+        append, overwrite = checked_way(append, overwrite)
+        if overwrite or not path.exists() or path.stat().st_size == 0:
+            return None
+        try:
+            steps = cls(path)
+        except VDIFileError:
+            if append:
+                raise
+            raise refused(path, "") from None
+        if not steps.times:
+            return None  # there is nothing to lose
+        if not append:
+            last = steps.times[-1]
+            raise refused(path, f" with {len(steps)} steps, the last at time {last:g}")
+        if steps._frames[-1][1].number != len(steps) - 1:
+            raise VDIFileError(
+                f"{path} has lost steps and cannot be gone on with: write what it has to another "
+                "file (pyvista-vdi convert), or begin a new one"
+            )
+        steps.info()  # refused now where it is damaged
+        return steps
 
-@dataclass(frozen=True)
-class Begun:
-    """A file that has steps.
+    @property
+    def entries(self) -> list[bytes]:
+        """The index so far."""
+        return [layout.ENTRY.pack(at) + header.to_bytes() for at, header in self._frames]
 
-    Attributes
-    ----------
-    path : pathlib.Path
-        The file.
-    first : SeriesInfo or VDI
-        What has the camera, the window size and the metadata of the first step.
-    head : dict
-        What the file's head says.
-    entries : list of bytes
-        The index so far.
-    last_time : float
-        Of the last step.
-    end : int
-        Where the last step ends.
-    """
-
-    path: Path
-    first: Any
-    head: dict[str, Any]
-    entries: list[bytes]
-    last_time: float
-    end: int
+    @property
+    def end(self) -> int:
+        """Where the last step ends."""
+        place, last = self._frames[-1]
+        return place + layout.HEADER_BYTES + last.n_bytes
 
     def check_head(self, **given: Any) -> None:
         """Raise InvalidArgumentError if steps would be written in another way."""
         for name, value in given.items():
-            if self.head.get(name) != value:
+            if self._head.get(name) != value:
                 shown = {"codec": "compression"}.get(name, name)
                 raise InvalidArgumentError(
-                    f"{self.path} was written with {shown}={self.head.get(name)!r}, and goes on "
+                    f"{self._path} was written with {shown}={self._head.get(name)!r}, and goes on "
                     f"with the same only; got {value!r}"
                 )
 
     def check(self, step: Any) -> None:
         """Raise InvalidArgumentError if a VDI is not of this series."""
-        check_goes_on(self.path, self.first, step)
-
-
-def begun(path: Path, append: Any, overwrite: Any) -> Begun | None:
-    """Return what there is of a file to go on with; ``None`` if it is to be written anew.
-
-    Raises
-    ------
-    VDIFileError
-        If there is a file that is neither to be appended to nor to be replaced, or it is damaged.
-    InvalidArgumentError
-        If both are asked for.
-    """
-    append, overwrite = checked_way(append, overwrite)
-    if overwrite or not path.exists() or path.stat().st_size == 0:
-        return None
-    try:
-        steps = _Frames(path)
-    except VDIFileError:
-        if append:
-            raise
-        raise refused(path, "") from None
-    frames = steps.frames
-    if not frames:
-        return None  # there is nothing to lose
-    place, last = frames[-1]
-    if not append:
-        raise refused(path, f" with {len(frames)} steps, the last at time {last.time:g}")
-    if last.number != len(frames) - 1:
-        raise VDIFileError(
-            f"{path} has lost steps and cannot be gone on with: write what it has to another file "
-            "(pyvista-vdi convert), or begin a new one"
-        )
-    return Begun(
-        path,
-        steps.info(),
-        steps.head,
-        [layout.ENTRY.pack(at) + header.to_bytes() for at, header in frames],
-        last.time,
-        place + layout.HEADER_BYTES + last.n_bytes,
-    )
+        check_goes_on(self._path, self.info(), step)
 
 
 def checked_way(append: Any, overwrite: Any) -> tuple[bool, bool]:

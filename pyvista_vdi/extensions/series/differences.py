@@ -41,28 +41,60 @@ Arrays = dict[str, NDArray[Any]]
 
 @dataclass
 class Stepped:
-    """A step as a reader has it, from which another may be guessed.
+    """A step as a reader has it, from which another may be guessed."""
 
-    Parameters
-    ----------
-    codes : Codes
-        Its supersegments, their entries known.
-    tables : Tables
-        Those that it was written with.
-    samples : Samples or None
-        Where its faces were taken to be; None where nothing is known of samples.
-    window_size : (int, int)
-        Lists along each edge.
-    """
-
-    codes: Codes
-    tables: Tables
+    codes: Codes  # its supersegments, their entries known
+    tables: Tables  # those that it was written with
+    #: Where its faces were taken to be; None where nothing is known of samples
     samples: Samples | None
-    window_size: tuple[int, int]
+    window_size: tuple[int, int]  # lists along each edge
 
     def packed(self) -> tuple[NDArray[np.uint64], Packed8]:
         """Return offsets and the packed form, checked."""
         return self.codes.packed()
+
+
+@dataclass
+class Lists:
+    """How the lists of a frame are written, and their lengths: what both decoders begin with."""
+
+    way: NDArray[Any]
+    coded: NDArray[np.bool_]  # lists that are not as they were
+    placed: NDArray[np.bool_]  # lists that are written by what they were
+    counts: Integers
+    occupied: Integers  # the lists that are written and not empty
+    shift: Integers  # of these, the samples by which they have moved
+    kept: NDArray[np.bool_]  # of the supersegments in lists that are KEPT
+    kept_there: NDArray[np.bool_]  # of those that these had
+
+    @classmethod
+    def of(cls, arrays: Arrays, window_size: tuple[int, int], before: Integers | None) -> Lists:
+        """Return them from a frame's arrays, and from the lengths of the lists before."""
+        kinds = {array.dtype.kind for name, array in arrays.items() if name != "extinctions"}
+        _require(kinds == {"u"}, "all arrays")
+        way = arrays["how"] & HOW
+        right = len(way) == window_size[0] * window_size[1]
+        _require(right and (before is not None or not way.any()), "how lists are written")
+        coded, placed = way != SAME, way >= PLACED
+        counts = np.zeros(len(way), np.int64)
+        counts[coded] = _long(arrays, "counts", np.count_nonzero(coded))
+        counts[placed] = unfolded(counts[placed])
+        if before is not None:
+            counts[placed] += before[placed]
+            counts[~coded] = before[~coded]
+            _require((before[placed] > 0).all(), "lists placed as they were")
+        _require(counts.min() >= 0 and counts.max() <= 1 << 16, "counts")
+        _require(int(counts[coded].sum()) == len(arrays["entry"]), "counts")
+        occupied = np.flatnonzero(coded & (counts > 0))
+        shift, bits = np.zeros(len(occupied), np.int64), np.zeros(0, bool)
+        lists = cls(way, coded, placed, counts, occupied, shift, bits, bits)
+        if before is not None:
+            moving, keeps = placed[occupied], occupied[way[occupied] == KEPT]
+            shift[moving] = unfolded(_long(arrays, "shift", np.count_nonzero(moving)))
+            _require((np.abs(shift) < FARTHEST).all(), "shift")
+            lists.kept = _bits(arrays, "kept", counts[keeps].sum())
+            lists.kept_there = _bits(arrays, "kept_there", before[keeps].sum())
+        return lists
 
 
 def decoded(
@@ -73,53 +105,25 @@ def decoded(
     window_size: tuple[int, int],
     before: Stepped | None,
 ) -> Stepped:
-    """Return the step that :func:`~pyvista_vdi.extensions.series.encoder.encoded` made arrays of.
-
-    Raises
-    ------
-    InvalidVDIError
-        If no step gives such arrays; what is returned is still to be checked.
-    """
-    n_lists = window_size[0] * window_size[1]
-    kinds = {array.dtype.kind for name, array in arrays.items() if name != "extinctions"}
-    _require(kinds == {"u"}, "all arrays")
-    how_and_end = arrays["how"]
-    how = how_and_end & HOW
-    _require(len(how) == n_lists and (before is not None or not how.any()), "how lists are written")
-    coded = how != SAME
-    counts = np.zeros(n_lists, np.int64)
-    given = arrays["counts"].astype(np.int64)
-    _require(len(given) == np.count_nonzero(coded), "counts")
-    by_it = how >= PLACED
-    counts[coded] = given
-    counts[by_it] = unfolded(counts[by_it])
-    if before is not None:
-        counts[by_it] += before.codes.counts[by_it]
-        counts[~coded] = before.codes.counts[~coded]
-        _require((before.codes.counts[by_it] > 0).all(), "lists placed as they were")
-    n_coded = len(arrays["entry"])
-    _require(counts.min() >= 0 and counts.max() <= 1 << 16, "counts")
-    _require(int(counts[coded].sum()) == n_coded, "counts")
-
+    """Return the step that the encoder made arrays of; its codes are still to be checked."""
+    lists = Lists.of(arrays, window_size, None if before is None else before.codes.counts)
+    coded, counts, shift, n_coded = lists.coded, lists.counts, lists.shift, len(arrays["entry"])
     codes = Codes(step, counts, *(np.empty(0, np.int64),) * 5, np.empty((0, 3), np.uint8))
-    view = View.placed(codes, np.flatnonzero(coded & (counts > 0)))
+    view = View.placed(codes, lists.occupied)
     there = there_of(before, view.lists)
-    there.has = by_it[view.lists]
+    there.has = lists.placed[view.lists]
     there.restrict()
     unit_step = Stepped(codes, tables, samples, window_size)
     pitches = pitches_of(unit_step, view.lists)
-    shift = np.zeros(len(view.lists), np.int64)
-    pays = how[view.lists] == KEPT
+    pays = lists.way[view.lists] == KEPT
     kept = np.zeros(len(view.own), bool)
     old_rows = np.empty(0, np.int64)
     old_front = old_back = old_rows
     moved_by = there.strides.astype(float) if pitches is None else pitches
     if before is not None:
-        shift[there.has] = unfolded(_long(arrays, "shift", np.count_nonzero(there.has)))
-        _require(bool((np.abs(shift) < FARTHEST).all()), "shift")
         old_view = View(before.codes, view.lists[pays])
-        kept[pays[view.own]] = _bits(arrays, "kept", np.count_nonzero(pays[view.own]))
-        kept_there = _bits(arrays, "kept_there", len(old_view.rows))
+        kept[pays[view.own]] = lists.kept
+        kept_there = lists.kept_there
         old_rows = old_view.rows[kept_there]
         _require(
             np.array_equal(
@@ -147,7 +151,7 @@ def decoded(
     origins = _origins(
         unfolded(_long(arrays, "origin", n_occupied)), there, shift, moved_by, pitches is None
     )
-    as_it_was = (how_and_end[view.lists] & END) > 0
+    as_it_was = (arrays["how"][view.lists] & END) > 0
     _require(not (as_it_was & ~there.has).any(), "ends")
     if pitches is None:
         spans = np.zeros(n_occupied)
@@ -330,11 +334,7 @@ def guessed_media(
 
 
 def _running(
-    gap: Integers,
-    length: Integers,
-    kept: NDArray[np.bool_],
-    old_back: Integers,
-    view: View,
+    gap: Integers, length: Integers, kept: NDArray[np.bool_], old_back: Integers, view: View
 ) -> Integers:
     """Return backs in samples: gaps and lengths added up from the last one that is known."""
     n = len(gap)

@@ -56,14 +56,9 @@ def encoded(
 ) -> tuple[Stepped, Arrays]:
     """Return what a reader will have of a step, and the arrays to be written for it.
 
-    Parameters
-    ----------
-    step : Stepped
-        With the tables and samples of ``before``.
-    before : Stepped, optional
-        Another step of the same window, camera and depth grid.
-    tolerance : float
-        Colours and opacities may differ by so much, 0 to 1; with 0 the step itself is read.
+    ``step`` has the tables and samples of ``before``, another step of the same window, camera
+    and depth grid. Colours and opacities may differ by the tolerance, 0 to 1; with 0 the step
+    itself is read.
     """
     codes, n_lists = step.codes, len(step.codes.counts)
     same = np.zeros(n_lists, bool)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.extensions.series.info import SeriesInfo
-from pyvista_vdi.extensions.series.reader import StepsReader
+from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.steps_writer import write
 from pyvista_vdi.io.files import format_named
@@ -32,20 +31,7 @@ def write_steps(
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
-    """Read a series from a .vdis file; steps are decoded when they are asked for.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    progress : callable, optional
-        Called with 1: opening reads no step.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
-    """
+    """Read a series from a .vdis file; steps are decoded when they are asked for."""
     steps = StepsReader(path)
     Pieces(progress, 1)()
     return VDISeries(steps, steps.times)

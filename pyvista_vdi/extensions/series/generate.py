@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Iterable, Sequence, Sized
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,28 +30,33 @@ from pyvista_vdi.model.options import (
     declared,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.types import Progress
+from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import bytes_of, warn_missed
 from pyvista_vdi.quality.generate_anywhere import generate_anywhere
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from pyvista_vdi.extensions.series.keywords import SeriesOptions, VolumesLike
 
 _DIAL = tuple(declared(QualityTarget))
 _GRID = ("spacing", "origin")
 
 
 def generate_series(
-    volumes: Any,
-    camera: Any,
-    window_size: Sequence[int],
+    volumes: VolumesLike,
+    camera: CameraLike,
+    window_size: WindowSize,
     times: Iterable[float] | None = None,
     *,
     spacing: Sequence[float] | None = None,
     origin: Sequence[float] | None = None,
-    client: Any = None,
+    client: ClientLike | None = None,
     progress: Progress | None = None,
-    device: Any = None,
-    **options: Any,
+    device: DeviceLike | None = None,
+    **options: Unpack[SeriesOptions],
 ) -> VDISeries:
     """Generate the VDIs of a volume that changes in time, all from one view.
 
@@ -118,7 +123,9 @@ def generate_series(
         window_size,
         device=device,
         client=client,
-        **{"spacing": spacing, "origin": origin, **options},
+        spacing=spacing,
+        origin=origin,
+        **options,
     )
     sized = steps if known_times is None else known_times
     total = len(sized) if isinstance(sized, Sized) else None
@@ -140,19 +147,7 @@ def generate_series(
 
 
 class StepMaker:
-    """Makes a VDI of each volume that it is called with, all by what the first one implied.
-
-    Parameters
-    ----------
-    function : str
-        Name of the caller's function, for messages.
-    camera, window_size, device, client
-        As for :func:`generate_series`.
-    default_precision : str
-        Of the VDIs, unless it is given or a dial chooses it.
-    **given
-        The options, as there.
-    """
+    """Makes a VDI of each volume that it is called with, all by what the first one implied."""
 
     def __init__(
         self,
@@ -190,17 +185,7 @@ class StepMaker:
         camera: Any = None,
         window_size: Sequence[int] | None = None,
     ) -> VDI:
-        """Return a step's VDI.
-
-        Parameters
-        ----------
-        volume : object
-            See :func:`generate_series`.
-        progress : callable, optional
-            As for :func:`pyvista_vdi.generate`.
-        camera, window_size : optional
-            In place of the series' own.
-        """
+        """Return a step's VDI."""
         volume = self.volume(volume)
         # The first step's range is all steps', while a property's functions have theirs in each
         if self._table is None or self._looks.in_place:

@@ -11,7 +11,6 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from io import BytesIO
 from typing import Any, NamedTuple
 
@@ -82,48 +81,31 @@ class FrameHeader(NamedTuple):
         return cls(*_HEADER.unpack(data[: _HEADER.size]))
 
 
-@dataclass(frozen=True)
-class Content:
-    """What a frame holds.
+def content_bytes(
+    text: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], codec: str, level: int
+) -> bytes:
+    """Return what a frame holds: what is to be said in JSON, and numbers, compressed by themselves.
 
-    Parameters
-    ----------
-    text : dict
-        What is to be said in JSON.
-    arrays : dict of str to numpy.ndarray
-        Numbers, one-dimensional; or one named ``"vdi"``, uint8: a whole .vdi file.
+    The arrays are one-dimensional; or there is one named ``"vdi"``, uint8: a whole .vdi file.
     """
-
-    text: dict[str, Any]
-    arrays: Mapping[str, NDArray[Any]]
-
-    def to_bytes(self, codec: str, level: int) -> bytes:
-        """Return it as it is written; arrays are compressed by themselves."""
-        stream, index = BytesIO(), []
-        for array in self.arrays.values():
-            layout = _layout(array.dtype, len(array))
-            index += write_chunks(
-                stream,
-                layout,
-                codec,
-                level,
-                lambda first, last, rows=array: np.ascontiguousarray(rows[first:last]),  # type: ignore[misc]
-                lambda: None,
-            )
-        arrays = {name: [array.dtype.str, len(array)] for name, array in self.arrays.items()}
-        text = zlib.compress(to_json({**self.text, "arrays": arrays}).encode(), 9)
-        chunks = np.array(index, _INDEX).tobytes()
-        return _TEXT.pack(len(text), len(index)) + text + chunks + stream.getvalue()
+    stream, index = BytesIO(), []
+    for array in arrays.values():
+        index += write_chunks(
+            stream,
+            _layout(array.dtype, len(array)),
+            codec,
+            level,
+            lambda first, last, rows=array: np.ascontiguousarray(rows[first:last]),  # type: ignore[misc]
+            lambda: None,
+        )
+    kinds = {name: [array.dtype.str, len(array)] for name, array in arrays.items()}
+    packed = zlib.compress(to_json({**text, "arrays": kinds}).encode(), 9)
+    chunks = np.array(index, _INDEX).tobytes()
+    return _TEXT.pack(len(packed), len(index)) + packed + chunks + stream.getvalue()
 
 
 def read_text(data: memoryview) -> tuple[dict[str, Any], int, int]:
-    """Return what a frame's content says, where its index begins, and that one's entries.
-
-    Raises
-    ------
-    ValueError
-        If it is no such content.
-    """
+    """Return what a frame's content says, where its index begins, and that one's entries."""
     if len(data) < _TEXT.size:
         raise ValueError("its content is too short")
     n_text, n_chunks = _TEXT.unpack_from(data)
@@ -137,25 +119,13 @@ def read_text(data: memoryview) -> tuple[dict[str, Any], int, int]:
 
 
 class FrameArrays(dict[str, NDArray[Any]]):
-    """The arrays of a frame, all in one memory, which a device may use as it lies.
-
-    Attributes
-    ----------
-    memory : numpy.ndarray
-        uint8.
-    """
+    """The arrays of a frame, all in one memory, which a device may use as it lies."""
 
     memory: NDArray[np.uint8]
 
 
 def read_arrays(data: memoryview, codec: str) -> FrameArrays:
-    """Return the arrays of a frame's content, decompressed.
-
-    Raises
-    ------
-    ValueError, DamagedChunkError
-        If they are not what the content says.
-    """
+    """Return the arrays of a frame's content, decompressed."""
     text, begin, n_chunks = read_text(data)
     index = np.frombuffer(data, _INDEX, n_chunks, begin)
     body = data[begin + index.nbytes :]
@@ -207,13 +177,7 @@ def _layout(dtype: np.dtype[Any], n_rows: int) -> Layout:
 
 
 def unpacked(data: memoryview | bytes) -> bytes:
-    """Return a text that zlib has compressed, which may not be longer than descriptions are.
-
-    Raises
-    ------
-    ValueError
-        If it is longer, or no such text.
-    """
+    """Return a text that zlib has compressed, which may not be longer than descriptions are."""
     stream = zlib.decompressobj()
     try:
         text = stream.decompress(data, MAX_DESCRIPTION_BYTES)

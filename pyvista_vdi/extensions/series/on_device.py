@@ -17,16 +17,8 @@ from pyvista_vdi.device import (
     padded,
 )
 from pyvista_vdi.errors import DeviceError, InvalidVDIError, MissingDependencyError, NoDeviceError
-from pyvista_vdi.extensions.series.codes import Codes, Samples, Tables
-from pyvista_vdi.extensions.series.differences import (
-    HOW,
-    KEPT,
-    PLACED,
-    SAME,
-    Arrays,
-    Stepped,
-    unfolded,
-)
+from pyvista_vdi.extensions.series.codes import Codes, Integers, Samples, Tables
+from pyvista_vdi.extensions.series.differences import KEPT, Arrays, Lists, Stepped, unfolded
 from pyvista_vdi.extensions.series.kernels import DECODE_LISTS
 from pyvista_vdi.model.packing import GRID, TAU_BASE, TAU_CODES, Packed8, check_grid
 
@@ -44,19 +36,7 @@ _GROUP = 64
 
 
 class PackedStep(Stepped):
-    """A step in its 8-byte form; whole numbers by themselves are made of it when they are needed.
-
-    Parameters
-    ----------
-    offsets : numpy.ndarray
-        int32 (W * H + 1,): where each list begins.
-    packing : Packed8
-        Its supersegments.
-    entries : numpy.ndarray
-        uint8 (n,): which of the tables' colours each is nearest to.
-    tables, samples, window_size
-        See :class:`Stepped`.
-    """
+    """A step in its 8-byte form; whole numbers are made of it when they are needed."""
 
     def __init__(
         self,
@@ -120,10 +100,8 @@ def decoded_on(
 
     The parameters are those of :func:`differences.decoded`, which says what is wrong with them.
     """
-    n_lists = window_size[0] * window_size[1]
     how = arrays["how"]
-    way = how & HOW
-    if how.dtype != np.uint8 or len(how) != n_lists or (before is None and way.any()):
+    if how.dtype != np.uint8:
         return None
     for name in _STREAMS:
         if arrays[name].dtype.kind != "u" or arrays[name].itemsize > 4:
@@ -134,14 +112,15 @@ def decoded_on(
         old = None if before is None else PackedStep.of(before)
     except InvalidVDIError:  # it was not looked at, and may still do
         return None
-    places = _Places.of(arrays, way, old)
-    if places is None:
-        return None
+    old_counts = None if old is None else np.diff(old.offsets).astype(np.int64)
+    lists = Lists.of(arrays, window_size, old_counts)
     pitches = None if samples is None else samples.pitches(window_size, step)
-    left = _left(arrays, way, places, plain=pitches is None)
-    if left is None:
+    left = _left(arrays, lists, plain=pitches is None)
+    places = _places(arrays, lists, old_counts)
+    if left is None or places is None:
         return None
-    n = int(places.starts[-1])
+    n_lists, starts = len(how), _sums(lists.counts)
+    n = int(starts[-1])
     check_grid(step, *(np.empty(0, np.int64),) * 3)  # of the step alone: the kernel looks at lists
     base, streams = _together(arrays)
     defines = {"GRID": GRID, "TAU_BASE": TAU_BASE, "TAU_CODES": TAU_CODES}
@@ -171,8 +150,8 @@ def decoded_on(
             defines,
             n_lists=n_lists,
             how=up(how, "u1", "how lists are written"),
-            starts=up(places.starts, "i4", "list offsets"),
-            places=up(places.table, "i4", "places"),
+            starts=up(starts, "i4", "list offsets"),
+            places=up(places, "i4", "places"),
             pitches=up(pitches, "f8", "pitches"),
             data=up(base, "u1", "arrays of a step"),
             streams=up(streams, "u4", "places of arrays"),
@@ -197,106 +176,52 @@ def decoded_on(
         if runtime.download(trouble)[0]:
             return None
         packing = Packed8(
-            step,
-            runtime.download(origins),
-            runtime.download(strides),
-            runtime.download(words)[:n],
+            step, runtime.download(origins), runtime.download(strides), runtime.download(words)[:n]
         )
         return PackedStep(
-            places.starts, packing, runtime.download(entries)[:n], tables, samples, window_size
+            starts, packing, runtime.download(entries)[:n], tables, samples, window_size
         )
 
 
-class _Places:
-    """Where lists begin among their supersegments, and in a frame's arrays."""
-
-    starts: NDArray[np.int32]
-    table: NDArray[np.int32]
-    written: NDArray[np.bool_]  # lists that are written and not empty
-
-    @classmethod
-    def of(cls, arrays: Arrays, way: NDArray[Any], old: PackedStep | None) -> _Places | None:
-        """Return them; None where the arrays are not as many as they should be."""
-        places = cls()
-        coded = way != SAME
-        given = arrays["counts"]
-        if given.dtype.kind != "u" or given.itemsize > 4 or given.max(initial=0) >= _TAME:
-            return None
-        if len(given) != np.count_nonzero(coded):
-            return None
-        counts = np.zeros(len(way), np.int32)
-        counts[coded] = given
-        if old is not None:
-            before = np.diff(old.offsets)
-            placed = way >= PLACED
-            if not (before[placed] > 0).all():
-                return None
-            counts = np.where(placed, unfolded(counts) + before, np.where(coded, counts, before))
-        if len(counts) and not (counts.min() >= 0 and counts.max() <= 1 << 16):
-            return None
-        if counts.sum(dtype=np.int64) >= 1 << 28:  # offsets are of 32 bits
-            return None
-        places.written = coded & (counts > 0)
-        keeps = (way == KEPT) & (counts > 0)
-        places.starts = _sums(counts)
-        table = aligned_empty((len(way), _PLACES), np.int32)
-        rows = _sums(np.where(coded, counts, 0))
-        n_rows = int(rows[-1])
-        occupied = _sums(places.written)
-        table[:, 0], table[:, 2] = rows[:-1], occupied[:-1]
-        if any(len(arrays[name]) != n_rows for name in _STREAMS[2:4] + _STREAMS[5:]):
-            return None
-        if len(arrays["end"]) != occupied[-1]:
-            return None
-        table[:, 1], table[:, 3:] = rows[:-1], 0
-        n_new = n_rows
-        if old is not None:
-            bits = _sums(np.where(keeps, counts, 0))
-            there = _sums(np.where(keeps, np.diff(old.offsets), 0))
-            kept = _bits(arrays["kept"], int(bits[-1]))
-            if kept is None or _bits(arrays["kept_there"], int(there[-1])) is None:
-                return None
-            before_it = _sums(kept)
-            table[:, 1] -= before_it[bits[:-1]]
-            table[:, 3], table[:, 4] = bits[:-1], there[:-1]
-            n_new -= int(before_it[-1])
-        if len(arrays["gap"]) != n_new or len(arrays["length"]) != n_new:
-            return None
-        places.table = table
-        return places
-
-
-def _left(
-    arrays: Arrays, way: NDArray[Any], places: _Places, *, plain: bool
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]] | None:
-    """Return what is left of the origins and strides of lists, or all of them; and shifts."""
-    placed = way[places.written] >= PLACED
-    n = len(placed)
-    origin, stride = arrays["origin"], arrays["stride"]
-    if not (len(origin) == len(stride) == n and origin.dtype.kind == stride.dtype.kind == "u"):
+def _places(arrays: Arrays, lists: Lists, old: Integers | None) -> NDArray[np.int32] | None:
+    """Return where lists begin in a frame's arrays; None where these are not as many."""
+    counts, coded = lists.counts, lists.coded
+    if counts.sum() >= 1 << 28:  # offsets are of 32 bits
         return None
-    shift = np.zeros(n, np.int64)
-    if placed.any():
-        given = arrays["shift"]
-        if len(given) != np.count_nonzero(placed) or given.dtype.kind != "u":
-            return None
-        shift[placed] = unfolded(given.astype(np.int64))
-    origins, strides = (unfolded(values.astype(np.int64)) for values in (origin, stride))
-    origins[~placed] = np.cumsum(origins[~placed])
+    rows, occupied = _sums(np.where(coded, counts, 0)), _sums(coded & (counts > 0))
+    n_rows = n_new = int(rows[-1])
+    if any(len(arrays[name]) != n_rows for name in _STREAMS[2:4] + _STREAMS[5:]):
+        return None
+    if len(arrays["end"]) != occupied[-1]:
+        return None
+    table = aligned_empty((len(counts), _PLACES), np.int32)
+    table[:, 0], table[:, 1], table[:, 2], table[:, 3:] = rows[:-1], rows[:-1], occupied[:-1], 0
+    if old is not None:
+        keeps = (lists.way == KEPT) & (counts > 0)
+        bits, there = _sums(np.where(keeps, counts, 0)), _sums(np.where(keeps, old, 0))
+        before_it = _sums(lists.kept)
+        table[:, 1] -= before_it[bits[:-1]]
+        table[:, 3], table[:, 4] = bits[:-1], there[:-1]
+        n_new -= int(before_it[-1])
+    return table if len(arrays["gap"]) == len(arrays["length"]) == n_new else None
+
+
+def _left(arrays: Arrays, lists: Lists, *, plain: bool) -> list[NDArray[np.int32]] | None:
+    """Return what is left of the origins and strides of lists, or all of them; and shifts."""
+    alone, n = ~lists.placed[lists.occupied], len(lists.occupied)
+    origins, strides = (arrays[name].astype(np.int64) for name in ("origin", "stride"))
+    if not len(origins) == len(strides) == n:
+        return None
+    origins, strides = unfolded(origins), unfolded(strides)
+    origins[alone] = np.cumsum(origins[alone])
     if plain:
-        strides[~placed] = np.cumsum(strides[~placed])
-    found = (origins, strides, shift)
-    for values, limit in zip(found, _LIMITS, strict=True):
-        if np.abs(values).max(initial=0) >= limit:
-            return None
-    left = tuple(aligned_empty(n, np.int32) for _ in found)
-    for values, given in zip(left, found, strict=True):
+        strides[alone] = np.cumsum(strides[alone])
+    if max(np.abs(origins).max(initial=0), np.abs(strides).max(initial=0)) >= 1 << 28:
+        return None
+    left = [aligned_empty(n, np.int32) for _ in range(3)]
+    for values, given in zip(left, (origins, strides, lists.shift), strict=True):
         values[...] = given
-    return left  # type: ignore[return-value]
-
-
-#: Of origins and strides, and of shifts: those of ``differences``.
-_LIMITS = (1 << 28, 1 << 28, 1 << 20)
+    return left
 
 
 def _together(arrays: Arrays) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:
@@ -320,9 +245,3 @@ def _sums(values: NDArray[Any]) -> NDArray[np.int32]:
     sums[0] = 0
     np.cumsum(values, out=sums[1:], dtype=np.int32)
     return sums
-
-
-def _bits(packed: NDArray[Any], n: int) -> NDArray[np.uint8] | None:
-    if packed.dtype != np.uint8 or len(packed) != -(-n // 8):
-        return None
-    return np.unpackbits(packed, count=n)

@@ -46,24 +46,6 @@ class Player:
     that is slower than the rate, it takes the steps that will be due when they are ready, so that
     what is shown is late by a frame at most. Decoded steps are kept as long as they fit in
     :attr:`memory`; those that come last of all are let go of first.
-
-    Parameters
-    ----------
-    series : VDISeries
-        What is shown, from its first step on.
-    clock : callable, optional
-        Returns seconds.
-
-    Attributes
-    ----------
-    series : VDISeries
-        As above.
-    dropped : int
-        Steps that were left out since :meth:`play`.
-    device : optional
-        Where steps are drawn, see :func:`pyvista_vdi.list_devices`.
-    memory : float
-        Bytes that decoded steps may take, on the device and beside it; a few are always kept.
     """
 
     def __init__(self, series: VDISeries, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -119,13 +101,7 @@ class Player:
 
     @property
     def vdi(self) -> VDI:
-        """The step that is shown, decoded now if it is not ready.
-
-        Raises
-        ------
-        VDIError
-            If it cannot be decoded.
-        """
+        """The step that is shown, decoded now if it is not ready."""
         step = self.step
         with self._lock:
             known = self._instead or self._ready.get(step)
@@ -153,22 +129,7 @@ class Player:
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: float | str | None = None
     ) -> None:
-        """Go on from the step that is shown, or from the first where the last one is.
-
-        Parameters
-        ----------
-        rate : float
-            Steps per second, more than 0. Time begins with the next frame.
-        loop : bool
-            Whether the first step follows the last one; otherwise that is the end.
-        memory_limit : float or str, optional
-            Another :attr:`memory`, bytes, or as ``"2 GiB"``.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the rate is none, or the limit no number of bytes.
-        """
+        """Go on from the step that is shown, or from the first where the last one is."""
         rate_ = as_float(rate)
         if isinstance(rate, bool) or not 0 < rate_ < math.inf:
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
@@ -189,13 +150,7 @@ class Player:
         self._playing = False
 
     def advance(self) -> bool:
-        """Show the last step that is due and ready; whether it is another one.
-
-        Raises
-        ------
-        VDIError
-            If a step cannot be decoded: once for each, and playing goes on without it.
-        """
+        """Show the last step that is due and ready; whether it is another one."""
         if not self._playing:
             return False
         if self._since is None:

@@ -10,10 +10,11 @@ import zlib
 from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from threading import Lock
-from typing import Any, BinaryIO, Generic, NoReturn, TypeVar
+from typing import Any, BinaryIO, Generic, NamedTuple, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,6 @@ from pyvista_vdi.extensions.series import layout
 from pyvista_vdi.extensions.series.codes import ENTRIES, Samples, Tables
 from pyvista_vdi.extensions.series.differences import Stepped, decoded
 from pyvista_vdi.extensions.series.frames import Frames, found_between, indexed
-from pyvista_vdi.extensions.series.info import SeriesInfo
-from pyvista_vdi.extensions.series.layout import FrameHeader
 from pyvista_vdi.extensions.series.on_device import decoded_on, runtime_for_decoding
 from pyvista_vdi.io.files import opened
 from pyvista_vdi.io.vdi_file import reader as vdi_reader
@@ -65,6 +64,27 @@ _CONTRADICTIONS = (
 )
 
 
+@dataclass(frozen=True)
+class SeriesInfo:
+    """What a .vdis file says about itself."""
+
+    path: Path
+    format_version: int
+    written_by: str  # program and version
+    camera: Camera  # the first step's generating view V_O
+    window_size: tuple[int, int]  # the first step's lists along each edge of the viewport
+    bounds: tuple[float, ...]  # the first step's, in the model frame
+    metadata: dict[str, Any]  # what made the first step
+    times: tuple[float, ...]  # of the steps
+    step_bytes: tuple[int, ...]  # what each step takes
+    keys: tuple[int, ...]  # steps that need no other
+    precision: str
+    codec: str
+    tolerance: float
+    closed: bool  # whether the writer came to its end: otherwise it is still at work, or was killed
+    file_bytes: int
+
+
 _Value = TypeVar("_Value")
 
 
@@ -91,19 +111,18 @@ class _Recent(Generic[_Value]):
         return value
 
 
+class _Described(NamedTuple):
+    """What a step's description says, checked."""
+
+    camera: Camera
+    window_size: tuple[int, int]
+    bounds: tuple[float, ...]
+    metadata: dict[str, Any]
+    depth_origin: float
+
+
 class StepsReader(Sequence[VDI]):
-    """The steps of a .vdis file: read and decoded when they are asked for, from any thread.
-
-    Parameters
-    ----------
-    path : path-like
-        The file, or a page with one.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished step.
-    """
+    """The steps of a .vdis file: read and decoded when they are asked for, from any thread."""
 
     _MAGIC, _PART = layout.MAGIC, "step"
     _FOREIGN = (
@@ -127,7 +146,7 @@ class StepsReader(Sequence[VDI]):
         self._steps = _Recent[Stepped](_KEPT_STEPS)
         self._vdis = _Recent[VDI](self._KEPT_VDIS)
         self._contents = _Recent[memoryview](1)  # of a frame, while it is looked at
-        self._descriptions: dict[int, dict[str, Any]] = {}
+        self._descriptions: dict[int, _Described] = {}
         #: How many steps have been decoded so far.
         self.n_decoded = 0
         try:
@@ -151,16 +170,6 @@ class StepsReader(Sequence[VDI]):
             raise
 
     @property
-    def head(self) -> dict[str, Any]:
-        """What the file's head says."""
-        return self._head
-
-    @property
-    def frames(self) -> list[tuple[int, FrameHeader]]:
-        """Where each step's frame begins, and its header."""
-        return self._frames
-
-    @property
     def times(self) -> tuple[float, ...]:
         """The steps' times."""
         return tuple(header.time for _, header in self._frames)
@@ -168,17 +177,17 @@ class StepsReader(Sequence[VDI]):
     @property
     def camera(self) -> Camera:
         """The first step's."""
-        return self.info().camera
+        return self._described(0).camera
 
     @property
     def window_size(self) -> tuple[int, int]:
         """The first step's."""
-        return self.info().window_size
+        return self._described(0).window_size
 
     @property
     def bounds(self) -> tuple[float, ...]:
         """The first step's."""
-        return self.info().bounds
+        return self._described(0).bounds
 
     def __len__(self) -> int:
         return len(self._frames)
@@ -192,15 +201,15 @@ class StepsReader(Sequence[VDI]):
 
     def info(self) -> SeriesInfo:
         """Return what the file says about itself, without the steps' arrays."""
-        camera, window_size, bounds, metadata, _ = self._checked(0)
+        first = self._described(0)
         return SeriesInfo(
             path=self._path,
             format_version=self._version,
             written_by=str(self._head.get("written_by", "")),
-            camera=camera,
-            window_size=window_size,
-            bounds=bounds,
-            metadata=metadata,
+            camera=first.camera,
+            window_size=first.window_size,
+            bounds=first.bounds,
+            metadata=first.metadata,
             times=self.times,
             step_bytes=tuple(layout.HEADER_BYTES + h.n_bytes for _, h in self._frames),
             keys=tuple(i for i, (_, h) in enumerate(self._frames) if h.by < 0),
@@ -284,35 +293,27 @@ class StepsReader(Sequence[VDI]):
             source = i
             while self._frames[source][1].kind == layout.AGAIN:
                 source = self._place_of(self._frames[source][1].by, header.number)
-            camera, window_size, bounds, metadata, origin = self._checked(i)
+            of = self._described(i)
             if self._frames[source][1].kind == layout.VDI_FILE:
                 self.n_decoded += 1
                 vdi = vdi_reader.read(self._path, stream=self._file_in(source))
                 if source == i:
                     return vdi
+                arrays = (vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth)
                 again = VDI(
-                    camera,
-                    window_size,
-                    vdi.offsets,
-                    vdi.front,
-                    vdi.back,
-                    vdi.color,
-                    vdi.optical_depth,
-                    bounds,
-                    depth_origin=origin,
-                    metadata=metadata,
+                    *(of.camera, of.window_size, *arrays, of.bounds),
+                    depth_origin=of.depth_origin,
+                    metadata=of.metadata,
                 )
                 again.packing = vdi.packing
                 return again
-            offsets, packing = self._step(source).packed()
             return VDI._of_packing(
-                camera,
-                window_size,
-                offsets,
-                packing,
-                bounds,
-                depth_origin=origin,
-                metadata=metadata,
+                of.camera,
+                of.window_size,
+                *self._step(source).packed(),
+                of.bounds,
+                depth_origin=of.depth_origin,
+                metadata=of.metadata,
             )
         except (VDIFileError, Cancelled):
             raise
@@ -347,7 +348,7 @@ class StepsReader(Sequence[VDI]):
                 f"{self._PART} {header.number} is none that others are written by"
             )
         text, arrays = layout.read_text(data)[0], layout.read_arrays(data, self._codec)
-        window_size = self._checked(i)[1]
+        window_size = self._described(i).window_size
         if before is None:
             samples, tables = _samples(text["samples"]), _tables(arrays)
         else:
@@ -376,55 +377,42 @@ class StepsReader(Sequence[VDI]):
             )
         return k
 
-    def _described(self, i: int) -> dict[str, Any]:
+    def _described(self, i: int) -> _Described:
         """Return a step's description: its own, or that of the step that it is written by."""
         passed: list[int] = []
-        found: Any
         while i not in self._descriptions:
             passed.append(i)
             header = self._frames[i][1]
+            part = f"{self._PART} {header.number}"
             try:
                 if header.kind == layout.VDI_FILE:
-                    found = self._of_file(i)
-                else:
-                    found = layout.read_text(self._content(i))[0].get("description")
+                    info = vdi_reader.read_info(self._path, stream=self._file_in(i))
+                    self._descriptions[i] = _Described(
+                        *(info.camera, info.window_size, info.bounds, info.metadata),
+                        info.depth_origin,
+                    )
+                    break
+                found = layout.read_text(self._content(i))[0].get("description")
             except VDIFileError:
                 raise
             except _CONTRADICTIONS as error:
-                self._refuse(f"{self._PART} {header.number}: {error}")
-            if found is not None:
-                if not isinstance(found, dict):
-                    self._refuse(f"{self._PART} {header.number} is not described")
-                self._descriptions[i] = found
-            elif header.by < 0:
-                self._refuse(f"{self._PART} {header.number} is not described")
-            else:
+                self._refuse(f"{part}: {error}")
+            if found is None and header.by >= 0:
                 i = self._place_of(header.by, header.number)
-        found = self._descriptions[i]
+            elif not isinstance(found, dict):
+                self._refuse(f"{part} is not described")
+            else:
+                self._descriptions[i] = self._checked(found, part)
         for k in passed:
-            self._descriptions[k] = found
-        return found
+            self._descriptions[k] = self._descriptions[i]
+        return self._descriptions[i]
 
-    def _of_file(self, i: int) -> dict[str, Any]:
-        """Return the description of a frame that holds a whole file."""
-        info = vdi_reader.read_info(self._path, stream=self._file_in(i))
-        return {
-            "window_size": info.window_size,
-            "camera": info.camera.to_dict(),
-            "bounds": info.bounds,
-            "depth_origin": info.depth_origin,
-            "metadata": info.metadata,
-        }
-
-    def _checked(
-        self, i: int
-    ) -> tuple[Camera, tuple[int, int], tuple[float, ...], dict[str, Any], float]:
-        """Return a step's camera, window, bounds, metadata and depth origin."""
-        found = self._described(i)
+    def _checked(self, found: dict[str, Any], part: str) -> _Described:
+        """Return a frame's description."""
         try:
             if not isinstance(found["metadata"], dict):
                 raise TypeError("metadata are a dictionary")
-            return (
+            return _Described(
                 Camera.from_dict(found["camera"]),
                 check_window_size(found["window_size"]),
                 tuple(number(bound) for bound in found["bounds"]),
@@ -432,9 +420,7 @@ class StepsReader(Sequence[VDI]):
                 number(found["depth_origin"]),
             )
         except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
-            self._refuse(
-                f"{self._PART} {self._frames[i][1].number} is described wrongly: {error!r}"
-            )
+            self._refuse(f"{part} is described wrongly: {error!r}")
 
 
 def _samples(found: Any) -> Samples | None:

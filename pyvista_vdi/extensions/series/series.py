@@ -52,10 +52,7 @@ class VDISeries(VDICollection):
     times: tuple[float, ...]
 
     def __init__(
-        self,
-        steps: Sequence[VDI],
-        times: Sequence[float],
-        volumes: Sequence[Any] | None = None,
+        self, steps: Sequence[VDI], times: Sequence[float], volumes: Sequence[Any] | None = None
     ) -> None:
         self.times = checked_times(times)
         if not isinstance(steps, Sequence):

@@ -6,6 +6,7 @@ import io
 import os
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -73,10 +74,11 @@ def write_all(
     steps: Sequence[VDI],
     times: Sequence[float],
     progress: Progress | None,
+    **head: Any,
 ) -> int:
-    """Write a whole file to a stream; return how many bytes show its first step."""
+    """Write a whole file, with what its head says; return how many bytes show its first step."""
     done, first = Pieces(progress, len(times)), 0
-    writer.begin(stream)
+    writer.begin(stream, **head)
     for i, time in enumerate(times):
         writer.write(stream, steps[i], time)
         first = first or stream.tell()
@@ -86,21 +88,10 @@ def write_all(
 
 
 class StepsWriter:
-    """Writes frames to a stream, and remembers the steps that others may be written by.
-
-    Parameters
-    ----------
-    precision, tolerance, key_every, compression, level
-        As for :class:`SeriesWriter`.
-    """
+    """Writes frames to a stream, and remembers the steps that others may be written by."""
 
     def __init__(
-        self,
-        precision: str,
-        tolerance: float,
-        key_every: int,
-        compression: str,
-        level: int | None,
+        self, precision: str, tolerance: float, key_every: int, compression: str, level: int | None
     ) -> None:
         self._precision = check_precision(precision)
         if isinstance(tolerance, bool) or not isinstance(tolerance, int | float):
@@ -155,7 +146,7 @@ class StepsWriter:
             key_every=self._key_every,
             codec=self._codec,
         )
-        self._entries, self._last_time = list(begun.entries), begun.last_time
+        self._entries, self._last_time = begun.entries, begun.times[-1]
 
     def checked_time(self, time: float | None) -> float:
         """Return the next step's time, or raise InvalidArgumentError."""
@@ -172,13 +163,7 @@ class StepsWriter:
         new = self._written(vdi.with_precision(self._precision))
         number = len(self._entries)
         header = layout.FrameHeader(
-            layout.STEP,
-            number,
-            new.kind,
-            new.by,
-            time,
-            len(new.content),
-            zlib.crc32(new.content),
+            layout.STEP, number, new.kind, new.by, time, len(new.content), zlib.crc32(new.content)
         ).to_bytes()
         begin = stream.tell()
         stream.write(header + new.content)
@@ -278,26 +263,29 @@ class StepsWriter:
             text["step"] = step.codes.step
             if old is None:
                 text["samples"] = step.samples and step.samples.coefficients
-        found = _Known(new.number, new.vdi, new.description)
-        found.kind, found.step = kind, step
-        found.by = -1 if old is None else old.number
-        found.depth = 1 if old is None else old.depth + (kind != layout.AGAIN)
         codec = "none" if kind == layout.VDI_FILE else self._codec  # that is compressed already
-        found.content = layout.Content(text, arrays).to_bytes(codec, self._level)
-        return found
+        return replace(
+            new,
+            kind=kind,
+            by=-1 if old is None else old.number,
+            depth=1 if old is None else old.depth + (kind != layout.AGAIN),
+            step=step,
+            content=layout.content_bytes(text, arrays, codec, self._level),
+        )
 
 
+@dataclass(eq=False)
 class _Known:
     """A step that was written, or will be."""
 
-    kind = layout.VDI_FILE
-    by = -1
-    depth = 1
-    content = b""
+    number: int
+    vdi: VDI
+    description: dict[str, Any]
+    kind: int = layout.VDI_FILE
+    by: int = -1
+    depth: int = 1
     step: Stepped | None = None
-
-    def __init__(self, number: int, vdi: VDI, description: dict[str, Any]) -> None:
-        self.number, self.vdi, self.description = number, vdi, description
+    content: bytes = b""
 
     def goes_with(self, other: _Known) -> bool:
         """Whether both have the same lists and depths."""

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Sequence
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming
 from pyvista_vdi.extensions.series import layout
-from pyvista_vdi.extensions.series.continuing import begun
+from pyvista_vdi.extensions.series.continuing import Begun
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
+from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from pyvista_vdi.extensions.series.keywords import WriterOptions
 
 
 class SeriesWriter:
@@ -76,18 +81,18 @@ class SeriesWriter:
     def __init__(
         self,
         path: str | os.PathLike[str],
-        camera: Any = None,
-        window_size: Sequence[int] | None = None,
+        camera: CameraLike | None = None,
+        window_size: WindowSize | None = None,
         *,
         precision: str = "8-byte",
         tolerance: float = 0.0,
         key_every: int = KEY_EVERY,
         compression: str = "zstd",
         level: int | None = None,
-        device: Any = None,
+        device: DeviceLike | None = None,
         append: bool = False,
         overwrite: bool = False,
-        **options: Any,
+        **options: Unpack[WriterOptions],
     ) -> None:
         self._make: StepMaker | None = None
         if (camera is None) != (window_size is None) or (options and camera is None):
@@ -101,7 +106,7 @@ class SeriesWriter:
             )
         self._steps = StepsWriter(precision, tolerance, key_every, compression, level)
         self.path = check_writable(with_suffix(as_path(path), (layout.SUFFIX,), "a series"))
-        self._begun = begun(self.path, append, overwrite)
+        self._begun = Begun.of(self.path, append, overwrite)
         if self._begun is None:
             with whole_file(self.path) as stream:
                 self._steps.begin(stream)

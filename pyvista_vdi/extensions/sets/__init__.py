@@ -19,14 +19,14 @@ EXTENSION = Extension(
         ),
     ),
     shown={
-        "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput",
+        "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput"
     },
     verbs=(
         Verb(
             "set",
             "write VDIs of a volume from as many sides as pictures from everywhere need",
             "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
-            "pyvista_vdi.extensions.sets.options:add_options",
+            "pyvista_vdi.extensions.sets.cli:add_options",
             "pyvista_vdi.extensions.sets.cli:generate",
         ),
     ),

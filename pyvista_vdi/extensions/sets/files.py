@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.extensions.series.info import SeriesInfo
 from pyvista_vdi.extensions.series.layout import index_bytes
-from pyvista_vdi.extensions.series.reader import StepsReader
+from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
 from pyvista_vdi.extensions.series.steps_writer import StepsWriter
+from pyvista_vdi.extensions.series.steps_writer import write_all as write_parts
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import number
@@ -29,18 +29,7 @@ MAGIC = b"\x89VDIV\r\n\x1a"
 
 
 class SetReader(StepsReader):
-    """The VDIs of a .vdiset file: read and decoded when they are asked for, from any thread.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-
-    Raises
-    ------
-    VDIFileError
-        As for :class:`~pyvista_vdi.extensions.series.reader.StepsReader`.
-    """
+    """The VDIs of a .vdiset file: read and decoded when they are asked for, from any thread."""
 
     _MAGIC, _PART = MAGIC, "view"
     _FOREIGN = (
@@ -99,54 +88,34 @@ def write_all(
     stream: BinaryIO, writer: StepsWriter, vdi_set: VDISet, progress: Progress | None = None
 ) -> int:
     """Write a whole file to a stream; return how many bytes show its first VDI."""
-    views, first = list(vdi_set.cameras), 0
-    done = Pieces(progress, len(views))
-    _begin(writer, stream, vdi_set)
-    if stream.tell() > MAX_DESCRIPTION_BYTES:
-        raise InvalidVDIError(f"{len(views)} views are more than a file's head can hold")
-    for i in range(len(views)):
-        writer.write(stream, vdi_set[i], float(i))
-        first = first or stream.tell()
-        done()
-    writer.finish(stream)
-    return first
+    head = _head(vdi_set)
+    n = len(head["views"])
+    if bytes_around(vdi_set) - index_bytes(n) > MAX_DESCRIPTION_BYTES:
+        raise InvalidVDIError(f"{n} views are more than a file's head can hold")
+    return write_parts(stream, writer, vdi_set, range(n), progress, **head)
 
 
 def bytes_around(vdi_set: VDISet) -> int:
     """Return the bytes that a set's file has beside the frames of its VDIs."""
     stream = io.BytesIO()
-    _begin(StepsWriter("8-byte", 0.0, 1, "zstd", 1), stream, vdi_set)
+    StepsWriter("8-byte", 0.0, 1, "zstd", 1).begin(stream, **_head(vdi_set))
     return stream.tell() + index_bytes(len(vdi_set.cameras))
 
 
-def _begin(writer: StepsWriter, stream: BinaryIO, vdi_set: VDISet) -> None:
-    """Write the head of a set's file."""
-    writer.begin(
-        stream,
-        MAGIC,
-        FORMAT_NAME,
-        views=[view.to_dict() for view in vdi_set.cameras],
-        picture_size=list(vdi_set.window_size),
-        bounds=list(vdi_set.bounds),
-        about=vdi_set.about,
-    )
+def _head(vdi_set: VDISet) -> dict[str, Any]:
+    """Return what the head of a set's file says."""
+    return {
+        "magic": MAGIC,
+        "name": FORMAT_NAME,
+        "views": [view.to_dict() for view in vdi_set.cameras],
+        "picture_size": list(vdi_set.window_size),
+        "bounds": list(vdi_set.bounds),
+        "about": vdi_set.about,
+    }
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISet:
-    """Read a set from a .vdiset file; VDIs are decoded when they are asked for.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    progress : callable, optional
-        Called with 1: opening reads no VDI.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version or damaged, or has no finished view.
-    """
+    """Read a set from a .vdiset file; VDIs are decoded when they are asked for."""
     views = SetReader(path)
     Pieces(progress, 1)()
     return VDISet(

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidArgumentTypeError,
-)
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.extensions.sets.placing import Placing, Progress
 from pyvista_vdi.extensions.sets.sphere import orbit, spiral, spread
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
@@ -21,12 +18,14 @@ from pyvista_vdi.model.checks import as_float, check_callback
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.metrics import SSIM_WINDOW
-from pyvista_vdi.model.options import (
-    GENERATION_NAMES,
-    GenerationOptions,
-    check_max_supersegments,
-)
+from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions, check_max_supersegments
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.types import CameraLike, DeviceLike, VolumeLike, WindowSize
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from pyvista_vdi.extensions.series.keywords import SetOptions
 
 #: What a set takes of generation: its precision is always "8-byte".
 _OPTIONS = tuple(name for name in GENERATION_NAMES if name != "precision")
@@ -42,19 +41,19 @@ VIEW_CONE = 30.0
 
 
 def generate_set(
-    volume: Any,
-    views: Any = "sphere",
-    window_size: Sequence[int] = (640, 360),
+    volume: VolumeLike,
+    views: str | Iterable[CameraLike] = "sphere",
+    window_size: WindowSize = (640, 360),
     *,
-    camera: Any = None,
+    camera: CameraLike | None = None,
     target_ssim: float = TARGET_SSIM,
     max_bytes: int | None = None,
     max_views: int = MOST_VIEWS,
     lists: float | None = None,
     max_supersegments: int | None = None,
-    device: Any = None,
+    device: DeviceLike | None = None,
     progress: Progress | None = None,
-    **options: Any,
+    **options: Unpack[SetOptions],
 ) -> VDISet:
     """Generate VDIs of a volume from as many views as pictures from all sides need.
 
@@ -141,21 +140,15 @@ def generate_set(
             f"a window of {size[0]} x {size[1]} pixels has no SSIM to place views by: it takes "
             f"{SSIM_WINDOW} along each edge"
         )
-    looks = Classification.composited(
-        {n: v for n, v in options.items() if n not in _OPTIONS}, "generate_set", _OPTIONS
-    )
+    given: dict[str, Any] = dict(options)
+    chosen = {name: given.pop(name) for name in _OPTIONS if name in given}
+    looks = Classification.composited(given, "generate_set", _OPTIONS)
     read = as_volume(volume, looks.scalars, looks.preference)
     maker = ViewMaker(
         read,
         looks.transfer_function_of(read),
         size,
-        GenerationOptions(
-            **{
-                "view_cone": VIEW_CONE,
-                "precision": "8-byte",
-                **{n: v for n, v in options.items() if n in _OPTIONS},
-            }
-        ),
+        GenerationOptions(**{"view_cone": VIEW_CONE, "precision": "8-byte", **chosen}),
         {"classification": looks.describe(), "scalars": read.name},
         device,
     )

@@ -12,10 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import (
-    Cancelled,
-    warn_external,
-)
+from pyvista_vdi.errors import Cancelled, warn_external
 from pyvista_vdi.extensions.sets.files import bytes_around
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.sets.view_maker import FINER, SetSettings, ViewMaker, file_bytes
@@ -258,10 +255,7 @@ class Placing:
     ) -> dict[str, Any]:
         return {
             "target_ssim": self._goal,
-            "chosen": {
-                "lists": settings.lists,
-                "max_supersegments": settings.max_supersegments,
-            },
+            "chosen": {"lists": settings.lists, "max_supersegments": settings.max_supersegments},
             "reached": {
                 "directions": len(ssim),
                 "least": round(float(ssim.min()), 5),

@@ -28,17 +28,6 @@ class SetInput(Input):
     between two frames. Another thread decodes what is nearest to the view, and brings it to the
     device, as far as there is memory; a third makes VDIs of views that do not reach the set's
     target.
-
-    Parameters
-    ----------
-    vdi_set : VDISet
-        What is shown.
-
-    Attributes
-    ----------
-    memory : float
-        Bytes that decoded VDIs may take, on the device and beside it; those that are drawn are
-        always kept.
     """
 
     collection: VDISet
@@ -145,13 +134,7 @@ class SetInput(Input):
             self._weights = self.collection.weights(view)
 
     def advance(self) -> bool:
-        """Add what was made to the set; whether there is another VDI to be drawn.
-
-        Raises
-        ------
-        VDIError
-            What made it fail.
-        """
+        """Add what was made to the set; whether there is another VDI to be drawn."""
         made = self._grower.take()
         for vdi in made or ():
             self.collection.add(vdi)

@@ -36,27 +36,14 @@ _MEDIUM = ("sample_distance", "lights", "ambient_occlusion", "memory_limit")
 
 @dataclass(frozen=True)
 class SetSettings:
-    """How the VDIs of a set are made.
+    """How the VDIs of a set are made."""
 
-    Attributes
-    ----------
-    lists : float
-        Lists along an edge over pixels of the pictures.
-    max_supersegments : int
-        Longest list.
-    views : int
-        V_Os to begin with.
-    nbytes : float
-        Expected bytes of their VDIs; NaN where nothing was measured.
-    growth : (float, float)
-        Lists along an edge, and the longest list, of a V_O that comes to help over the others': 1
-        where the user has said what they are.
-    """
-
-    lists: float
-    max_supersegments: int
-    views: int
-    nbytes: float = math.nan
+    lists: float  # lists along an edge over pixels of the pictures
+    max_supersegments: int  # longest list
+    views: int  # V_Os to begin with
+    nbytes: float = math.nan  # expected bytes of their VDIs; NaN where nothing was measured
+    #: Lists along an edge, and the longest list, of a V_O that comes to help over the others': 1
+    #: where the user has said what they are
     growth: tuple[float, float] = (FINER, FINER)
 
     def finer(self) -> SetSettings:
@@ -67,21 +54,7 @@ class SetSettings:
 
 
 class ViewMaker:
-    """Makes VDIs of one volume that cover all of it, for pictures of one window, and judges them.
-
-    Parameters
-    ----------
-    volume, transfer_function
-        What is seen.
-    window_size : (int, int)
-        Of the pictures.
-    options : GenerationOptions
-        How it is made but for its lists.
-    metadata : dict
-        Entries for the VDIs' metadata.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    """
+    """Makes VDIs that cover all of one volume, for pictures of one window, and judges them."""
 
     def __init__(
         self,

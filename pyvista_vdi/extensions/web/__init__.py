@@ -31,7 +31,7 @@ EXTENSION = Extension(
             "serve",
             "serve VDIs of a volume to web pages, in which it is turned while it stays here",
             "pyvista-vdi serve knee.nrrd --cmap bone --opacity sigmoid_6",
-            "pyvista_vdi.extensions.web.options:add_options",
+            "pyvista_vdi.extensions.web.cli:add_options",
             "pyvista_vdi.extensions.web.cli:serve",
         ),
     ),

@@ -61,25 +61,13 @@ class _Module(NamedTuple):
 def viewer_script(
     *, scene: bool = False, remote: bool = False, series: bool = False, module: bool = False
 ) -> str:
-    """Return the viewer as one script.
+    """Return the viewer as one script, ASCII or UTF-8 text that may stand in a ``<script>``.
 
-    Parameters
-    ----------
-    scene : bool
-        Whether it draws meshes, lines and text beside VDIs.
-    remote : bool
-        Whether it can be fed by ``pyvista-vdi serve``.
-    series : bool
-        Whether it plays series, and reads what zstd has compressed. Otherwise the names that
-        these modules export are null.
-    module : bool
-        Whether names stay in sight of what is written behind the script: for an ES module. By
-        default the script is a function that is called, and shows nothing but its element.
-
-    Returns
-    -------
-    str
-        ASCII or UTF-8 text that may stand in a ``<script>``.
+    ``scene``: it draws meshes, lines and text beside VDIs. ``remote``: it can be fed by
+    ``pyvista-vdi serve``. ``series``: it plays series, and reads what zstd has compressed;
+    otherwise the names that these modules export are null. ``module``: names stay in sight of
+    what is written behind the script, for an ES module; by default it is a function that is
+    called, and shows nothing but its element.
     """
     folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
     sources = {
@@ -97,24 +85,9 @@ def viewer_script(
 
 
 def bundled(sources: Mapping[str, str], entries: Iterable[str]) -> str:
-    """Return modules as one script.
+    """Return modules, and what they import, as one script without comments and indentation.
 
-    Parameters
-    ----------
-    sources : mapping of str to str
-        Texts of modules by their files' names.
-    entries : iterable of str
-        Those that are wanted; they bring what they import.
-
-    Returns
-    -------
-    str
-        The script, without comments and indentation.
-
-    Raises
-    ------
-    ValueError
-        If a module is not written as the head of this file asks.
+    Raises ValueError if one is not written as the head of this file asks.
     """
     if SPAWN in sources:
         sources = {**sources, SPAWN: _SPAWN_BUNDLED}

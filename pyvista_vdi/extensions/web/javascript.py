@@ -42,13 +42,7 @@ class Token(NamedTuple):
 
 
 def tokens_of(name: str, text: str) -> list[Token]:
-    """Return the tokens of a module, between two semicolons, without comments.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be told which they are.
-    """
+    """Return the tokens of a module, between two semicolons, without comments."""
     tokens = [Token("mark", ";", "", 0, False, False)] * 2
     brackets: list[tuple[str, bool, bool, bool, bool]] = []
     whole = inside = False  # whether all in these brackets is in a function; what is here

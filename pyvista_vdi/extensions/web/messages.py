@@ -46,29 +46,15 @@ class Look:
 
 @dataclass(frozen=True)
 class Wish:
-    """What a client wants to see: the last that it has said of everything.
+    """What a client wants to see: the last that it has said of everything."""
 
-    Attributes
-    ----------
-    view : View or None
-        Its camera, and the size of its picture; ``None`` before it has said.
-    moving : bool
-        Whether the view is about to change.
-    look : Look
-        The transfer function.
-    step : int
-        Of the time steps.
-    planes : tuple of tuple of float
-        Clipping planes: origin and normal of each, world coordinates.
-    said : int
-        How many messages the client had said by then. Equal wishes may differ in it.
-    """
-
-    view: View | None = None
-    moving: bool = False
-    look: Look = Look()
-    step: int = 0
+    view: View | None = None  # its camera, and the size of its picture; ``None`` before it has said
+    moving: bool = False  # whether the view is about to change
+    look: Look = Look()  # the transfer function
+    step: int = 0  # of the time steps
+    #: Clipping planes: origin and normal of each, world coordinates
     planes: tuple[tuple[float, ...], ...] = ()
+    #: How many messages the client had said by then. Equal wishes may differ in it
     said: int = field(default=0, compare=False)
 
     @property
@@ -79,29 +65,17 @@ class Wish:
 
 @dataclass(frozen=True)
 class Offer:
-    """What clients may choose from.
+    """What clients may choose from."""
 
-    Attributes
-    ----------
-    steps : int
-        How many time steps there are.
-    cmaps, opacities : tuple of str
-        Names of colour maps and of opacity mappings; empty where the look is fixed.
-    """
-
-    steps: int = 1
+    steps: int = 1  # how many time steps there are
+    #: Names of colour maps and of opacity mappings; empty where the look is fixed
     cmaps: tuple[str, ...] = ()
+    #: Names of colour maps and of opacity mappings; empty where the look is fixed
     opacities: tuple[str, ...] = ()
 
 
 def wish_after(text: str, wish: Wish, offer: Offer) -> Wish:
-    """Return what a client wants after a message of its.
-
-    Raises
-    ------
-    BadMessageError
-        If the text is no message of the protocol, or asks for what is not offered.
-    """
+    """Return what a client wants after a message of its."""
     try:
         message = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:

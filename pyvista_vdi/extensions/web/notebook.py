@@ -18,20 +18,7 @@ _THUMBNAIL = 240
 def mime_bundle(
     vdi: VDI, include: Collection[str] | None = None, exclude: Collection[str] | None = None
 ) -> Any:
-    """Return what IPython shows of a VDI: a viewer and a picture, or what there can be of it.
-
-    Parameters
-    ----------
-    vdi : VDI
-        What to show.
-    include, exclude : collection of str, optional
-        MIME types that are wanted, or are not; IPython looks after them.
-
-    Returns
-    -------
-    dict, or (dict, dict)
-        Data by MIME type, and metadata. Nothing in a terminal, which shows the ``repr`` then.
-    """
+    """Return what IPython shows of a VDI: a viewer and a picture, or what there can be of it."""
     if _in_a_terminal():
         return {}
     try:

@@ -89,32 +89,16 @@ _NO_SCRIPT = (
 
 @dataclass
 class View:
-    """What a viewer in a page shows.
+    """What a viewer in a page shows."""
 
-    Attributes
-    ----------
-    vdi : VDI or None
-        As it is sent; ``None`` if all is in the scene, or it is a series.
-    background : str
-        As CSS has it.
-    still : numpy.ndarray
-        uint8 (H, W, 3), the picture where nothing can be turned.
-    still_size : (int, int)
-        Width and height that it is shown as, or smaller.
-    scene : bytes, optional
-        What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scenes.scene`.
-    attributes : dict of str to str
-        More attributes of the element.
-    series : sequence of bytes
-        Parts of a .vdis file; the first shows its first step. Or those of a .vdiset file.
-    """
-
-    vdi: VDI | None
-    background: str
-    still: NDArray[np.uint8]
-    still_size: Sequence[int]
+    vdi: VDI | None  # as it is sent; ``None`` if all is in the scene, or it is a series
+    background: str  # as CSS has it
+    still: NDArray[np.uint8]  # uint8 (H, W, 3), the picture where nothing can be turned
+    still_size: Sequence[int]  # width and height that it is shown as, or smaller
+    #: What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scenes.scene`
     scene: bytes | None = None
-    attributes: dict[str, str] = field(default_factory=dict)
+    attributes: dict[str, str] = field(default_factory=dict)  # of the element
+    #: Parts of a .vdis file; the first shows its first step. Or those of a .vdiset file
     series: Sequence[bytes] = ()
 
 
@@ -127,58 +111,19 @@ def page(
     level: int | None = None,
     progress: Progress | None = None,
 ) -> bytes:
-    """Return an HTML page that shows a VDI, as large as the window.
+    """Return an HTML page that shows a VDI, as large as the window, behind it an RGB from 0 to 1.
 
-    Parameters
-    ----------
-    vdi : VDI
-        What to show.
-    title : str
-        Of the page.
-    background : (float, float, float)
-        RGB, 0 to 1, behind the VDI.
-    precision : {"exact", "16-byte", "8-byte"}, optional
-        Bytes of a supersegment before they are compressed; ``"8-byte"`` by default.
-    level : int, optional
-        Effort of the compressor (deflate), 1 to 9; 6 by default.
-    progress : callable, optional
-        As for :func:`pyvista_vdi.io.write`.
-
-    Returns
-    -------
-    bytes
-        UTF-8 text.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the background is no colour, or a list is too long for the precision.
+    ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6.
     """
-    sent = vdi.with_precision(precision or "8-byte")
-    percents = " ".join(f"{100 * channel:g}%" for channel in background)
-    still = over_background(_from_generating_view(vdi), background)
-    view = View(sent, f"rgb({percents})", np.rint(still * 255).astype(np.uint8), vdi.picture_size)
+    view = _view_of(vdi, background)
+    view.vdi = vdi.with_precision(precision or "8-byte")
     return assembled([view], title=title, level=level, progress=progress)
 
 
 def assembled(
-    views: Sequence[View],
-    *,
-    title: str,
-    level: int | None = None,
-    progress: Progress | None = None,
+    views: Sequence[View], *, title: str, level: int | None = None, progress: Progress | None = None
 ) -> bytes:
-    """Return a page with one or several viewers.
-
-    Parameters
-    ----------
-    views : sequence of View
-        What they show. :func:`read` gives the first one's VDI back.
-    title : str
-        Of the page.
-    level, progress : optional
-        As for :func:`page`.
-    """
+    """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
     title = html.escape(title)
     has_scene = any(view.scene is not None for view in views)
     has_series = any(view.series for view in views)
@@ -268,19 +213,11 @@ def write_series(
     With ``autoplay`` it plays as soon as it is opened.
     """
     target = Path(os.path.realpath(check_writable(Path(path))))
-    percents = " ".join(f"{100 * channel:g}%" for channel in background)
-    first = series[0]
-    still = over_background(_from_generating_view(first), background)
+    view = _view_of(series[0], background)
+    view.attributes = {"autoplay": ""} if autoplay else {}
     writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
     cut = write_all(stream, writer, series, series.times, progress)
-    view = View(
-        None,
-        f"rgb({percents})",
-        np.rint(still * 255).astype(np.uint8),
-        first.picture_size,
-        attributes={"autoplay": ""} if autoplay else {},
-        series=in_parts(stream.getvalue(), cut),
-    )
+    view.series = in_parts(stream.getvalue(), cut)
     content = assembled([view], title=target.stem if title is None else title)
     with whole_file(target) as out:
         out.write(content)
@@ -364,6 +301,13 @@ def _jpeg(pixels: NDArray[np.uint8], size: Sequence[int]) -> bytes:
     stream = io.BytesIO()
     Image.fromarray(pixels).resize(small).save(stream, format="jpeg", quality=_STILL_QUALITY)
     return stream.getvalue()
+
+
+def _view_of(vdi: VDI, background: Sequence[float]) -> View:
+    """Return what shows a VDI from its generating view, which is still to be added."""
+    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    still = np.rint(over_background(_from_generating_view(vdi), background) * 255)
+    return View(None, f"rgb({percents})", still.astype(np.uint8), vdi.picture_size)
 
 
 def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:

@@ -27,15 +27,6 @@ class PlotterWidget(VDIWidget):
     its camera and background, its VDIs with their clipping planes, opacity multipliers and places,
     and its meshes, lines, points and texts. When a view rests the plotter is rendered in the
     kernel's event loop: its VDIs are kept up to date as in a window on a screen.
-
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-        Rendered before; held weakly, as its active renderer.
-    scene : Scene
-        What that shows.
-    picture : numpy.ndarray
-        uint8 (H, W, 3), the plotter's picture, which is kept in a saved notebook.
     """
 
     _esm = viewer_script(scene=True, module=True) + RENDER

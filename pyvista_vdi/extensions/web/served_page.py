@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import secrets
+
 from pyvista_vdi.extensions.web.bundle import viewer_script
 
 _PAGE = """\
@@ -39,6 +41,21 @@ window.remote = connectPage(byId("viewer"), byId("controls"), byId("status"));
 """
 
 
-def served_page(nonce: str) -> str:
-    """Return the page; its script carries the nonce of the page's content security policy."""
-    return _PAGE.format(nonce=nonce, script=viewer_script(remote=True, module=True))
+def served_page(host: str) -> tuple[str, dict[str, str]]:
+    """Return the page as a server of that name sends it, and its headers.
+
+    Its script carries the nonce of the page's content security policy.
+    """
+    nonce = secrets.token_urlsafe(16)
+    headers = {
+        "Cache-Control": "no-store",
+        "Referrer-Policy": "no-referrer",
+        "X-Content-Type-Options": "nosniff",
+        "X-Frame-Options": "SAMEORIGIN",
+        "Content-Security-Policy": (
+            f"default-src 'none'; script-src 'nonce-{nonce}' blob:; worker-src blob:; "
+            f"style-src 'unsafe-inline'; img-src data: blob:; "
+            f"connect-src 'self' ws://{host} wss://{host}; base-uri 'none'; form-action 'none'"
+        ),
+    }
+    return _PAGE.format(nonce=nonce, script=viewer_script(remote=True, module=True)), headers

@@ -19,7 +19,7 @@ import socket
 import threading
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult, quote, urlsplit
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
@@ -32,7 +32,13 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.drawing_options import checked_bound
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from pyvista_vdi.extensions.series.keywords import Look
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web
@@ -220,20 +226,8 @@ class Server:
         return True
 
     async def _page(self, request: web.Request) -> web.Response:
-        nonce = secrets.token_urlsafe(16)
-        headers = {
-            "Cache-Control": "no-store",
-            "Referrer-Policy": "no-referrer",
-            "X-Content-Type-Options": "nosniff",
-            "X-Frame-Options": "SAMEORIGIN",
-            "Content-Security-Policy": (
-                f"default-src 'none'; script-src 'nonce-{nonce}' blob:; worker-src blob:; "
-                f"style-src 'unsafe-inline'; img-src data: blob:; "
-                f"connect-src 'self' ws://{request.host} wss://{request.host}; "
-                "base-uri 'none'; form-action 'none'"
-            ),
-        }
-        return web.Response(text=served_page(nonce), content_type="text/html", headers=headers)
+        text, headers = served_page(request.host)
+        return web.Response(text=text, content_type="text/html", headers=headers)
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if len(self.clients) >= self._max_clients:
@@ -365,7 +359,7 @@ class Server:
 
 
 def serve(
-    volume: Any,
+    volume: VolumeLike | Sequence[VolumeLike],
     *,
     host: str = HOST,
     port: int = PORT,
@@ -374,14 +368,14 @@ def serve(
     lists: int = LISTS,
     max_supersegments: int = LONGEST,
     sample_distance: float | None = None,
-    ambient_occlusion: Any = None,
-    memory_limit: int | float | str | None = None,
+    ambient_occlusion: OcclusionLike | None = None,
+    memory_limit: MemoryLike | None = None,
     regenerate_below: float = REGENERATE_BELOW,
     max_clients: int = MAX_CLIENTS,
-    device: Any = None,
+    device: DeviceLike | None = None,
     announce: Callable[[str], object] | None = print,
     wait: bool = True,
-    **classification: Any,
+    **classification: Unpack[Look],
 ) -> Server:
     """Serve VDIs of a volume to web pages, which draw them at their own rate.
 
@@ -434,14 +428,14 @@ def serve(
         If aiohttp is not installed.
     """
     looks = Classification.composited(classification, "serve", _NAMES)
-    options = GenerationOptions(
+    options = GenerationOptions.checked(
         max_supersegments=max_supersegments,
         sample_distance=sample_distance,
         ambient_occlusion=ambient_occlusion,
-        memory_limit=memory_limit,  # type: ignore[arg-type]  # a text becomes bytes
+        memory_limit=memory_limit,
         precision="8-byte",
     )
-    steps = volume if _is_sequence(volume) else [volume]
+    steps: Any = volume if _is_sequence(volume) else [volume]
     source = Source(steps, looks, options, lists=lists, device=device)
     server = Server(
         source,

@@ -15,8 +15,8 @@ from concurrent.futures import Executor
 from typing import Any
 
 from pyvista_vdi.errors import Cancelled, VDIError
-from pyvista_vdi.extensions.web.encode import encoded
 from pyvista_vdi.extensions.web.messages import Wish
+from pyvista_vdi.extensions.web.placing import encoded
 from pyvista_vdi.extensions.web.source import Made, Source
 from pyvista_vdi.quality.regeneration_policy import AT_HOME, estimate_is_old, is_poor
 
@@ -31,29 +31,7 @@ SETTLED = 5.0
 
 
 class Client:
-    """What a server knows of one connection.
-
-    Parameters
-    ----------
-    source : Source
-        What is served.
-    threads : Executor
-        Where stages run.
-    below : float
-        Estimated SSIM below which a view gets a VDI of its own.
-
-    Attributes
-    ----------
-    waiting : (Made, bytes) or None
-        The VDI that is to be sent next, and its file. At most one waits: nothing more is made
-        until it is on its way.
-    notes : dict
-        Messages to be sent, the last of each type.
-    news : asyncio.Event
-        Set when there is something to send.
-    left : asyncio.Event
-        Set when the connection is to end.
-    """
+    """What a server knows of one connection."""
 
     def __init__(self, source: Source, threads: Executor, below: float) -> None:
         self.wish = Wish()

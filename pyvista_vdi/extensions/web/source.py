@@ -82,43 +82,17 @@ class _Recent:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A VDI that was made for a client: what of, and how good.
+    """A VDI that was made for a client: what of, and how good."""
 
-    Attributes
-    ----------
-    wish : Wish
-        What it was made for.
-    view : View
-        The wish's.
-    level : {"coarse", "full"}
-        Whether a full one is to follow.
-    window_size : (int, int)
-        Its lists; (0, 0) where nothing of the volume is in view, and there is no VDI.
-    """
-
-    wish: Wish
-    view: View
-    level: str
+    wish: Wish  # what it was made for
+    view: View  # the wish's
+    level: str  # whether a full one is to follow
+    #: Its lists; (0, 0) where nothing of the volume is in view, and there is no VDI
     window_size: tuple[int, int]
 
 
 class Source:
-    """A volume, or time steps of one, and how VDIs of it are made.
-
-    Parameters
-    ----------
-    volumes : sequence
-        Time steps, each what :func:`pyvista_vdi.generate` takes for a volume; any object with a
-        length whose items are loaded when they are asked for.
-    looks : Classification
-        How they look.
-    options : GenerationOptions
-        How VDIs are made.
-    lists : int
-        Most lists of a VDI.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    """
+    """A volume, or time steps of one, and how VDIs of it are made."""
 
     def __init__(
         self,
@@ -183,15 +157,7 @@ class Source:
     def make(
         self, wish: Wish, level: str, cancelled: Callable[[], bool]
     ) -> tuple[Made, VDI | None]:
-        """Make a VDI for a view, of the lists that are in sight.
-
-        Raises
-        ------
-        Cancelled
-            When ``cancelled`` says so.
-        VDIError
-            If it cannot be made.
-        """
+        """Make a VDI for a view, of the lists that are in sight."""
         assert wish.view is not None
         seen, options = self._in_sight(wish, self._lists), self._options
         if seen is not None and level == "coarse":
@@ -213,13 +179,6 @@ class Source:
         """Return the volume's own picture of a view, as an image file; none where it is not seen.
 
         It has the view's pixels, or fewer: no more of the volume than the most lists of a VDI.
-
-        Raises
-        ------
-        Cancelled
-            When ``cancelled`` says so.
-        VDIError
-            If it cannot be made.
         """
         assert wish.view is not None
         seen = self._in_sight(wish, math.prod(wish.view.size))

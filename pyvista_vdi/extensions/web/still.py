@@ -52,21 +52,7 @@ def picture(
     background: Sequence[float] | None = None,
     clipping_planes: ArrayLike | None = None,
 ) -> NDArray[np.uint8]:
-    """Return what a viewer shows: uint8 (H, W, 3) RGB, or (H, W, 4) without a background.
-
-    Parameters
-    ----------
-    vdi : VDI
-        What it shows.
-    camera : dict
-        Its view, in the viewer's form.
-    window_size : (int, int), optional
-        Width and height in pixels; by default those the VDI was made for.
-    background : (float, float, float), optional
-        RGB, 0 to 1.
-    clipping_planes : array_like of float, shape (k, 6), optional
-        As for :func:`pyvista_vdi.render`.
-    """
+    """Return what a viewer shows: uint8 (H, W, 3) RGB, or (H, W, 4) without a background."""
     # Where the model is in the world is the VDI's own: the viewer's camera does not say it
     placed = vdi.camera.model_transform
     view = camera_of(camera).replace(model_transform=placed)

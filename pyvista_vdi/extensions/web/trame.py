@@ -14,7 +14,7 @@ from typing import Any
 from pyvista_vdi.errors import MissingDependencyError
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
-from pyvista_vdi.extensions.web.encode import encoded
+from pyvista_vdi.extensions.web.placing import encoded
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.view import View

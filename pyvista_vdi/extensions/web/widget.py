@@ -184,12 +184,7 @@ class VDIWidget(anywidget.AnyWidget):
     clipping_planes = _PlanesTrait([]).tag(sync=True)
 
     def __init__(
-        self,
-        vdi: Any,
-        *,
-        camera: Any = None,
-        background: Any = None,
-        precision: str | None = None,
+        self, vdi: Any, *, camera: Any = None, background: Any = None, precision: str | None = None
     ) -> None:
         self._precision = precision
         self._vdi = as_vdi(vdi)

@@ -68,8 +68,11 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
 
 
 @needs_mpi
-def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(tmp_path, default_runtime):
-    run(2, PROGRAM, "mistakes", tmp_path)
+@pytest.mark.parametrize("part", ["mistakes", pytest.param("all_mistakes", marks=pytest.mark.slow)])
+def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(
+    part, tmp_path, default_runtime
+):
+    run(2, PROGRAM, part, tmp_path)
 
 
 @needs_mpi

@@ -27,7 +27,7 @@ from pyvista_vdi.errors import (
     NoDeviceError,
     VDIWarning,
 )
-from pyvista_vdi.extensions.large.rows import balanced
+from pyvista_vdi.extensions.large.generate import balanced
 
 #: Seconds within which a worker starts on the busiest machine; more is a worker that never does.
 STARTED = 120
@@ -261,6 +261,7 @@ def test_a_worker_that_has_not_the_same_store_is_named(
     assert not list(here.glob("*.ranges"))
 
 
+@pytest.mark.every(9)
 @pytest.mark.parametrize("kind", STORES)
 def test_relative_paths_are_this_process_s_and_changes_are_seen_while_it_is_open(
     client, scene, in_folders, kind, default_runtime

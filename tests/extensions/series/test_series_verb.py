@@ -149,6 +149,7 @@ KINDS = {
 LOOK = ("--size", "12x9", "--cmap", "gray", "--opacity", "linear", "--clim", "0", "255")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("make", "times"), KINDS.values(), ids=KINDS)
 def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -56,6 +56,7 @@ def test_a_view_is_found_without_decoding_another(vdis, saved):
     assert views.n_decoded == 1
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("precision", "compression"),
     [("8-byte", "zstd"), ("8-byte", "none"), ("16-byte", "lz4"), ("exact", "deflate")],

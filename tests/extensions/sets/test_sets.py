@@ -236,6 +236,7 @@ def test_limits_are_kept_and_what_is_missed_is_said(volume, monkeypatch):
 UNLIKE_VIEWS = {"sphere": "sphere", "path": [VIEW.azimuth(angle) for angle in range(0, 360, 24)]}
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("views", UNLIKE_VIEWS)
 @pytest.mark.parametrize("limit", [1_000, 10_000, 20_000, 40_000, 90_000])
 @pytest.mark.parametrize("given", [{}, {"lists": 1, "max_supersegments": 6}], ids=["free", "given"])

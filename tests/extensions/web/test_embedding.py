@@ -148,15 +148,6 @@ def test_pages_of_one_file_ask_for_all_of_the_picture(vdi, tmp_path, open_page):
     assert shown == pytest.approx(pixels.sum() / (120 * 260), rel=0.05)
 
 
-def test_paper_shows_the_picture_in_its_own_shape(around):
-    page = around("{viewer}")
-    page.ready()
-    fit = "getComputedStyle(viewer.shadowRoot.querySelector('canvas')).objectFit"
-    assert page.evaluate(fit) == "fill"
-    page.page.emulate_media(media="print")
-    assert page.evaluate(fit) == "contain"
-
-
 # -- what people do --------------------------------------------------------------------------------
 
 SCROLLED = "<p>above</p>{viewer}" + "<p>below</p>" * 20
@@ -195,11 +186,12 @@ def test_a_finger_turns_all_ways_where_nothing_scrolls(around):
     assert swipe(page, (0, -250))[1] != still
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("body", "attributes", "key", "zooms"),
     [
-        ("{viewer}", "", None, True),
         (SCROLLED, "", None, False),
+        ("{viewer}", "", None, True),
         (SCROLLED, "", "Control", True),
         (SCROLLED, 'gestures="all"', None, True),
         ("{viewer}", 'gestures="shared"', None, False),
@@ -284,15 +276,6 @@ def test_what_is_set_before_the_module_has_come_is_taken(around):
     assert page.evaluate("viewer.clippingPlanes.length") == 1
 
 
-def test_src_is_a_property_too(around):
-    page = around("{viewer}", expected="404")
-    page.ready()
-    assert page.evaluate("viewer.src") == "ball.vdi"
-    failed = "viewer.src = 'none.vdi', viewer.ready.catch(({ message }) => message)"
-    assert "none.vdi cannot be read: 404" in page.evaluate(failed)
-    assert page.evaluate("viewer.getAttribute('src')") == "none.vdi"
-
-
 def test_a_file_that_a_visitor_chose_is_shown(vdi, data, open_page):
     page = open_page(SIZE)
     page.evaluate(
@@ -302,12 +285,23 @@ def test_a_file_that_a_visitor_chose_is_shown(vdi, data, open_page):
     page.assert_shows(vdi, SIZE)
 
 
-def test_a_name_of_the_page_s_is_the_picture_s(around):
-    page = around("{viewer}", attributes='aria-label="a ball"')
+def test_its_name_its_address_and_its_shape_on_paper(around):
+    """A name of the page's is the picture's, and ``src`` is a property, too."""
+    page = around("{viewer}", attributes='aria-label="a ball"', expected="404")
     page.ready()
     assert page.page.get_by_role("img", name="a ball").is_visible()
     page.evaluate("viewer.removeAttribute('aria-label')")
     assert page.page.get_by_role("img", name="volume, to be turned").is_visible()
+
+    fit = "getComputedStyle(viewer.shadowRoot.querySelector('canvas')).objectFit"
+    assert page.evaluate(fit) == "fill"
+    page.page.emulate_media(media="print")
+    assert page.evaluate(fit) == "contain"
+
+    assert page.evaluate("viewer.src") == "ball.vdi"
+    failed = "viewer.src = 'none.vdi', viewer.ready.catch(({ message }) => message)"
+    assert "none.vdi cannot be read: 404" in page.evaluate(failed)
+    assert page.evaluate("viewer.getAttribute('src')") == "none.vdi"
 
 
 def test_a_scene_that_is_damaged_is_made_up_for_by_the_next(vdi, data, open_page):

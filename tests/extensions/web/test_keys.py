@@ -88,27 +88,26 @@ def pressed(data, open_page):
 
 @pytest.fixture
 def playing(series, open_page):
-    """The same with a series in the viewer, at its second step."""
+    """The same with a series in the viewer."""
     page = open_page(
         SIZE, attributes='src="ball.vdis"', files={"ball.vdis": series}, before=LISTENING
     )
     page.ready()
-    page.evaluate("viewer.time = 0.5, viewer.ready.then(() => true)")
     return Pressed(page)
 
 
-@pytest.mark.parametrize("key", TAKEN)
-def test_what_it_takes_reaches_nothing_else(key, pressed):
+def test_what_it_takes_reaches_nothing_else(pressed):
     look = partial(pressed.page.evaluate, "viewer.camera")
-    pressed.page.evaluate("viewer.resetCamera()")
-    first = look()
-    if key in ("r", "Shift+R"):
-        pressed.of_the_viewer("canvas", "ArrowLeft")
-        assert look() != first
-    told = pressed.of_the_viewer("canvas", key)
-    assert (look() == first) == (key in ("r", "Shift+R"))
-    assert told == []
-    assert pressed.anywhere(key)  # the page has its shortcuts still
+    for key in TAKEN:
+        pressed.page.evaluate("viewer.resetCamera()")
+        first = look()
+        if key in ("r", "Shift+R"):
+            pressed.of_the_viewer("canvas", "ArrowLeft")
+            assert look() != first
+        told = pressed.of_the_viewer("canvas", key)
+        assert (look() == first) == (key in ("r", "Shift+R")), key
+        assert told == [], key
+        assert pressed.anywhere(key)  # the page has its shortcuts still
 
 
 def test_arrows_that_it_takes_do_not_scroll_the_page(data, open_page):
@@ -123,11 +122,11 @@ def test_arrows_that_it_takes_do_not_scroll_the_page(data, open_page):
     pressed.page.wait_for("scrollY > 0")
 
 
-@pytest.mark.parametrize("key", NOT_TAKEN)
-def test_what_it_does_not_take_reaches_the_page_as_without_it(key, pressed):
+def test_what_it_does_not_take_reaches_the_page_as_without_it(pressed):
     before = pressed.page.evaluate("viewer.camera")
-    assert pressed.of_the_viewer("canvas", key) == pressed.anywhere(key) != []
-    assert pressed.page.evaluate("viewer.camera") == before
+    for key in NOT_TAKEN:
+        assert pressed.of_the_viewer("canvas", key) == pressed.anywhere(key) != [], key
+        assert pressed.page.evaluate("viewer.camera") == before, key
 
 
 def test_what_is_typed_elsewhere_is_none_of_its(pressed):
@@ -157,22 +156,20 @@ OF_SERIES = [
 ]
 
 
-@pytest.mark.parametrize(("part", "key", "changes"), OF_SERIES)
-def test_a_series_takes_keys_of_its_own(part, key, changes, playing):
+def test_a_series_takes_keys_of_its_own_and_no_others(playing):
     names = ["playing", "time", "camera.position[0]"]
     look = partial(playing.page.evaluate, f"[{', '.join(f'viewer.{name}' for name in names)}]")
-    before = dict(zip(names, look(), strict=True))
-    told = playing.of_the_viewer(part, key)
-    after = dict(zip(names, look(), strict=True))
-    playing.page.evaluate("viewer.pause()")
-    if changes == "playing":  # and then the time, sooner or later
-        after["time"] = before["time"]
-    assert {name for name in after if after[name] != before[name]} == {changes}
-    assert told == []
-
-
-@pytest.mark.parametrize("part", ["canvas", "input", "button"])
-def test_a_series_takes_no_others(part, playing):
+    for part, key, changes in OF_SERIES:
+        playing.page.evaluate("viewer.time = 0.5, viewer.ready.then(() => true)")
+        before = dict(zip(names, look(), strict=True))
+        told = playing.of_the_viewer(part, key)
+        after = dict(zip(names, look(), strict=True))
+        playing.page.evaluate("viewer.pause()")
+        if changes == "playing":  # and then the time, sooner or later
+            after["time"] = before["time"]
+        assert {name for name in after if after[name] != before[name]} == {changes}, (part, key)
+        assert told == [], (part, key)
     keys = ["a", "b", "Escape", "Control+,", "Alt+."]
-    assert playing.of_the_viewer(part, *keys) == playing.anywhere(*keys)
-    assert not playing.page.evaluate("viewer.playing")
+    for part in ("canvas", "input", "button"):
+        assert playing.of_the_viewer(part, *keys) == playing.anywhere(*keys), part
+        assert not playing.page.evaluate("viewer.playing")

@@ -484,9 +484,7 @@ def test_the_view_draws_and_shares_its_camera(open_widget, widget, vdi):
     page.evaluate("(camera) => model.set('camera', camera)", turned)
     assert page.evaluate("viewers.map((viewer) => viewer.camera)") == [turned, turned]
     expected = pvdi.render(
-        vdi.with_precision("8-byte"),
-        vdi.camera.azimuth(25),
-        clipping_planes=widget.clipping_planes,
+        vdi.with_precision("8-byte"), vdi.camera.azimuth(25), clipping_planes=widget.clipping_planes
     )
     apart = np.abs(picture(page, SIZE, "viewers[1]") / 255 - expected).max(axis=2)
     assert np.mean(apart <= 2 / 255) >= 0.999  # the bound of issue 17

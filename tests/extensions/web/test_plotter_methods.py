@@ -198,6 +198,7 @@ def test_the_docs_name_every_method():
     assert set(METHODS) <= set(CALLS)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", SLOW)
 def test_a_method_is_drawn_or_named_as_the_docs_say(method, plotter, page):
     said = documented()[method]
@@ -229,6 +230,7 @@ def solid(plotter):
     plotter.add_mesh(box, color="r", culling="front", lighting=False)
 
 
+@pytest.mark.every(9)
 @pytest.mark.parametrize("add", [front, pytest.param(back, marks=slow), points, solid])
 def test_only_polygons_have_sides_that_are_culled(add, plotter, page):
     before = shown(page, plotter)[2]
@@ -239,7 +241,8 @@ def test_only_polygons_have_sides_that_are_culled(add, plotter, page):
     assert far(got, want) <= MEAN
 
 
-@pytest.mark.parametrize("vertical", [False, pytest.param(True, marks=slow)])
+@pytest.mark.every(4)
+@pytest.mark.parametrize("vertical", [False, True])
 @pytest.mark.parametrize("kind", ["few", "log", "outside", "categories"])
 def test_the_boxes_of_a_scalar_bar_have_its_colours(kind, vertical, plotter, page):
     mesh, more, bar = SPHERE.copy(), {}, {}

@@ -46,11 +46,7 @@ from pyvista_vdi.extensions.paraview.parts.properties import (
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce_times, wanted_time, watch
-from pyvista_vdi.vtk_pipeline.filters.convert import (
-    require_image,
-    scalars_of,
-    vdi_from_image,
-)
+from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
 #: What ParaView's plugin manager shows.

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.extensions.web.scenes.scalar_bar import scalar_bar
-from pyvista_vdi.extensions.web.scenes.texts import HORIZONTAL, VERTICAL, described_text
+from pyvista_vdi.extensions.web.scenes.texts import HORIZONTAL, VERTICAL, described_text, mapper_of
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkActor2D,
     vtkCaptionActor2D,
@@ -23,7 +23,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkScalarBarActor,
     vtkSelectVisiblePoints,
     vtkTextActor,
-    vtkTextMapper,
 )
 
 _WORLD = 5  # vtkCoordinate's VTK_WORLD
@@ -37,15 +36,7 @@ _LARGEST_FONT = 100
 
 
 def annotations_of(prop: Any, renderer: Any) -> list[dict[str, Any]] | None:
-    """Return what a 2D prop draws; ``None`` if it is none that is known.
-
-    Parameters
-    ----------
-    prop : vtkProp
-        Visible; drawn before.
-    renderer : vtkRenderer
-        Which shows it.
-    """
+    """Return what a visible 2D prop that was drawn draws; ``None`` if it is none that is known."""
     if isinstance(prop, vtkScalarBarActor):
         return list(scalar_bar(prop, renderer))
     if isinstance(prop, vtkCaptionActor2D):
@@ -128,12 +119,7 @@ def _corner_texts(annotation: Any, renderer: Any) -> Iterator[dict[str, Any]]:
 def _corner_font(annotation: Any, texts: list[str], renderer: Any) -> int:
     """Return the size of the font that vtkCornerAnnotation takes for a viewport."""
     extent = np.array(renderer.GetSize())
-    mappers = []
-    for text in texts:
-        mapper = vtkTextMapper()
-        mapper.SetInput(text)
-        mapper.GetTextProperty().ShallowCopy(annotation.GetTextProperty())
-        mappers.append(mapper)
+    mappers = [mapper_of(text, annotation.GetTextProperty()) for text in texts]
     rows = [text.count("\n") + 1 if text else 0 for text in texts]
     columns = ((0, 2), (1, 3), (4, 7))  # whose texts stand one above the other
     line = int(extent[1] * annotation.GetMaximumLineHeight())

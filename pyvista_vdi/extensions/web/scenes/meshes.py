@@ -68,10 +68,7 @@ class Cells(NamedTuple):
     def pieces(self, fewer: int) -> tuple[Array, Array, Array]:
         """Divide each cell of n points into n - ``fewer`` pieces.
 
-        Returns
-        -------
-        owner, number, first : numpy.ndarray
-            Of each piece: its cell, its number in the cell, and where its cell begins.
+        Returns of each piece its cell, its number in the cell, and where its cell begins.
         """
         counts = np.maximum(np.diff(self.offsets) - fewer, 0)
         owner = np.repeat(np.arange(len(self)), counts)
@@ -79,16 +76,9 @@ class Cells(NamedTuple):
         return owner, number, self.offsets[:-1][owner]
 
     def triangles(self) -> tuple[Array, Array, Array]:
-        """Return a fan of each polygon, as VTK's mapper draws it.
+        """Return a fan of each polygon, as VTK's mapper draws it: points (n, 3), polygons, edges.
 
-        Returns
-        -------
-        points : numpy.ndarray
-            (n, 3).
-        owner : numpy.ndarray
-            (n,), the polygon of each.
-        edges : numpy.ndarray
-            uint8 (n,): bits 0 to 2 are set where the sides 0-1, 1-2 and 2-0 are edges of it.
+        Of edges bits 0 to 2 are set where the sides 0-1, 1-2 and 2-0 are edges of the polygon.
         """
         owner, number, first = self.pieces(2)
         corners = [first, first + number + 1, first + number + 2]
@@ -115,23 +105,9 @@ class Cells(NamedTuple):
 def shapes_of(
     actor: Any, matrix: Array, keep: Keep, left_out: list[str]
 ) -> Iterator[dict[str, Any]]:
-    """Describe what an actor draws, as the viewer's ``scene.js`` takes it.
+    """Describe what an actor that was drawn draws, as the viewer's ``scene.js`` takes it.
 
-    Parameters
-    ----------
-    actor : vtkActor
-        Visible; drawn before.
-    matrix : numpy.ndarray
-        (4, 4), from its data to the world.
-    keep : callable
-        Takes an array that is sent.
-    left_out : list of str
-        What cannot be drawn is said here.
-
-    Yields
-    ------
-    dict
-        Points, their attributes, material, and ``parts`` (triangles, lines, points).
+    ``matrix``: from its data to the world. What cannot be drawn is said in ``left_out``.
     """
     mapper = actor.GetMapper()
     name = None if mapper is None else mapper.GetClassName()

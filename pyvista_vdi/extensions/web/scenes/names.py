@@ -46,15 +46,7 @@ _OF_PYVISTA = ("_", "BoundingBox(", "Floor(")
 
 
 class Names:
-    """Names of a renderer's props.
-
-    Parameters
-    ----------
-    given : dict of str to vtkProp
-        As PyVista's renderers keep them, those that the user gave among them.
-    renderer : vtkRenderer
-        Whose they are.
-    """
+    """Names of a renderer's props."""
 
     def __init__(self, given: dict[str, Any], renderer: Any) -> None:
         self._given = {

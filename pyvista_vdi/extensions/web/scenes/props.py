@@ -1,4 +1,4 @@
-"""The visible parts of a scene's props, and actors that stand for what has none of its own."""
+"""A scene's lights and bounds, the parts of its props, and actors for what has none of its own."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.extensions.web.placing import array_of
 from pyvista_vdi.vtk_pipeline.vtk import (
     numpy_to_vtk,
     vtk_to_numpy,
@@ -54,13 +55,6 @@ def collected(get: Callable[[Any], None]) -> list[Any]:
     collection = vtkPropCollection()
     get(collection)
     return list(dict.fromkeys(collection))
-
-
-def array_of(matrix: Any) -> Matrix:
-    """Return a ``vtkMatrix4x4``, or the identity for ``None``."""
-    if matrix is None:
-        return np.eye(4)
-    return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
 
 
 def _paths(prop: Any) -> Iterator[tuple[Any, Matrix]]:
@@ -117,3 +111,35 @@ def image_quad(actor: Any) -> Any:
     places = vtk_to_numpy(plane.GetOutput().GetPointData().GetTCoords())
     places[:] = half + places * (1 - 2 * half)
     return unlit(plane.GetOutput(), look, texture)
+
+
+#: vtkLight's types.
+_LIGHTS = {1: "head", 2: "camera", 3: "scene"}
+
+#: Lights that the viewer looks at.
+MOST_LIGHTS = 8
+
+
+def bounds_of(renderer: Any) -> list[float] | None:
+    """Return the box by which VTK sets its clipping range, which translucent layers depend on."""
+    bounds = renderer.ComputeVisiblePropBounds()
+    return list(bounds) if bounds[0] <= bounds[1] else None
+
+
+def lights_of(renderer: Any) -> Iterator[dict[str, Any]]:
+    """Yield the lights that are on, as scene.js takes them."""
+    for light in renderer.GetLights():
+        if not light.GetSwitch():
+            continue
+        kind = _LIGHTS[light.GetLightType()]
+        # Lights of the camera are given where it stands at (0, 0, 1) and looks at the origin
+        yield {
+            "kind": kind,
+            "color": [channel * light.GetIntensity() for channel in light.GetDiffuseColor()],
+            "position": list(light.GetPosition()) if kind != "head" else [0, 0, 1],
+            "focalPoint": list(light.GetFocalPoint()) if kind != "head" else [0, 0, 0],
+            "positional": bool(light.GetPositional()),
+            "cone": light.GetConeAngle(),
+            "exponent": light.GetExponent(),
+            "attenuation": list(light.GetAttenuationValues()),
+        }

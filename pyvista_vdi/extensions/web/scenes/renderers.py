@@ -13,10 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.extensions.web.camera import viewer_camera
+from pyvista_vdi.extensions.web.placing import array_of
 from pyvista_vdi.extensions.web.scenes.annotations import annotations_of
-from pyvista_vdi.extensions.web.scenes.lighting import bounds_of, lights_of
 from pyvista_vdi.extensions.web.scenes.meshes import Keep, shapes_of
-from pyvista_vdi.extensions.web.scenes.props import array_of, collected, image_quad, parts_of, unlit
+from pyvista_vdi.extensions.web.scenes.props import (
+    bounds_of,
+    collected,
+    image_quad,
+    lights_of,
+    parts_of,
+    unlit,
+)
 from pyvista_vdi.extensions.web.scenes.texts import described_text
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
@@ -40,22 +47,9 @@ def others_of(
 ) -> Iterator[dict[str, Any]]:
     """Describe what other renderers of a plotter's window draw within one's viewport.
 
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        Which has been drawn. Only PyVista's have others.
-    keep : callable
-        Takes an array that is sent.
-    texts : list of dict
-        What is written in them is added here.
-    left_out : list of str
-        What cannot be drawn is said here.
-
-    Yields
-    ------
-    dict
-        ``place`` (parts of the viewport: left, bottom, right, top), ``camera``, ``bounds``,
-        ``lights``, ``shapes``; whether it ``turns`` with the scene, and is ``behind`` it.
+    ``place`` (parts of the viewport: left, bottom, right, top), ``camera``, ``bounds``, ``lights``,
+    ``shapes``; whether it ``turns`` with the scene, and is ``behind`` it. Texts, and what cannot be
+    drawn, are added to the lists.
     """
     low, high = np.reshape(renderer.GetViewport(), (2, 2))
     for number, other in enumerate(around(renderer)):

@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
-from pyvista_vdi.extensions.web.encode import encoded
-from pyvista_vdi.extensions.web.placing import look_of, planes_of, thinned
+from pyvista_vdi.extensions.web.placing import encoded, look_of, planes_of, thinned
 from pyvista_vdi.extensions.web.scenes.annotations import annotations_of
-from pyvista_vdi.extensions.web.scenes.lighting import MOST_LIGHTS, bounds_of, lights_of
 from pyvista_vdi.extensions.web.scenes.meshes import shapes_of
 from pyvista_vdi.extensions.web.scenes.names import Names, is_silhouette, passes_of, widgets_of
-from pyvista_vdi.extensions.web.scenes.props import image_quad, parts_of
+from pyvista_vdi.extensions.web.scenes.props import (
+    MOST_LIGHTS,
+    bounds_of,
+    image_quad,
+    lights_of,
+    parts_of,
+)
 from pyvista_vdi.extensions.web.scenes.renderers import around, flat_of, others_of
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
@@ -48,30 +52,14 @@ _GRADIENTS = (
 
 @dataclass
 class Scene:
-    """What is shown of a renderer.
+    """What is shown of a renderer."""
 
-    Attributes
-    ----------
-    vdi : VDI or None
-        The first one, if there is one.
-    actors : list of VDIActor
-        Those that show VDIs, the first one's first.
-    state : tuple
-        Of :func:`state_of`.
-    data : bytes
-        All the rest, as scene.js takes it.
-    background : str
-        As CSS has it.
-    left_out : list of str
-        What is not shown, by name.
-    """
-
-    vdi: VDI | None
-    actors: list[Any]
-    state: Any
-    data: bytes
-    background: str
-    left_out: list[str]
+    vdi: VDI | None  # the first one, if there is one
+    actors: list[Any]  # those that show VDIs, the first one's first
+    state: Any  # of :func:`state_of`
+    data: bytes  # all the rest, as scene.js takes it
+    background: str  # as CSS has it
+    left_out: list[str]  # what is not shown, by name
 
     @property
     def actor(self) -> Any:
@@ -117,23 +105,10 @@ def scene_of(
     camera: bool = True,
     needs_vdi: bool = True,
 ) -> Scene:
-    """Return what a renderer shows, for the viewer.
+    """Return what a renderer that has been drawn shows, for the viewer.
 
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        It has been drawn, so that its VDIs are there.
-    names : dict of str to vtkProp, optional
-        What its props are called, for what is said of those that are left out.
-    camera : bool
-        Whether its view is that in which the viewer begins.
-    needs_vdi : bool
-        Whether a renderer without VDIs is refused.
-
-    Raises
-    ------
-    UnsupportedError
-        If it shows no VDI and needs one.
+    ``names``: what its props are called. ``camera``: the viewer begins with its view.
+    ``needs_vdi``: one without VDIs is refused by UnsupportedError.
     """
     called, packed, left_out = Names(names or {}, renderer), _Packed(), _environment(renderer)
     shapes: list[dict[str, Any]] = []

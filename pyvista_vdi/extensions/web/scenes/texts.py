@@ -41,7 +41,7 @@ def described_text(
 
 def size_of(text: str, look: Any, renderer: Any) -> Any:
     """Return the width and height of a text, pixels."""
-    mapper, held = _mapper(text, look), [0, 0]
+    mapper, held = mapper_of(text, look), [0, 0]
     mapper.GetSize(renderer, held)
     return np.array(held, dtype=float)
 
@@ -49,11 +49,12 @@ def size_of(text: str, look: Any, renderer: Any) -> Any:
 def constrained(texts: list[str], look: Any, room: Any, renderer: Any) -> int:
     """Return the largest font by which all texts have room."""
     width, height = map(int, room)
-    mappers = [_mapper(text, look) for text in texts]
+    mappers = [mapper_of(text, look) for text in texts]
     return max(1, min(m.SetConstrainedFontSize(renderer, width, height) for m in mappers))
 
 
-def _mapper(text: str, look: Any) -> Any:
+def mapper_of(text: str, look: Any) -> Any:
+    """Return what measures a text."""
     mapper = vtkTextMapper()
     mapper.SetInput(text)
     mapper.GetTextProperty().ShallowCopy(look)
