@@ -42,6 +42,7 @@ from pyvista_vdi.quality.frame_state import (
     VDIReady,
     ViewPicked,
 )
+from pyvista_vdi.quality.records import replace as replaced
 
 pytestmark = pytest.mark.fast
 
@@ -554,7 +555,15 @@ def test_a_state_is_frozen_all_the_way_down(steps, watched, chosen):
     assert frozen(run(steps, watched, chosen).state)
 
 
-PURE = ("decide", "frame_state", "frame_rate", "pace", "pictures", "regeneration_policy")
+PURE = ("decide", "frame_state", "frame_rate", "pace", "pictures", "records", "regeneration_policy")
+
+
+def test_a_record_is_replaced_as_by_dataclasses():
+    state = FrameState(number=1)
+    assert replaced(state, number=2, by_vdi=False) == replace(state, number=2, by_vdi=False)
+    assert state == FrameState(number=1)
+    with pytest.raises(TypeError, match="numbr"):
+        replaced(state, numbr=2)
 
 
 @pytest.mark.parametrize("name", [*PURE, "render_mode"])

@@ -10,7 +10,6 @@ import logging
 import math
 import weakref
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, TypeAlias
 
@@ -21,6 +20,7 @@ from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality import frame_state as fs
 from pyvista_vdi.quality.decide import busy, decide, growth
+from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.volume_picture import (
@@ -204,8 +204,7 @@ class Deciding:
         if self.state.settings.draw == "auto":  # else nobody asks
             detail = magnification(vdi, frame.camera, frame.full_size)
             covered = coverage(vdi, view.camera, view.size)
-        pixels = shown.covered(vdi.bounds)
-        of = (shown.angle, detail, covered, pixels, self._options)
+        of = (shown.angle, detail, covered, shown.covered, self._options)
         return fs.Sight(number, vdi.bounds, made, *of)
 
     def _stored(self, source: Input, frame: Frame) -> VDI | None:

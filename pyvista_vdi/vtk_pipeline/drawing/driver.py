@@ -9,7 +9,6 @@ import math
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
@@ -19,6 +18,7 @@ from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.decide import placeholder_share, ssim_of
 from pyvista_vdi.quality.frame_state import FrameTook, PlaceholderTook, VDIAsked, ViewPicked
 from pyvista_vdi.quality.pace import reduced
+from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.render_mode import seconds_per_pixel
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick
@@ -179,7 +179,8 @@ class Driver(Deciding):
             if part is not None:
                 return part
         window = self.window
-        frame = replace(frame, depth=window.shared(OpaqueDepths).read([frame]))
+        depth = window.shared(OpaqueDepths).read([frame])
+        frame = frame if depth is None else replace(frame, depth=depth)
         at_rest = reduced(frame.full_size, 1 / self.state.settings.image_distance**2)
         frame = frame.coarser(at_rest)
         drawn = self._images.get(frame)
@@ -233,7 +234,7 @@ class Driver(Deciding):
                 floor,
                 frame.cost,
                 effort=frame.effort,
-                expected=each * frame.covered(frame.bounds) if known else None,  # type: ignore[operator]
+                expected=each * frame.covered if known else None,  # type: ignore[operator]
             )
         return reduced(frame.full_size, min(share, 1 / settings.image_distance**2))
 
@@ -258,7 +259,7 @@ class Driver(Deciding):
             window.pace = window.pace.drawn(*took)
         # A volume's first picture has kernels compiled and voxels sent to the device
         if frame.few_lists is None and (volume is None or volume.pictures > 1):
-            self.tell(FrameTook(frame.way, frame.angle, frame.covered(frame.bounds), seconds))
+            self.tell(FrameTook(frame.way, frame.angle, frame.covered, seconds))
         return drawn
 
     def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:

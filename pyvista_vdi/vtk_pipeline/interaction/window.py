@@ -29,8 +29,10 @@ _BEFORE, _AFTER = 1.0, -1.0
 #: By the windows' addresses; without callbacks, as ``drawing.mapper._drivers`` explains.
 _windows: dict[str, weakref.ref[Window]] = {}
 
-#: The clock that frames are measured by: seconds.
-now = time.perf_counter
+
+def now() -> float:
+    """Return the seconds of the clock that frames are measured by."""
+    return time.perf_counter()
 
 
 class Met:
