@@ -12,7 +12,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, weakly
 
 # PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
 require_this_build(Volume)
@@ -157,11 +157,10 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         first, last = self._player().series.times[0], self._player().series.times[-1]
         if first == last:
             raise InvalidArgumentError("this series has one step: there is no time to choose")
-        actor, bar = vtkWeakReference(), vtkWeakReference()
-        actor.Set(self)
+        actor = weakly(self)
 
         def chosen(time: float) -> None:
-            shown = actor.Get()
+            shown = actor()
             if shown is not None:
                 shown.time = time
 
@@ -170,10 +169,10 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             (first, last),
             **{"value": self.time, "title": "time", "interaction_event": "always", **options},
         )
-        bar.Set(slider.GetRepresentation())
+        bar = weakly(slider.GetRepresentation())
 
         def follow(*_: Any) -> None:
-            shown, representation = actor.Get(), bar.Get()
+            shown, representation = actor(), bar()
             if shown is not None and representation is not None and shown.playing:
                 representation.SetValue(shown.time)
 

@@ -36,7 +36,7 @@ from pyvista_vdi.plotting.actor import PlotterVDIActor
 from pyvista_vdi.plotting.adding import Addition, Placement, added, added_blocks
 from pyvista_vdi.plotting.classify import Looks, blending_name, note_mapper
 from pyvista_vdi.plotting.registration import Component
-from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet, weakly
 
 #: What is added: a volume, or what is made of one already.
 Volumes: TypeAlias = VolumeLike | VDILike | NDArray[Any] | VDICollection
@@ -57,7 +57,7 @@ class AddVDI(Component):
 
     def __init__(self, plotter: Any) -> None:
         super().__init__(plotter)
-        self._actors: list[Any] = []
+        self._actors: list[Callable[[], Any]] = []
 
     def __call__(
         self,
@@ -319,14 +319,12 @@ class AddVDI(Component):
 
     def _remember(self, actor: PlotterVDIActor) -> None:
         """Keep an actor in mind, weakly, until the plotter is closed."""
-        weak = vtkWeakReference()
-        weak.Set(actor)
-        self._actors.append(weak)
+        self._actors.append(weakly(actor))
 
     def __plotter_close__(self) -> None:
         """Release images and textures, even where the user keeps an actor."""
         for weak in self._actors:
-            actor = weak.Get()
+            actor = weak()
             if actor is not None and actor.mapper is not None:
                 actor.mapper.driver.release()
         self._actors.clear()

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from pyvista_vdi.model.view import View
@@ -57,6 +56,7 @@ from pyvista_vdi.quality.pictures import (
     drawn_by_volume,
     serves,
 )
+from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.regeneration_policy import (
     AT_HOME,
     OUT_OF_DATE,

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import statistics
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.quality.records import replace
 
 #: Frames whose mean rate is reported, and the fewest that show a trend (paper section 5).
 RECENT_FRAMES = 5

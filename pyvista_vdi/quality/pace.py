@@ -8,11 +8,12 @@ frames have taken, and asks; there is no clock here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from pyvista_vdi.quality.frame_rate import FrameRate
 from pyvista_vdi.quality.frame_state import RenderMode
+from pyvista_vdi.quality.records import replace
 
 #: What a ray's cost is known by: the render mode, or a VDI of every second list.
 Cost: TypeAlias = RenderMode | Literal["few lists"]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.frame_state import FrameAsked, Pictures, Sight
+from pyvista_vdi.quality.records import replace
 
 #: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn where the volume is at
 #: hand, and by what share the contrast within 4 x 4 pixels may differ, where nobody said otherwise.

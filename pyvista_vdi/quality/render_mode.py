@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import replace
 
 from pyvista_vdi.quality.frame_state import Costs, FrameTook, RenderMode
+from pyvista_vdi.quality.records import replace
 
 #: SSIM lost by drawing every k-th pixel along each edge and interpolating linearly: medians over
 #: six volumes x soft and steep, 640 x 360 pixels, 30 degrees from V_O

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -145,6 +146,13 @@ def __getattr__(name: str) -> Any:
         raise explain_import_error(ImportError(f"{BACKEND} has no {name}")) from error
     globals()[name] = value
     return value
+
+
+def weakly(thing: Any) -> Callable[[], Any]:
+    """Return what gives a VTK object as long as others keep it, and ``None`` afterwards."""
+    held = (globals().get("vtkWeakReference") or __getattr__("vtkWeakReference"))()
+    held.Set(thing)
+    return held.Get  # type: ignore[no-any-return]
 
 
 def explain_import_error(error: ImportError) -> MissingDependencyError:

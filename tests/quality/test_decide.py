@@ -36,10 +36,13 @@ from pyvista_vdi.quality.frame_state import (
     Show,
     Sight,
     StoredAsked,
+    StoredSeen,
     TimePassed,
     VDIAsked,
     VDIReady,
+    ViewPicked,
 )
+from pyvista_vdi.quality.records import replace as replaced
 
 pytestmark = pytest.mark.fast
 
@@ -509,6 +512,33 @@ def test_a_stored_vdi_that_failed_is_tried_again_when_another_is_due():
     assert decide(state, StoredAsked(2))[1] == (Do("update"), Show("last"))
 
 
+def test_what_is_asked_for_is_made_unless_it_is_there():
+    state = FrameState(behind=True)
+    assert decide(state, VDIAsked(True, 1)) == (state, ())
+    assert decide(state, VDIAsked(False, 1))[1][-1] == Do("update")
+    assert decide(replace(state, failed_in_frame=1), VDIAsked(False, 1))[1][-1] != Do("update")
+    assert decide(state, ViewPicked(1.0))[1] == ()
+    assert decide(state, ViewPicked(0.5))[1] == (Show("this view"),)
+
+
+def test_another_input_begins_with_nothing_known():
+    known = replace(FrameState(Settings(draw="vdi")), refused=1, estimate=Estimate(1, Seen(0), 0.5))
+    assert decide(known, InputChanged())[0] == FrameState(Settings(draw="vdi"))
+    assert decide(known, InputChanged(another=False))[0] == known
+
+
+@pytest.mark.parametrize(
+    ("seen", "cause"),
+    [({"angle": 61}, "angle"), ({"coverage": 0.8}, "coverage"), ({"magnification": 3}, "magni")],
+)
+def test_what_a_stored_vdi_lacks_is_said(seen, cause):
+    told = StoredSeen(Sight(1, BOUNDS, **seen), 60.0, "no remedy")
+    (warning,) = decide(FrameState(), told)[1]
+    assert warning.cause.startswith(cause)
+    assert "no remedy" in warning.message
+    assert decide(FrameState(Settings(regenerate="never")), told)[1] == ()
+
+
 def frozen(thing):
     """Whether a record is of frozen records, tuples and plain values, all the way down."""
     if is_dataclass(thing):
@@ -525,7 +555,15 @@ def test_a_state_is_frozen_all_the_way_down(steps, watched, chosen):
     assert frozen(run(steps, watched, chosen).state)
 
 
-PURE = ("decide", "frame_state", "frame_rate", "pace", "pictures", "regeneration_policy")
+PURE = ("decide", "frame_state", "frame_rate", "pace", "pictures", "records", "regeneration_policy")
+
+
+def test_a_record_is_replaced_as_by_dataclasses():
+    state = FrameState(number=1)
+    assert replaced(state, number=2, by_vdi=False) == replace(state, number=2, by_vdi=False)
+    assert state == FrameState(number=1)
+    with pytest.raises(TypeError, match="numbr"):
+        replaced(state, numbr=2)
 
 
 @pytest.mark.parametrize("name", [*PURE, "render_mode"])

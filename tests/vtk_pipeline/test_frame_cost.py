@@ -12,7 +12,6 @@ from pyvista_vdi.vtk_pipeline.drawing import driver, images
 from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
 from pyvista_vdi.vtk_pipeline.drawing import texture as texture_module
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
-from pyvista_vdi.vtk_pipeline.interaction.window import Window
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkTextureObject
 
 pytestmark = pytest.mark.gl
@@ -155,7 +154,8 @@ def changes_of_what_is_opaque(plotter, sphere):
     yield "visibility", lambda: sphere.SetVisibility(False)
 
 
-def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts):
+def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts, monkeypatch):
+    read = OpaqueDepths.read
     sphere = plotter.add_mesh(
         pv.Sphere(radius=0.5, center=(0.4, 0.2, 0.5)), color="w", reset_camera=False
     )
@@ -167,9 +167,10 @@ def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts):
         assert counts["opaque_z"] > reads, name
         assert (after != before).any(), f"{name} changes nothing"
         # Nothing is known any more, and all of it is read
-        Window.of(plotter.render_window).shared(OpaqueDepths)._known.clear()
         plotter.volume.mapper.driver.release()
-        np.testing.assert_array_equal(shown(plotter), after, err_msg=name)
+        with monkeypatch.context() as patch:
+            patch.setattr(OpaqueDepths, "read", lambda _, frames: read(OpaqueDepths(), frames))
+            np.testing.assert_array_equal(shown(plotter), after, err_msg=name)
         before = after
 
 
@@ -217,10 +218,17 @@ def test_a_prop_that_nobody_knows_is_always_read(plotter, counts):
     assert counts["render_vdi"] == 1  # it is as it was
 
 
-def test_vtk_copies_no_depth(plotter):
+def test_vtk_copies_no_depth(plotter, monkeypatch):
+    made = []
+
+    class Texture(vtkTextureObject):
+        def CreateDepthFromRaw(self, *args):
+            made.append(self)
+            return super().CreateDepthFromRaw(*args)
+
+    monkeypatch.setattr(texture_module, "vtkTextureObject", Texture)
     plotter.show(auto_close=False)
-    drawing = plotter.volume.mapper.driver
-    texture = drawing._no_depth._texture
+    drawing, (texture,) = plotter.volume.mapper.driver, made
     assert (texture.GetWidth(), texture.GetHeight()) == (1, 1)
     assert texture.GetReferenceCount() == 2  # ours, and the mapper's
     drawing.release()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import inspect
+from types import FunctionType, ModuleType
 
 import numpy as np
 import pytest
@@ -556,11 +557,15 @@ def test_a_source_holds_properties_and_cameras_in_vtk_alone():
     source = ready_source(camera=camera)
     source.SetVolumeProperty(prop)
     source.TrackCameraOn()
-    held = vars(source), vars(source._given), *source._observed
-    for thing in (prop, camera, prop.GetScalarOpacity()):
-        assert not any(by is each for by in gc.get_referrers(thing) for each in held)
+    reached, found = [vars(source)], set()
+    while reached:
+        each = reached.pop()
+        if id(each) not in found and not isinstance(each, type | ModuleType | FunctionType):
+            found.add(id(each))
+            reached += gc.get_referents(each)
+    assert not found & {id(prop), id(camera), id(prop.GetScalarOpacity())}
     address = prop.GetAddressAsString("")
-    del prop, camera, thing
+    del prop, camera
     gc.collect()
     assert isinstance(source.GetVolumeProperty(), pv.VolumeProperty)
     assert source.GetVolumeProperty().GetAddressAsString("") == address

@@ -6,12 +6,22 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.model.coverage import bounds_corners
+from pyvista_vdi.vtk_pipeline.drawing.shader import fill_viewport
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, Held, watch
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkStreamingDemandDrivenPipeline
 
 _EXTENT = (0, 1, 0, 1, 0, 1)
 _EMPTY = (0, -1, 0, -1, 0, -1)
+
+#: Diagonals from the origin beyond which a box fills the viewport instead: VTK places boxes in
+#: float32, which rounds corners by a pixel in ten thousand there, and by more beyond.
+_FAR = 1000.0
+
+#: Edge of the box that VTK draws then, about the origin: so small that no eye is inside.
+_EDGE = 2e-3
 
 
 class Box(Algorithm):
@@ -34,6 +44,7 @@ class Box(Algorithm):
         self._shown: Input | None = None
         self.components = 1
         self._stands = False
+        self._far: tuple[Any, Any] | None = None  # origin and spacing, in a frame of what is far
         self._watched: tuple[Held, int] | None = None
         self.Update()
         self.image = self.GetOutputDataObject(0)
@@ -90,14 +101,32 @@ class Box(Algorithm):
             self.image.SetOrigin(*low)
             self.image.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
 
-    def begin(self) -> None:
-        """Add points while a frame is drawn: VTK writes an error where there are none."""
+    def begin(self, actor: Any) -> None:
+        """Be what VTK can draw in a frame of an actor; between frames the bounds are the VDI's.
+
+        VTK writes an error where there are no points, and float32 cannot place what is far from the
+        origin: a box about the origin has the whole viewport drawn then, where the image that is
+        looked up is transparent beside the VDI.
+        """
+        self.end()  # of a frame that VTK has broken off
         self._stands = self.image.GetNumberOfPoints() == 0
         if self._stands:
             self.place((0, 1, 0, 1, 0, 1))
+        if actor is None:
+            return
+        far = _is_far(as_array(actor.GetMatrix()), self.image.GetBounds())
+        fill_viewport(actor, _EDGE if far else None)
+        if far:
+            self._far = self.image.GetOrigin(), self.image.GetSpacing()
+            self.image.SetOrigin([-_EDGE / 2] * 3)
+            self.image.SetSpacing([_EDGE] * 3)
 
     def end(self) -> None:
-        """Remove the points again, if there are no bounds."""
+        """Have the bounds again, or none."""
+        if self._far is not None:
+            (origin, spacing), self._far = self._far, None
+            self.image.SetOrigin(origin)
+            self.image.SetSpacing(spacing)
         if self._stands:
             self._stands = False
             self.place(None)
@@ -121,3 +150,13 @@ class Box(Algorithm):
     def _allocate(self) -> None:
         self.image.AllocateScalars(3, self.components)  # VTK_UNSIGNED_CHAR
         self.image.GetPointData().GetScalars().Fill(0)
+
+
+def _is_far(matrix: Any, bounds: Any) -> bool:
+    """Whether a box is far from the origin of the model frame, or of the world."""
+    model = bounds_corners(bounds)
+    far = [
+        np.abs(at).max() > _FAR * np.linalg.norm(np.ptp(at, axis=0))
+        for at in (model, model @ matrix[:3, :3].T + matrix[:3, 3])
+    ]
+    return any(far)

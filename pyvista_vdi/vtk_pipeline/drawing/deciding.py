@@ -10,7 +10,6 @@ import logging
 import math
 import weakref
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, TypeAlias
 
@@ -21,6 +20,7 @@ from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality import frame_state as fs
 from pyvista_vdi.quality.decide import busy, decide, growth
+from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.volume_picture import (
@@ -64,6 +64,7 @@ class Deciding:
         self._numbered: Callable[[], VDI | None] = lambda: None
         self._number = 0
         self._options = RenderOptions()  # how the last frame's VDI is drawn
+        self._sighted: Frame | None = None  # the VDI made last, in the frame that is decided
         self._behind, self._estimators = Behind(), Estimators()
         self._swapped = False
         self._timer = Timer(self._tick)
@@ -112,8 +113,8 @@ class Deciding:
 
     # What a frame shows
 
-    def decided(self, frame: Frame, *, joint: bool) -> Shown:
-        """Return what a frame is to show: the VDI, brought up to date, or the volume."""
+    def decided(self, frame: Frame, *, joint: bool) -> Frame | None:
+        """Return the frame of what it is to show: the VDI, brought up to date, or the volume."""
         source, settings = self.input, self.state.settings
         if source is None:
             return None
@@ -121,11 +122,19 @@ class Deciding:
             source.set_view_if_missing(frame.renderer, frame.model_transform)
         try:
             if isinstance(source, SourceInput):
-                return self.tell(self._asked(source, frame, joint=joint), frame)
-            return self._stored(source, frame)
+                seen = self.tell(self._asked(source, frame, joint=joint), frame)
+            else:
+                seen = self._stored(source, frame)
         except Cancelled as error:
             shown = self._volumes.lasting is not None or source.last() is not None
-            return self.tell(fs.Interrupted(error, shown), frame)
+            seen = self.tell(fs.Interrupted(error, shown), frame)
+        finally:  # it holds the renderer
+            sighted, self._sighted = self._sighted, None
+        if seen is None or isinstance(seen, VolumePicture):
+            return None if seen is None else frame.showing(seen, seen.number)
+        if sighted is not None and sighted.vdi is seen and settings is self.state.settings:
+            return sighted
+        return frame.showing(seen, self._number_of(seen))
 
     def _number_of(self, vdi: VDI) -> int:
         """Return the number of a VDI, another one than that of the VDI before."""
@@ -190,13 +199,12 @@ class Deciding:
             return None
         number = self._number_of(vdi)
         shown, view = frame.showing(vdi, number), frame.view
-        self._options = shown.world_options()
+        self._options, self._sighted = shown.world_options(), shown
         detail = covered = 1.0
         if self.state.settings.draw == "auto":  # else nobody asks
             detail = magnification(vdi, frame.camera, frame.full_size)
             covered = coverage(vdi, view.camera, view.size)
-        pixels = shown.covered(vdi.bounds)
-        of = (shown.angle, detail, covered, pixels, self._options)
+        of = (shown.angle, detail, covered, shown.covered, self._options)
         return fs.Sight(number, vdi.bounds, made, *of)
 
     def _stored(self, source: Input, frame: Frame) -> VDI | None:

@@ -55,9 +55,7 @@ class OpaqueDepths:
         """
         frame = frames[0]
         renderer = frame.renderer  # it has drawn what is opaque
-        farthest = max(own.depths_of(own.bounds)[1] for own in frames)
-        drawing = [thing for own in frames for thing in consumers(own.actor)]
-        opaque = _opaque_before(renderer, frame.to_view, farthest, drawing)
+        opaque = _opaque_before(frames)
         if opaque is None:
             return None
         if renderer.GetPass() is not None or not all(_is_plain(prop) for prop in opaque):
@@ -78,31 +76,31 @@ class OpaqueDepths:
         return known.depth
 
 
-def _opaque_before(
-    renderer: Any, to_view: Matrix, farthest: float, drawing: Sequence[Any]
-) -> list[Any] | None:
-    """Return the opaque props of a renderer that reach before a view depth; ``None`` if none do.
+def _opaque_before(frames: Sequence[Frame]) -> list[Any] | None:
+    """Return the opaque props of a renderer that reach before the end of VDIs; ``None`` if none do.
 
-    Conservative: what has no bounds counts, and so do the assemblies that are ``drawing``: they
+    Conservative: what has no bounds counts, and so do the assemblies that are being drawn: they
     must not be asked, for an answer would end their walk through their parts. An empty list stands
     for what a lower layer drew, if its depth was kept.
     """
+    renderer = frames[0].renderer
+    found: list[Any] = []
     if renderer.GetPreserveDepthBuffer():
-        return []
-    props = renderer.GetViewProps()
-    found = []
+        return found
+    props, drawing, farthest = renderer.GetViewProps(), None, 0.0
     for i in range(props.GetNumberOfItems()):
         prop = props.GetItemAsObject(i)
         if not prop.GetVisibility() or isinstance(prop, vtkActor2D | vtkVolume):
             continue
+        if drawing is None:  # there is something else than volumes
+            drawing = [thing for own in frames for thing in consumers(own.actor)]
+            farthest = max(own.depths_of(own.bounds)[1] for own in frames)
         if prop in drawing:
             found.append(prop)
-            continue
-        if not prop.HasOpaqueGeometry():
-            continue
-        box = prop.GetBounds()
-        if not _is_box(box) or depths_of(to_view, box)[0] < farthest:
-            found.append(prop)
+        elif prop.HasOpaqueGeometry():
+            box = prop.GetBounds()
+            if not _is_box(box) or depths_of(frames[0].to_view, box)[0] < farthest:
+                found.append(prop)
     return found or None
 
 

@@ -9,7 +9,6 @@ import math
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
@@ -19,6 +18,7 @@ from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.decide import placeholder_share, ssim_of
 from pyvista_vdi.quality.frame_state import FrameTook, PlaceholderTook, VDIAsked, ViewPicked
 from pyvista_vdi.quality.pace import reduced
+from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.render_mode import seconds_per_pixel
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick
@@ -33,12 +33,11 @@ from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, touch
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
-from pyvista_vdi.vtk_pipeline.drawing.volume_picture import VolumePicture
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window, now
-from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference, weakly
 
 #: What is said where another volume has the mapper.
 _BEHIND_ANOTHER = (
@@ -56,7 +55,7 @@ class Driver(Deciding):
     def __init__(self) -> None:
         super().__init__()
         self.box = Box()
-        self._actor = vtkWeakReference()
+        self._actor: Callable[[], Any] = lambda: None
         self._active = vtkWeakReference()  # which renderer is between its start and its end
         self._watched = Met()
         self._view: View | None = None  # of the last frame
@@ -72,23 +71,23 @@ class Driver(Deciding):
 
     def set_actor(self, actor: Any) -> None:
         """Remember whose matrix and renderers count."""
-        other = self._actor.Get()
+        other = self._actor()
         if other is not None and other is not actor:
             raise InvalidArgumentError(
                 "this VDIMapper is already behind another VDIActor: give each actor its own "
                 "(the VDI itself can be shared)"
             )
-        self._actor.Set(actor)
+        self._actor = weakly(actor)
 
     def leave_actor(self, actor: Any) -> None:
         """Forget that actor, if it is this one."""
-        if self._actor.Get() is actor:
-            self._actor.Set(None)
+        if self._actor() is actor:
+            self._actor = lambda: None
 
     @property
     def actor(self) -> Any:
         """The actor that this draws for, whose matrix and renderers count; ``None`` without one."""
-        return self._actor.Get()
+        return self._actor()
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
@@ -127,7 +126,7 @@ class Driver(Deciding):
 
     def begin(self, mapper: Any) -> None:
         """Raycast and upload the image for the frame that has just begun."""
-        actor, renderer = self._actor.Get(), self.renderer()
+        actor, renderer = self._actor(), self.renderer()
         # Else a copy of the actor by vtkVolume.ShallowCopy draws, in another window
         self._astray = renderer is None or not _is_drawing(renderer)
         if self._astray:
@@ -180,7 +179,8 @@ class Driver(Deciding):
             if part is not None:
                 return part
         window = self.window
-        frame = replace(frame, depth=window.shared(OpaqueDepths).read([frame]))
+        depth = window.shared(OpaqueDepths).read([frame])
+        frame = frame if depth is None else replace(frame, depth=depth)
         at_rest = reduced(frame.full_size, 1 / self.state.settings.image_distance**2)
         frame = frame.coarser(at_rest)
         drawn = self._images.get(frame)
@@ -197,7 +197,7 @@ class Driver(Deciding):
 
     def _frame(self, mapper: Any, renderer: Any) -> tuple[Frame | None, bool]:
         """Return the frame of what it shows, ``None`` if that is nothing, and if others do, too."""
-        frame = Frame.current(renderer, self._actor.Get(), mapper)
+        frame = Frame.current(renderer, self._actor(), mapper)
         window = Window.of(renderer.GetRenderWindow())
         self._window, self._view = weakref.ref(window), frame.view
         window.join(self, renderer)
@@ -206,16 +206,12 @@ class Driver(Deciding):
         if others and any(p.GetMapper() is mapper and p is not frame.actor for p in shown):
             self._warnings.warn(_BEHIND_ANOTHER)
         seen = self.decided(frame, joint=others and self._overlapped(frame, shown))
-        if seen is None:
-            return None, others
-        self.box.place(seen.bounds)
-        if isinstance(seen, VolumePicture):
-            return frame.showing(seen, seen.number), others
-        number = self._number_of(seen)
-        if number != self._counted:
-            self._counted = number
-            self._generation += 1
-        return frame.showing(seen, number), others
+        if seen is not None:
+            self.box.place(seen.bounds)
+            if seen.volume is None and seen.number != self._counted:
+                self._counted = seen.number
+                self._generation += 1
+        return seen, others
 
     def preview_size(self, frame: Frame) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
@@ -238,7 +234,7 @@ class Driver(Deciding):
                 floor,
                 frame.cost,
                 effort=frame.effort,
-                expected=each * frame.covered(frame.bounds) if known else None,  # type: ignore[operator]
+                expected=each * frame.covered if known else None,  # type: ignore[operator]
             )
         return reduced(frame.full_size, min(share, 1 / settings.image_distance**2))
 
@@ -263,7 +259,7 @@ class Driver(Deciding):
             window.pace = window.pace.drawn(*took)
         # A volume's first picture has kernels compiled and voxels sent to the device
         if frame.few_lists is None and (volume is None or volume.pictures > 1):
-            self.tell(FrameTook(frame.way, frame.angle, frame.covered(frame.bounds), seconds))
+            self.tell(FrameTook(frame.way, frame.angle, frame.covered, seconds))
         return drawn
 
     def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
@@ -383,7 +379,7 @@ class Driver(Deciding):
 
     def _select(self, mapper: Any, renderer: Any) -> None:
         """Draw what can be picked of what the last frame showed, or the first would show."""
-        actor, selection = self._actor.Get(), self._selection
+        actor, selection = self._actor(), self._selection
         selection.enter(actor, renderer.GetSelector())
         seen = None
         try:
@@ -420,7 +416,7 @@ class Driver(Deciding):
         return self._guarded(self._frame_in_picture, mapper, renderer)  # type: ignore[no-any-return]
 
     def _frame_in_picture(self, mapper: Any, renderer: Any) -> Frame | None:
-        actor = self._actor.Get()
+        actor = self._actor()
         bounds = None if self.input is None else self.input.bounds()
         if actor is None or bounds is None:
             return None
@@ -447,7 +443,7 @@ class Driver(Deciding):
 
     def renderers(self) -> list[Any]:
         """Return all renderers that show the actor, by itself or as a part of an assembly."""
-        there = consumers(self._actor.Get())
+        there = consumers(self._actor())
         return list(dict.fromkeys(c for c in there if c.IsA("vtkRenderer")))
 
     def _watch(self, renderer: Any) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +19,7 @@ from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.frame_state import RenderMode
 from pyvista_vdi.quality.pace import Cost
+from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.render_mode import rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view
@@ -106,9 +108,9 @@ class Frame:
         return cls(size, (x, y), camera, to_view, projection[2:], *of)
 
     @classmethod
-    def of(cls, camera: Camera, size: tuple[int, int]) -> Frame:
+    def of(cls, camera: Camera, size: tuple[int, int], bounds: tuple[float, ...]) -> Frame:
         """Return a frame of no renderer, for what its view shows."""
-        return cls(size, (0, 0), camera, np.eye(4), np.eye(4)[2:], full_size=size)
+        return cls(size, (0, 0), camera, np.eye(4), np.eye(4)[2:], full_size=size, bounds=bounds)
 
     @property
     def driver(self) -> Any:
@@ -228,9 +230,10 @@ class Frame:
             return None
         return np.stack([low, high])
 
-    def covered(self, bounds: tuple[float, ...]) -> float:
-        """Return how many of the image's pixels bounds may be seen in."""
-        rectangle = self.rectangle(bounds)
+    @cached_property
+    def covered(self) -> float:
+        """How many of the image's pixels the bounds may be seen in."""
+        rectangle = self.rectangle(self.bounds)
         if rectangle is None:
             return 0.0
         low, high = np.clip(rectangle, 0, self.size)

@@ -9,6 +9,7 @@ and the fragment shader that ``VDIActor`` installs looks it up.
 from __future__ import annotations
 
 import gc
+from collections.abc import Callable
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -26,22 +27,21 @@ from pyvista_vdi.quality.frame_state import checked_image_distance
 from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
-from pyvista_vdi.vtk_pipeline.drawing.far_box import FarBox
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, weakly
 
 #: Drivers, with their mappers held weakly. VTK's garbage collector deletes a mapper under a lock;
 #: Python code that ran then, such as callbacks of weak references to what a driver holds, would
 #: let another thread take the interpreter and wait for that lock. So a driver outlives its mapper
 #: until ordinary code, or Python's garbage collector, finds it here.
-_drivers: dict[int, tuple[vtkWeakReference, Driver]] = {}
+_drivers: dict[int, tuple[Callable[[], Any], Driver]] = {}
 
 
 def _let_go_of_drivers(*_: Any) -> None:
     for key, (mapper, _driver) in list(_drivers.items()):
-        if mapper.Get() is None:
+        if mapper() is None:
             _drivers.pop(key, None)
 
 
@@ -52,15 +52,15 @@ COARSEST = 4.0
 
 
 def _on_start(mapper: Any, event: str) -> None:
-    mapper.driver.begin(mapper)
-    mapper.driver.box.begin()
-    mapper._far_box.begin(mapper.driver.actor, mapper.driver.proxy)
+    driver = mapper.driver
+    driver.begin(mapper)
+    driver.box.begin(driver.actor)
 
 
 def _on_end(mapper: Any, event: str) -> None:
-    mapper.driver.end()
-    mapper._far_box.end(mapper.driver.proxy)
-    mapper.driver.box.end()
+    driver = mapper.driver
+    driver.end()
+    driver.box.end()
 
 
 @refusing(OF_MAPPERS)
@@ -68,14 +68,12 @@ class VDIMapperMethods(ArrayChoiceMethods):
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
     _driver: Driver | None = None
-    _far_box: FarBox | None = None
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._driver, self._far_box, weak = Driver(), FarBox(), vtkWeakReference()
-        weak.Set(self)
+        self._driver = Driver()
         _let_go_of_drivers()
-        _drivers[id(self._driver)] = weak, self._driver
+        _drivers[id(self._driver)] = weakly(self), self._driver
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)

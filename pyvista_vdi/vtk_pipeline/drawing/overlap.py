@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.quality.records import replace
 from pyvista_vdi.raycasting.multi_vdi import OwnedImage, owned_image
 from pyvista_vdi.raycasting.placed import PlacedVDI
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths

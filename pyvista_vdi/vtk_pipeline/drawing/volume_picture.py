@@ -131,9 +131,9 @@ def prepared(runtime: Runtime, request: Request, *, time: bool) -> FrameTook | N
     volume.picture(FrameRequest(camera, (TRIAL_SIZE, TRIAL_SIZE)))
     if not time:
         return None
-    trial, taken = Frame.of(camera, reduced(request.screen.size, FLOOR)), []
+    trial, taken = Frame.of(camera, reduced(request.screen.size, FLOOR), volume.bounds), []
     for _ in range(_TRIALS):
         began = runtime.clock()
         volume.picture(FrameRequest(camera, trial.size))
         taken.append(runtime.clock() - began)
-    return FrameTook("volume", 0.0, trial.covered(volume.bounds), min(taken))
+    return FrameTook("volume", 0.0, trial.covered, min(taken))

@@ -183,11 +183,10 @@ def watch(
 
     Returns the observer's tag.
     """
-    weak = vtk.vtkWeakReference()
-    weak.Set(algorithm)
+    weak = vtk.weakly(algorithm)
 
     def modified(*_: Any) -> None:
-        found = weak.Get()
+        found = weak()
         if found is not None:
             changed(found)
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View as View
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Held
-from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import weakly
 
 
 def as_array(matrix: Any) -> NDArray[np.float64]:
@@ -43,6 +43,8 @@ def camera_of(camera: Any, model_transform: ArrayLike | None = None) -> Camera:
     if model_transform is None or isinstance(camera, Camera):
         return view
     on_top = as_array(camera.GetModelTransformMatrix())
+    if (on_top == np.eye(4)).all():  # nearly always
+        return view
     return view.replace(model_transform=on_top @ view.model_transform)
 
 
@@ -64,8 +66,7 @@ class TrackedCamera:
         self._held = Held(camera)
         self.model_transform = model_transform
         self._pose = _pose(camera)
-        self._source = vtkWeakReference()
-        self._source.Set(source)
+        self._source = weakly(source)
         self._tag: int | None = None
 
     @property
@@ -83,7 +84,7 @@ class TrackedCamera:
         weak, seen = self._source, [_pose(self.camera)]
 
         def changed(camera: Any, _: str) -> None:
-            pose, source = _pose(camera), weak.Get()
+            pose, source = _pose(camera), weak()
             # Renderers modify their cameras in every frame, by the clipping range
             if source is not None and pose != seen[0]:
                 seen[0] = pose

@@ -16,6 +16,9 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Protocol
 
+#: What has the helpers, where somebody has imported it.
+_TRAME = "trame_vtk.modules.vtk"
+
 
 class Follower(Protocol):
     """What shows, in a browser, the VDIs of a window as they are after each of its frames."""
@@ -38,6 +41,8 @@ def follow(follower: Follower) -> None:
 
 def watches(window: Any) -> bool:
     """Whether a browser shows pictures of a window, or follows it."""
+    if not _followers and _TRAME not in sys.modules:
+        return False
     return bool(_following(window)) or next(_publishers(window), None) is not None
 
 
@@ -98,7 +103,7 @@ def _following(window: Any) -> list[Follower]:
 
 
 def _helpers() -> list[Any]:
-    module = sys.modules.get("trame_vtk.modules.vtk")
+    module = sys.modules.get(_TRAME)
     return list(getattr(module, "HELPERS_PER_SERVER", {}).values())
 
 

@@ -11,7 +11,7 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import describe
 from pyvista_vdi.quality.frame_state import RenderMode
-from pyvista_vdi.vtk_pipeline.vtk import vtkCornerAnnotation, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import vtkCornerAnnotation, weakly
 
 _log = logging.getLogger(__name__)
 
@@ -126,7 +126,7 @@ class CornerTexts:
     """Annotations that show a status; the renderers own them."""
 
     def __init__(self) -> None:
-        self._texts: list[tuple[vtkWeakReference, vtkWeakReference, int]] = []
+        self._texts: list[tuple[Callable[[], Any], Callable[[], Any], int]] = []
         self._progress: float | None = None
 
     def add(self, renderer: Any, corner: str) -> vtkCornerAnnotation:
@@ -141,19 +141,16 @@ class CornerTexts:
         look.SetBackgroundColor(0.0, 0.0, 0.0)
         look.SetBackgroundOpacity(0.5)
         renderer.AddViewProp(annotation)
-        text, where = vtkWeakReference(), vtkWeakReference()
-        text.Set(annotation)
-        where.Set(renderer)
-        self._texts.append((text, where, CORNERS[corner]))
+        self._texts.append((weakly(annotation), weakly(renderer), CORNERS[corner]))
         return annotation
 
     def write(self, renderer: Any, status: Callable[[], VDIStatus]) -> None:
         """Show the status in the frame that this renderer is drawing."""
-        self._texts = [text for text in self._texts if text[0].Get() is not None]
+        self._texts = [text for text in self._texts if text[0]() is not None]
         for text, where, corner in self._texts:
-            if where.Get() is not renderer:
+            if where() is not renderer:
                 continue
-            annotation, now = text.Get(), status()
+            annotation, now = text(), status()
             self._progress = now.progress
             lines = str(now).replace(", ", "\n")
             if annotation.GetText(corner) != lines:

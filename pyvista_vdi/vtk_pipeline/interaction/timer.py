@@ -7,7 +7,7 @@ import weakref
 from collections.abc import Callable
 from typing import Any
 
-from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, weakly
 
 #: Milliseconds between two looks: a new VDI appears at most two frames of 30 per second late.
 PERIOD = 50
@@ -47,7 +47,7 @@ class Timer:
 
     def __init__(self, tick: Callable[[], None]) -> None:
         self._tick = weakref.WeakMethod(tick)
-        self._interactor = vtkWeakReference()
+        self._interactor: Callable[[], Any] = lambda: None
         self._timer = 0
         self._period = PERIOD
         self._observers: tuple[int, ...] = ()
@@ -64,7 +64,7 @@ class Timer:
 
         Also, ``in_loop``, in the asyncio loop that runs in this thread, if one does.
         """
-        if interactor is not self._interactor.Get() or interactor is None:
+        if interactor is not self._interactor() or interactor is None:
             self._leave()
         if interactor is not None and not (self.running and period == self._period):
             if not self._observers:
@@ -77,7 +77,7 @@ class Timer:
 
     def pause(self) -> None:
         """Take the interactor's timer away."""
-        interactor = self._interactor.Get()
+        interactor = self._interactor()
         if interactor is not None and self.running:
             interactor.DestroyTimer(self._timer)
         self._timer = 0
@@ -89,7 +89,7 @@ class Timer:
 
     def _leave(self) -> None:
         self.pause()
-        interactor = self._interactor.Get()
+        interactor = self._interactor()
         if interactor is not None:
             for observer in self._observers:
                 interactor.RemoveObserver(observer)
@@ -118,11 +118,11 @@ class Timer:
         interaction = interactor.AddObserver("StartInteractionEvent", on_interaction)
         # Or a style that has taken all events would keep it from us
         interactor.GetCommand(interaction).PassiveObserverOn()
-        self._interactor.Set(interactor)
+        self._interactor = weakly(interactor)
         self._observers = (ticks, interaction)
 
     def _on_timer(self, number: int) -> None:
-        interactor = self._interactor.Get()
+        interactor = self._interactor()
         if number == self._timer and interactor is not None and self._observers:
             interactor.GetCommand(self._observers[0]).SetAbortFlag(1)
         tick = self._tick()

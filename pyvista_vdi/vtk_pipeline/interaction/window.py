@@ -9,12 +9,13 @@ from __future__ import annotations
 import contextlib
 import time
 import weakref
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 from pyvista_vdi.quality.frame_state import Settings
 from pyvista_vdi.quality.pace import Pace
 from pyvista_vdi.vtk_pipeline.interaction import browser
-from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGL2PSHelper, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGL2PSHelper, weakly
 
 T = TypeVar("T")
 
@@ -38,15 +39,16 @@ class Met:
     """VTK's objects that were met before, held weakly: another may have an address later."""
 
     def __init__(self) -> None:
-        self._met: dict[str, vtkWeakReference] = {}
+        self._met: dict[str, Callable[[], Any]] = {}
 
     def is_new(self, thing: Any) -> bool:
         """Whether this is the first time; from now on it is not."""
-        known = self._met.setdefault(thing.GetAddressAsString(""), vtkWeakReference())
-        new = known.Get() is not thing
-        if new:
-            known.Set(thing)
-        return new
+        address = thing.GetAddressAsString("")
+        known = self._met.get(address)
+        if known is not None and known() is thing:
+            return False
+        self._met[address] = weakly(thing)
+        return True
 
 
 class Window:
@@ -66,12 +68,11 @@ class Window:
         self.number = 0
         self.pace = Pace()
         self.of_frame: dict[Any, Any] = {}
-        self._window = vtkWeakReference()
-        self._window.Set(window)
+        self._window = weakly(window)
         self._drivers: weakref.WeakSet[Any] = weakref.WeakSet()
         self._shared: dict[type, Any] = {}
         self._watched = Met()
-        self._known: list[vtkWeakReference] = []
+        self._known: list[Callable[[], Any]] = []
         self._given_up: int | None = None  # the window's multisampling, in a frame without it
         self._started: float | None = None
         self._previewed = False
@@ -86,7 +87,7 @@ class Window:
         address = window.GetAddressAsString("")
         known = _windows.get(address)
         found = None if known is None else known()
-        if found is None or found._window.Get() is not window:
+        if found is None or found._window() is not window:
             for gone in [key for key, each in list(_windows.items()) if each() is None]:
                 _windows.pop(gone, None)
             found = cls(window)
@@ -144,7 +145,7 @@ class Window:
 
     def render(self) -> None:
         """Draw the window, as from its event loop."""
-        window = self._window.Get()
+        window = self._window()
         if window is not None and browser.push(window):
             return
         interactor = None if window is None else window.GetInteractor()
@@ -155,32 +156,32 @@ class Window:
 
     def watched_behind(self, settings: Settings) -> bool:
         """Whether work may go on behind the frames: somebody watches, and can move."""
-        window = self._window.Get()
+        window = self._window()
         here = bool(window.GetShowWindow()) and window.GetInteractor() is not None
         return here or self._from_afar(settings)
 
     def _from_afar(self, settings: Settings) -> bool:
         on = settings.off_screen
-        return browser.watches(self._window.Get()) if on is None else on
+        return browser.watches(self._window()) if on is None else on
 
     def rate(self, settings: Settings) -> float:
         """Return the frames per second to be kept while a hand moves."""
-        return float(settings.target or self._window.Get().GetDesiredUpdateRate())
+        return float(settings.target or self._window().GetDesiredUpdateRate())
 
     def moving(self, settings: Settings) -> bool:
         """Whether a hand moves, by VTK's convention."""
-        return bool(self._window.Get().GetDesiredUpdateRate() >= settings.update_rate)
+        return bool(self._window().GetDesiredUpdateRate() >= settings.update_rate)
 
     def previews(self, settings: Settings) -> bool:
         """Whether frames may have fewer rays now: a hand moves, and somebody watches."""
         if not (settings.previews and self.moving(settings)):
             return False
-        return bool(self._window.Get().GetShowWindow()) or self._from_afar(settings)
+        return bool(self._window().GetShowWindow()) or self._from_afar(settings)
 
     @property
     def whole_picture(self) -> bool:
         """Whether this frame is a whole picture by itself, and not a tile of one."""
-        window = self._window.Get()
+        window = self._window()
         return window is None or tuple(window.GetTileScale()) == (1, 1)
 
     def takes_picture(self, renderer: Any) -> bool:
@@ -198,12 +199,10 @@ class Window:
 
     def knows(self, camera: Any) -> bool:
         """Whether something was drawn with this camera before; from now on it was."""
-        if any(known.Get() is camera for known in self._known):
+        there = [known for known in self._known if known() is not None]
+        if any(known() is camera for known in there):
             return True
-        weak = vtkWeakReference()
-        weak.Set(camera)
-        known = [each for each in self._known if each.Get() is not None]
-        self._known = [*known[1 - _KNOWN_CAMERAS :], weak]
+        self._known = [*there[1 - _KNOWN_CAMERAS :], weakly(camera)]
         return False
 
     # Its frames
@@ -220,7 +219,7 @@ class Window:
         self._foreground.close()
         for runtime in {driver.runtime() for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
-        window = self._window.Get()
+        window = self._window()
         samples = window.GetMultiSamples()
         if samples and self.pace.dear_samples and self._may_go_without(window, drivers):
             self._given_up, samples = samples, 0
@@ -235,7 +234,7 @@ class Window:
             for renderer in driver.renderers()
             if renderer.GetRenderWindow() is window and driver.actor.GetVisibility()
         ]
-        cameras = [known.Get() for known in self._known]
+        cameras = [known() for known in self._known]
         return bool(shown) and all(
             settings.adjust_multi_samples
             and self.previews(settings)
@@ -245,7 +244,7 @@ class Window:
         )
 
     def _end(self) -> None:
-        window = self._window.Get()
+        window = self._window()
         given_up, self._given_up = self._given_up, None
         if given_up is not None and not window.GetMultiSamples():  # it is as it was left here
             window.SetMultiSamples(given_up)
@@ -263,7 +262,7 @@ class Window:
         ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and
         may then take the picture that is on the screen, as ``Plotter.screenshot`` has it.
         """
-        window = self._window.Get()
+        window = self._window()
         if not self._previewed or self._started is not None or window is None:
             return
         interactor = window.GetInteractor()
