@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
@@ -13,6 +14,8 @@ import pyvista as pv
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.io import is_vdi_file, read
+from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.drawing_options import DrawingOptions
@@ -127,6 +130,9 @@ def added(
     plotter: Any, volume: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
+    if isinstance(volume, str | os.PathLike):
+        array = asked.array.scalars if isinstance(asked.array.scalars, str) else None
+        volume = read(volume) if is_vdi_file(volume) else read_volume(volume, array=array)
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like

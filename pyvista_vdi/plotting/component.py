@@ -130,8 +130,9 @@ class AddVDI(Component):
 
         Parameters
         ----------
-        volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, or one or more VDIs
-            A uniform grid, or a rectilinear one of equidistant points (other grids are refused,
+        volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, path, or VDIs
+            A file as :func:`pyvista_vdi.read_volume` or :func:`pyvista_vdi.read` reads it. A
+            uniform grid, or a rectilinear one of equidistant points (other grids are refused,
             with the remedy), a NumPy array as ``add_volume`` takes it, blocks of uniform grids, a
             VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
