@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
     import os
+
     from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
     from pyvista_vdi.model.camera import Camera
     from pyvista_vdi.model.cropping import Cropping
