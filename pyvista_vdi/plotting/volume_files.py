@@ -127,6 +127,8 @@ def _read(file: Path) -> Any:
             raise
         except Exception as error:  # each format has readers, and exceptions, of its own
             first = (str(error) or type(error).__name__).splitlines()[0]
+            if file.suffix in (".xdmf", ".xmf") and isinstance(error, TypeError):
+                first = 'it says no time: write <Time Value="0"/> into its Grid'
             raise InvalidVolumeError(
                 f"{file} cannot be read as a volume ({messages[0] if messages else first}): it is "
                 "of a format that is not known here, or damaged: convert it to NRRD, NIfTI or VTI"

@@ -45,7 +45,6 @@ class Kind:
     to_world: np.ndarray = field(default_factory=affine)
     unit: str = ""
     options: dict = field(default_factory=dict)
-    itk: bool = False  # whether SimpleITK reads the file, and places it likewise
     flipped: bool = False  # in NIfTI's frame, whose x and y are SimpleITK's negated
 
 
@@ -63,13 +62,13 @@ def kind(make):
 @kind
 def nifti(folder):
     path = write_nifti(folder / "a.nii", scan(), SPACING, sform=affine(direction=turned()))
-    return Kind(path, to_world=affine(direction=turned()), unit="mm", itk=True, flipped=True)
+    return Kind(path, to_world=affine(direction=turned()), unit="mm", flipped=True)
 
 
 @kind
 def nifti_gz(folder):
     path = write_nifti(folder / "a.nii.gz", scan(), SPACING, quaternion=(0, 0, 0, *ORIGIN))
-    return Kind(path, unit="mm", itk=True, flipped=True)
+    return Kind(path, unit="mm", flipped=True)
 
 
 @kind
@@ -81,7 +80,7 @@ def nifti_misnamed(folder):
 @kind
 def nifti_scaled(folder):
     path = write_nifti(folder / "a.nii", scan(), SPACING, sform=affine(), slope=0.5)
-    return Kind(path, scan() * 0.5 - 3, unit="mm", itk=True, flipped=True)
+    return Kind(path, scan() * 0.5 - 3, unit="mm", flipped=True)
 
 
 @kind
@@ -104,7 +103,7 @@ def nifti_pair(folder):
     header[344:348] = b"ni1\0"
     (folder / "b.hdr").write_bytes(header)
     (folder / "b.img").write_bytes(whole[352:])
-    return Kind(folder / "b.img", unit="mm", itk=True, flipped=True)
+    return Kind(folder / "b.img", unit="mm", flipped=True)
 
 
 @kind
@@ -241,13 +240,13 @@ def _bytes(array=None):
 @kind
 def nrrd(folder):
     header = f"encoding: raw\n{_LPS}space directions: {_STEPS}\n"
-    return Kind(_nrrd(folder, header, _bytes()), itk=True)
+    return Kind(_nrrd(folder, header, _bytes()))
 
 
 @kind
 def nrrd_gzip(folder):
     header = f'encoding: gzip\n{_LPS}space directions: {_STEPS}\nspace units: "mm" "mm" "mm"\n'
-    return Kind(_nrrd(folder, header, gzip.compress(_bytes())), unit="mm", itk=True)
+    return Kind(_nrrd(folder, header, gzip.compress(_bytes())), unit="mm")
 
 
 @kind
@@ -260,7 +259,7 @@ def nrrd_text(folder):
 def nrrd_detached(folder):
     (folder / "a.raw").write_bytes(_bytes())
     header = f"encoding: raw\n{_LPS}space directions: {_STEPS}\ndata file: a.raw\n"
-    return Kind(_nrrd(folder, header, name="a.nhdr"), itk=True)
+    return Kind(_nrrd(folder, header, name="a.nhdr"))
 
 
 def _pieces(folder):
@@ -272,12 +271,12 @@ def _pieces(folder):
 @kind
 def nrrd_list(folder):
     names = "".join(f"s{i}.raw\n" for i in range(5))
-    return Kind(_nrrd(folder, f"{_pieces(folder)}LIST\n{names}", name="a.nhdr"), itk=True)
+    return Kind(_nrrd(folder, f"{_pieces(folder)}LIST\n{names}", name="a.nhdr"))
 
 
 @kind
 def nrrd_pattern(folder):
-    return Kind(_nrrd(folder, f"{_pieces(folder)}s%d.raw 0 4 1\n", name="a.nhdr"), itk=True)
+    return Kind(_nrrd(folder, f"{_pieces(folder)}s%d.raw 0 4 1\n", name="a.nhdr"))
 
 
 @kind
@@ -321,13 +320,13 @@ def nrrd_times(folder):
 @kind
 def meta_image(folder):
     path = write_meta_image(folder / "a.mha", scan(), SPACING, ORIGIN, turned())
-    return Kind(path, to_world=affine(direction=turned()), itk=True)
+    return Kind(path, to_world=affine(direction=turned()))
 
 
 @kind
 def meta_image_detached(folder):
     path = write_meta_image(folder / "a.mhd", scan(), SPACING, ORIGIN, turned())
-    return Kind(path, to_world=affine(direction=turned()), itk=True)
+    return Kind(path, to_world=affine(direction=turned()))
 
 
 def _meta(folder, more, data=b"", type_="MET_SHORT", sizes="7 6 5"):
@@ -343,7 +342,7 @@ def _meta(folder, more, data=b"", type_="MET_SHORT", sizes="7 6 5"):
 def meta_image_compressed(folder):
     data = zlib.compress(_bytes())
     more = f"CompressedData = True\nCompressedDataSize = {len(data)}\nElementDataFile = LOCAL\n"
-    return Kind(_meta(folder, f"BinaryData = True\n{more}", data), itk=True)
+    return Kind(_meta(folder, f"BinaryData = True\n{more}", data))
 
 
 @kind
@@ -362,13 +361,13 @@ def meta_image_pattern(folder):
 @kind
 def meta_image_long(folder):
     data = scan().astype("<i8").tobytes()
-    return Kind(_meta(folder, "ElementDataFile = LOCAL\n", data, "MET_LONG_LONG"), itk=True)
+    return Kind(_meta(folder, "ElementDataFile = LOCAL\n", data, "MET_LONG_LONG"))
 
 
 @kind
 def meta_image_big_endian(folder):
     more = "BinaryDataByteOrderMSB = True\nElementDataFile = LOCAL\n"
-    return Kind(_meta(folder, more, scan().astype(">f4").tobytes(), "MET_FLOAT"), itk=True)
+    return Kind(_meta(folder, more, scan().astype(">f4").tobytes(), "MET_FLOAT"))
 
 
 @kind
@@ -516,7 +515,7 @@ def _edited(folder, edit):
         data.file_meta.MediaStorageSOPInstanceUID = data.SOPInstanceUID = "1.2.3.4"
         edit(data)
         data.save_as(path, enforce_file_format=True)
-    return Kind(folder / "scan", to_world=affine(direction=turned()), unit="mm", itk=True)
+    return Kind(folder / "scan", to_world=affine(direction=turned()), unit="mm")
 
 
 @kind
@@ -866,6 +865,27 @@ def cube(folder):
     (folder / "a.cube").write_text("\n".join(lines) + "\n")
     return Kind(folder / "a.cube", to_world=affine(SPACING * 0.529177249, ORIGIN * 0.529177249))
 
+
+#: What SimpleITK reads, too, and places likewise.
+ITK = [
+    "nifti",
+    "nifti_gz",
+    "nifti_scaled",
+    "nifti_pair",
+    "nrrd",
+    "nrrd_gzip",
+    "nrrd_detached",
+    "nrrd_list",
+    "nrrd_pattern",
+    "meta_image",
+    "meta_image_detached",
+    "meta_image_compressed",
+    "meta_image_long",
+    "meta_image_big_endian",
+    "dicom",
+    "dicom_rle",
+    "dicom_deflated",
+]
 
 #: What they need beside the package and its tests.
 NEEDS = {

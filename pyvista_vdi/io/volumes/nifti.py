@@ -28,8 +28,10 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         return [_minc_1(file)]
     zipped = head[:2] == b"\x1f\x8b"
     known = name.endswith((*_NAMES, ".brik.gz", ".par", ".rec"))
-    if known and name.endswith((".gz", ".mgz")) == zipped:
-        image: Any = nib.load(_header_of(file))
+    if name.endswith(".mgh"):  # whose file nibabel leaves open
+        image: Any = nib.MGHImage.from_bytes(file.read_bytes())
+    elif known and name.endswith((".gz", ".mgz")) == zipped:
+        image = nib.load(_header_of(file))
     else:
         second = head_of(file)[:4] in (b"\x1c\x02\0\0", b"\0\0\x02\x1c")
         kind = nib.Nifti2Image if second else nib.Nifti1Image
@@ -54,7 +56,10 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         )
     else:
         array = Lazy(shape, dtype, lambda index: np.asanyarray(stored[index]), in_parts=True)
-    return [VolumeInFile(array, axes, _to_world(image, nib), unit=_unit(header))]
+    place = _to_world(image, nib)
+    if isinstance(image, nib.Minc1Image):  # and MINC 2: the slowest axis first
+        place, axes = place[:, [2, 1, 0, 3]], "tzyx"[-len(shape) :]
+    return [VolumeInFile(array, axes, place, unit=_unit(header))]
 
 
 def _minc_1(file: Path) -> VolumeInFile:
@@ -69,7 +74,8 @@ def _minc_1(file: Path) -> VolumeInFile:
         minc = Minc1File(data)
         kind = np.result_type(minc.get_data_dtype(), np.float32).newbyteorder("=")
         array = minc.get_scaled_data().astype(kind)
-        return VolumeInFile(array, "xyzt"[: array.ndim], minc.get_affine(), unit="mm")
+        place = minc.get_affine()[:, [2, 1, 0, 3]]  # its axes are the slowest first
+        return VolumeInFile(array, "tzyx"[-array.ndim :], place, unit="mm")
 
 
 def _header_of(file: Path) -> str:

@@ -298,7 +298,7 @@ def _listening(file: Path, kind: VolumeFormat) -> Iterator[None]:
         if str(file) in text or isinstance(error, MissingDependencyError):
             raise
         raise type(error)(f"{file} cannot be read as {kind.name}: {text}") from error
-    except MemoryError:
+    except (MemoryError, Warning):  # a warning, where those are errors
         raise
     except Exception as error:  # each library has exceptions of its own
         why = " ".join(str(error).split())[:500] or type(error).__name__
