@@ -95,10 +95,16 @@ def _is_dicom(file: Path) -> bool:
 
 
 def _read(file: Path) -> NDArray[Any]:
-    from skimage.io import imread
-
     try:
-        picture = np.asarray(imread(file))
+        if file.suffix.lower() in _KINDS[0]:
+            import tifffile
+
+            picture = tifffile.imread(file)
+        else:
+            from skimage.io import imread
+
+            with file.open("rb") as stream:
+                picture = np.asarray(imread(stream))
     except Exception as error:  # each format has readers, and exceptions, of its own
         raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
     if picture.ndim != 2 and not (picture.ndim == 3 and picture.shape[2] in (2, 3, 4)):
