@@ -37,10 +37,12 @@ _HOMES = {
     "estimate": "api",
     "generate": "api",
     "list_devices": "device",
+    "list_volumes": "io.volumes",
     "open_volume": "io.stores",
     "pick": "api",
     "presets": "model.presets",
     "read": "api",
+    "read_volume": "io.volumes",
     "render": "api",
     "render_depth": "api",
     "render_volume": "api",
@@ -68,9 +70,7 @@ registry.core = registry.Extension(
         ),
     ),
     readers={
-        ".nhdr": "pyvista_vdi.examples:read_nrrd",
-        ".nrrd": "pyvista_vdi.examples:read_nrrd",
-        "": "pyvista_vdi.plotting.imports:read_volume",
+        "": "pyvista_vdi.plotting.imports:volumes_in",
     },
     methods={
         "TransferFunction.from_arguments": (
@@ -83,6 +83,7 @@ registry.core = registry.Extension(
         "VDI.plot": "pyvista_vdi.plotting.accessor:plot",
         "VDI.save": "pyvista_vdi.io:write",
         "VDI.thinned": "pyvista_vdi.model.list_subsampling:subsampled_lists",
+        "Volume.read": "pyvista_vdi.io.volumes:read_volume",
         "Volume.from_vtk": "pyvista_vdi.vtk_pipeline:volume_from_vtk",
         "Volume.with_scalars": "pyvista_vdi.plotting.volumes:as_image",
     },

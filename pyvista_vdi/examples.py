@@ -16,14 +16,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
 
-import numpy as np
-
-from pyvista_vdi.errors import (
-    DataNotFoundError,
-    InvalidArgumentError,
-    InvalidVolumeError,
-    MissingDependencyError,
-)
+from pyvista_vdi.errors import DataNotFoundError, InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.io.volumes import read_volume
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -232,7 +226,8 @@ def load_data(name: str, *, as_volume: bool = False) -> pv.ImageData | Volume:
             f"PyVista is not installed, so {name!r} cannot be a pyvista.ImageData: pass "
             'as_volume=True, or install PyVista by pip install "pyvista-vdi[plot]"'
         )
-    volume = read_nrrd(file, VOLUMES[name].quantity)
+    volume = read_volume(file)
+    volume.name = VOLUMES[name].quantity
     if as_volume:
         return volume
     from pyvista_vdi.plotting.convert import to_image_data
@@ -336,32 +331,3 @@ def _locate(example: ExampleVolume) -> Path | None:
     else:
         return None
     return file if file.is_file() else None
-
-
-def read_nrrd(file: Path, quantity: str = "values") -> Volume:
-    """Read a three-dimensional NRRD file; axes as stored, so that x is the fastest."""
-    import nrrd
-
-    from pyvista_vdi.device import aligned_empty
-    from pyvista_vdi.model.volume import Volume
-
-    try:
-        array, header = nrrd.read(str(file), index_order="C")
-    except MemoryError:
-        raise
-    except Exception as error:  # of many kinds, StopIteration of an empty file among them
-        reason = str(error) or "it is empty, or cut off"
-        raise InvalidVolumeError(
-            f"{file} cannot be read as NRRD: {reason}; write it anew by nrrd.write"
-        ) from error
-    # Where a CPU device reads it without a copy of its own
-    aligned = aligned_empty(array.shape, array.dtype.newbyteorder("="))
-    aligned[...] = array
-    spacing, direction = np.asarray(header.get("spacings", np.ones(3)), dtype=np.float64), np.eye(3)
-    if (steps := header.get("space directions")) is not None:
-        # NRRD's rows are the steps from sample to sample along each axis
-        steps = np.asarray(steps, dtype=np.float64)
-        spacing = np.linalg.norm(steps, axis=1)
-        direction = (steps / spacing[:, None]).T
-    origin = header.get("space origin", np.zeros(3))
-    return Volume(aligned, spacing, origin, direction, name=quantity)

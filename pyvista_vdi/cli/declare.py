@@ -37,9 +37,9 @@ VDI_FILE = (
 )
 
 VOLUME_FILE = (
-    "a file that PyVista reads as a uniform grid (.nrrd, .mha, .nii, .vti, ...), .npy, a raw file "
-    "named like x_1024x1024x795_uint8.raw, a folder of slices (DICOM, TIFF or PNG), or a store of "
-    "chunks (.ome.zarr, .zarr, x.h5::/path)"
+    "a file of medicine, microscopy, simulation or astronomy (.nii.gz, .nrrd, .mha, .tif, .mrc, "
+    ".nc, .h5, .fits, .vti, .npy, ...), a raw file named like x_1024x1024x795_uint8.raw, a folder "
+    "of slices (DICOM, TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 
 
@@ -266,8 +266,11 @@ def grid(options: Options) -> None:
     option(options, "--origin", "of its first voxel, in the same way", xyz, parse_number, nargs=3)
     text = "of a multi-scale store: 0 is the finest; auto (default): what the view requires"
     option(options, "--level", text, "auto|N", parse_level)
-    option(options, "--channel", "of a store (default: 0)", "N|NAME", parse_channel)
-    text = "of a store: which step (default: 0; of a series or a server all)"
+    text = "of a file that holds several (default of a store: 0)"
+    option(options, "--channel", text, "N|NAME", parse_channel)
+    text = "of a DICOM folder or a TIFF file that holds several"
+    option(options, "--series", text, "N|NAME", parse_channel)
+    text = "which step of several (default of a store: 0; of a series or a server all)"
     option(options, "--time-index", text, "N", parse_whole)
 
 

@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file
+from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, stores, volumes
 from pyvista_vdi.io.files import holds
-from pyvista_vdi.io.stores import StoredVolume, is_store, open_volume
-from pyvista_vdi.io.volumes import read_file
+from pyvista_vdi.io.stores import StoredVolume, is_store
+from pyvista_vdi.io.volumes import list_volumes
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
@@ -30,7 +30,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
-from pyvista_vdi.plotting.imports import read_volume as read_by_pyvista
 from pyvista_vdi.plotting.progress import DelayedBar
 from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
@@ -45,8 +44,8 @@ CLASSIFICATION = tuple(declared(Look))
 #: Options that say how a volume's file is read.
 _OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")
 
-#: Options that say what is taken of a store of chunks.
-OF_A_STORE = ("level", "channel", "time_index")
+#: Options that say what is taken of a file or a store that holds several volumes.
+OF_A_STORE = ("level", "channel", "time_index", "series")
 
 #: Options that say what is read, and how a volume looks.
 OF_ANY_VOLUME = (*_OF_A_VOLUME, *OF_A_STORE, "tf", "transfer_function", *CLASSIFICATION)
@@ -60,22 +59,35 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
 
     A store is read whole, unless ``in_chunks``.
     """
-    if options.example is None and is_store(options.file):
+    if options.example is not None:
+        refuse(options, OF_A_STORE, "files that hold several volumes, and this is none")
+        from pyvista_vdi import examples
+
+        return laid_out(examples.load_data(options.example, as_volume=True), options)
+    if is_store(options.file):
         volume: Any = open_store(options)
         if len(volume.store.levels) > 1 and options.level in (None, "auto"):
             # Of another level they are others
             refuse(options, ("spacing", "origin"), "one level of a store, which --level chooses")
-        if not in_chunks:
-            volume = _loaded(volume)
-    else:
-        refuse(options, OF_A_STORE, "stores of chunks, such as x.ome.zarr, and this is none")
-        if options.example is not None:
-            from pyvista_vdi import examples
-
-            volume = examples.load_data(options.example, as_volume=True)
-        else:
-            volume = read_file(Path(options.file), _read_quietly)
-    return laid_out(volume, options)
+        return laid_out(volume if in_chunks else _loaded(volume), options)
+    array = options.scalars
+    if array is not None and options.preference == "cell":
+        of_cells = f"cell:{array}"  # where points have one of that name, too
+        names = {each.name for each in list_volumes(options.file)}
+        array = of_cells if of_cells in names else array
+    volume = volumes.read_volume(
+        options.file,
+        array=array,
+        series=getattr(options, "series", None),
+        channel=options.channel,
+        time=options.time_index,
+        level=options.level,
+        spacing=options.spacing,
+        origin=options.origin,
+    )
+    if volume.chunked and not in_chunks:
+        volume = _loaded(volume)
+    return volume  # type: ignore[no-any-return]
 
 
 def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
@@ -93,11 +105,6 @@ def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
     )
 
 
-def _read_quietly(file: Path) -> Any:
-    with quietly():
-        return read_by_pyvista(file)
-
-
 @contextmanager
 def quietly() -> Iterator[None]:
     """Silence VTK's readers: the error says what is wrong."""
@@ -112,7 +119,7 @@ def quietly() -> Iterator[None]:
 
 def open_store(options: argparse.Namespace) -> StoredVolume:
     """Open the store that is named, with what is asked of it."""
-    return open_volume(
+    return stores.open_store(
         options.file,
         level="auto" if options.level is None else options.level,
         channel=0 if options.channel is None else options.channel,
@@ -120,9 +127,10 @@ def open_store(options: argparse.Namespace) -> StoredVolume:
     )
 
 
-def _loaded(volume: StoredVolume) -> Volume:
+def _loaded(volume: Volume) -> Volume:
     remedy = "take a coarser level by --level, or make a VDI of it (pyvista-vdi generate)"
-    require_free_memory(volume.array.nbytes, f"the volume in {volume.store.path}", remedy)
+    path = volume.store.path if isinstance(volume, StoredVolume) else volume.name
+    require_free_memory(volume.array.nbytes, f"the volume in {path}", remedy)
     return volume.load()
 
 

@@ -5,6 +5,7 @@ zarr and h5py are optional, and imported where a store of theirs is opened.
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVolumeError,
@@ -27,7 +29,7 @@ from pyvista_vdi.model.levels import required_level
 from pyvista_vdi.model.volume import Volume, chunked_array
 from pyvista_vdi.model.whole_file import as_path
 
-_HDF5 = (".h5", ".hdf5", ".he5", ".ims")
+_HDF5 = (".h5", ".hdf5", ".he5")
 
 #: The axes of OME-Zarr, in their order.
 _AXES = ("t", "c", "z", "y", "x")
@@ -180,7 +182,7 @@ class StoredVolume(Volume):
             name=store.channels[number] if number < len(store.channels) else "values",
         )
         self.store, self.level, self.why = store, level, why
-        self.time, self.channel = time, channel
+        self.time, self.channel, self.unit = time, channel, store.unit
         self.unit_distance = store.levels[0].grid.default_unit_distance
 
     def at_level(
@@ -224,8 +226,10 @@ def open_volume(
     window_size: Sequence[int] | None = None,
     time: int = 0,
     channel: int | str = 0,
-) -> StoredVolume:
+) -> Volume:
     """Open a volume in a store of chunks, of which only the metadata are read.
+
+    Any other file is read whole, by :func:`read_volume`.
 
     Parameters
     ----------
@@ -264,11 +268,26 @@ def open_volume(
     InvalidArgumentError
         If it has no such level, time or channel.
     """
+    if is_store(path):
+        return open_store(path, level, camera, window_size, time, channel)
+    chosen = {"time": time, "channel": channel}
+    given: dict[str, Any] = {k: v for k, v in chosen.items() if not np.array_equal(v, 0)}
+    return registry.method("Volume.read")(path, level=level, **given)  # type: ignore[no-any-return]
+
+
+def open_store(
+    path: str | os.PathLike[str],
+    level: int | str = "auto",
+    camera: Any = None,
+    window_size: Sequence[int] | None = None,
+    time: int = 0,
+    channel: int | str = 0,
+) -> StoredVolume:
+    """Open a store; arguments as of :func:`open_volume`."""
     outer, inner = _parts(path)
-    if not is_store(path) or outer.lower().endswith(_HDF5):
-        store = _open_hdf5(outer, inner)
-    else:
-        store = _open_zarr(outer, inner)
+    named = outer.rstrip("/\\").lower()
+    hdf5 = named.endswith(_HDF5) or (os.path.isfile(outer) and not named.endswith(".zarr"))  # noqa: PTH113
+    store = _open_hdf5(outer, inner) if hdf5 else _open_zarr(outer, inner)
     number, why = _chosen(store, level, camera, window_size)
     no_time = np.array_equal(time, 0)  # whatever else it is, a number or not
     either = "t" in store.axes and "c" not in store.axes and not store.named
@@ -315,18 +334,23 @@ def _open_hdf5(path: str, inner: str) -> Store:
         file = h5py.File(os.path.abspath(path), "r")  # noqa: PTH100 - links may differ elsewhere
     except (OSError, ValueError) as error:
         raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
-    found: dict[str, Any] = {}
-
-    def visit(name: str, node: Any) -> None:
-        if isinstance(node, h5py.Dataset) and node.ndim > 2:
-            found[name] = node
-
     try:
-        file.visititems(visit)
-        return _of_array(path, _only(path, inner, found), "HDF5")
+        return array_store(path, _only(path, inner, arrays_in(file)), "HDF5")
     except BaseException:
         file.close()  # whoever keeps the error would keep it from being written
         raise
+
+
+def arrays_in(file: Any) -> dict[str, Any]:
+    """Return the arrays of three axes or more in an HDF5 file, by their names."""
+    found: dict[str, Any] = {}
+
+    def visit(name: str, node: Any) -> None:
+        if hasattr(node, "shape") and node.ndim > 2:
+            found[name] = node
+
+    file.visititems(visit)
+    return found
 
 
 def _only(path: str, inner: str, found: Mapping[str, Any]) -> tuple[str, Any]:
@@ -342,7 +366,7 @@ def _only(path: str, inner: str, found: Mapping[str, Any]) -> tuple[str, Any]:
     )
 
 
-def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
+def array_store(path: str, named: tuple[str, Any], kind: str) -> Store:
     """Return an array that stands by itself, with what its attributes say of its voxels."""
     name, array = named
     axes, are_named = _axis_names(array)
@@ -352,7 +376,8 @@ def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
     if "element_size_um" in attributes:
         unit, spacing = "micrometer", attributes["element_size_um"]
     try:
-        grid = _grid(array.shape[-3:], spacing, attributes.get("origin"))
+        shape = [n for n, axis in zip(array.shape, axes, strict=True) if axis in "zyx"]
+        grid = _grid(shape, spacing, attributes.get("origin"))
     except _BROKEN as error:
         raise InvalidVolumeError(
             f"{path}::{name}: element_size_um, spacing and origin must be three numbers, along "
@@ -362,10 +387,10 @@ def _of_array(path: str, named: tuple[str, Any], kind: str) -> Store:
 
 
 def _check_axes(path: str, axes: tuple[str, ...]) -> None:
-    if axes[-3:] != ("z", "y", "x"):
+    if tuple(axis for axis in axes if axis in "zyx") != ("z", "y", "x"):
         raise UnsupportedError(
-            f"{path} has the axes {', '.join(axes)}: the last three must be z, y, x; give "
-            "pyvista_vdi.Volume a transposed dask array instead"
+            f"{path} has the axes {', '.join(axes)}: z, y, x must be among them in this order; "
+            "give pyvista_vdi.Volume a transposed dask array instead"
         )
 
 
@@ -373,6 +398,8 @@ def _axis_names(array: Any) -> tuple[tuple[str, ...], bool]:
     """Return the names that zarr 3, xarray or HDF5 have for an array's axes; whether they do."""
     names: Any = getattr(getattr(array, "metadata", None), "dimension_names", None)
     names = names or array.attrs.get("_ARRAY_DIMENSIONS")
+    if "axistags" in array.attrs:  # of ilastik and vigra
+        names = [axis["key"] for axis in json.loads(array.attrs["axistags"])["axes"]]
     names = names or [dimension.label for dimension in getattr(array, "dims", ())]
     short = [{"time": "t", "channel": "c"}.get(str(n).lower(), str(n).lower()) for n in names]
     if len(short) == array.ndim and set(short) >= {"z", "y", "x"}:
@@ -414,7 +441,7 @@ def _open_zarr(path: str, inner: str) -> Store:
             f"{path}{'::' + inner if inner else ''} cannot be read as zarr: {error or 'not there'}"
         ) from error
     if hasattr(node, "shape"):
-        return _of_array(path, (inner, node), "zarr")
+        return array_store(path, (inner, node), "zarr")
     attributes = node.attrs.asdict()
     if "bioformats2raw.layout" in {*attributes, *attributes.get("ome", {})} and "0" in node:
         node, inner = node["0"], f"{inner}/0".strip("/")
@@ -425,7 +452,7 @@ def _open_zarr(path: str, inner: str) -> Store:
     if "multiscales" not in described:
         before = f"{inner}/" if inner else ""
         arrays = {before + name: array for name, array in node.arrays() if array.ndim > 2}
-        return _of_array(path, _only(path, "", arrays), "zarr")
+        return array_store(path, _only(path, "", arrays), "zarr")
     try:
         return _multiscale(path, node, described, "ome" in attributes)
     except _BROKEN as error:

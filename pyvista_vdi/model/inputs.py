@@ -24,8 +24,9 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
 
     Parameters
     ----------
-    volume : Volume or vtkImageData or pyvista.ImageData
-        Or what an extension makes one of. VTK is imported only for its own objects.
+    volume : Volume or vtkImageData or pyvista.ImageData or path-like
+        A file as :func:`read_volume` reads it; or what an extension makes one of. VTK is imported
+        only for its own objects.
     scalars : str or array_like, optional
         Name of the array, or values per point; the active array by default.
     preference : {"point", "cell"}
@@ -38,6 +39,10 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     """
     if isinstance(volume, Volume):
         return _with_scalars(volume, scalars)
+    if isinstance(volume, str | os.PathLike):
+        array = scalars if isinstance(scalars, str) else None
+        read: Volume = registry.method("Volume.read")(volume, array=array)
+        return read if array is not None else _with_scalars(read, scalars)
     if hasattr(volume, "GetClassName"):
         from_vtk = registry.method("Volume.from_vtk")
         if scalars is not None and not isinstance(scalars, str):
@@ -53,10 +58,9 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     from_data = registry.made_of("volumes", volume)
     if from_data is not None:
         return from_data(volume, scalars, preference)  # type: ignore[no-any-return]
-    opened = ": open it by pyvista_vdi.open_volume(path) or pyvista.read(path)"
     raise InvalidVolumeTypeError(
-        f"expected a pyvista.ImageData, a vtkImageData or a pyvista_vdi.Volume; "
-        f"got {_described(volume)}{opened if isinstance(volume, str | os.PathLike) else ''}"
+        "expected a pyvista.ImageData, a vtkImageData, a pyvista_vdi.Volume or a file's path; "
+        f"got {_described(volume)}"
     )
 
 

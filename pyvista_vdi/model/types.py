@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Union
 from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
+    import os
+
     from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
     from pyvista_vdi.model.camera import Camera
     from pyvista_vdi.model.cropping import Cropping
@@ -54,7 +56,8 @@ WindowSize: TypeAlias = Sequence[int]
 #: Called with the finished fraction, 0 to 1; work stops if it returns ``False``.
 Progress: TypeAlias = Callable[[float], object]
 
-VolumeLike: TypeAlias = Union["Volume", VTKObject]
+#: A path is a file that ``read_volume`` reads.
+VolumeLike: TypeAlias = Union["Volume", VTKObject, str, "os.PathLike[str]"]
 CameraLike: TypeAlias = Union["Camera", VTKObject]
 VDILike: TypeAlias = Union["VDI", VTKObject]
 LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]

@@ -69,6 +69,8 @@ class Volume(Geometry):
 
     array: NDArray[Any]
     name: str
+    #: Of lengths, where a file says it.
+    unit: str = ""
     blanked: NDArray[np.uint8] | None
 
     def __init__(
@@ -153,7 +155,7 @@ class Volume(Geometry):
         """Return the volume with all its voxels in memory."""
         array = self.array[:, :, :] if self.chunked else self.array
         loaded = Volume(array, self.spacing, self.origin, self.direction, name=self.name)
-        loaded.unit_distance = self.unit_distance
+        loaded.unit_distance, loaded.unit = self.unit_distance, self.unit
         return loaded
 
     @property

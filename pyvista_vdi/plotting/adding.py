@@ -21,6 +21,7 @@ from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
+from pyvista_vdi.plotting.prepared import prepared
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import refuse_settings
@@ -85,6 +86,8 @@ class Addition:
     drawing: DrawingOptions
     place: Placement
     resolution: Sequence[float] | None
+    resample: str | Sequence[int] | None
+    mask: Any
     camera: CameraLike | None
     coverage: str
     device: DeviceLike | None
@@ -99,7 +102,9 @@ class Addition:
         target = {"full_fps" if n == "target_fps" else n for n in self.target.given}
         changed = {*self.array.given, *self.look.given, *self.options.given, *target}
         changed -= {"lights", "annotations"}
-        changed |= {n for n in ("resolution", "camera") if getattr(self, n) is not None}
+        changed |= {
+            n for n in ("resolution", "resample", "mask", "camera") if getattr(self, n) is not None
+        }
         changed |= {"coverage"} if self.coverage != "bounds" else set()
         if changed:
             raise UnsupportedError(
@@ -127,6 +132,7 @@ def added(
     plotter: Any, volume: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
+    volume = prepared(plotter, volume, asked.array.scalars, asked.resample, asked.mask)
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like

@@ -91,6 +91,8 @@ class AddVDI(Component):
         user_matrix: MatrixLike | None = None,
         log_scale: bool = False,
         *,
+        resample: str | Sequence[int] | None = None,
+        mask: VolumeLike | NDArray[Any] | None = None,
         max_supersegments: int = 20,
         criterion: Criterion = "least-error",
         sample_distance: float | None = None,
@@ -130,8 +132,10 @@ class AddVDI(Component):
 
         Parameters
         ----------
-        volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, or one or more VDIs
-            A uniform grid, or a rectilinear one of equidistant points (other grids are refused,
+        volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, path, or VDIs
+            A file as :func:`pyvista_vdi.read_volume` or :func:`pyvista_vdi.read` reads it; of a
+            store, what :func:`pyvista_vdi.open_volume` opens, the level that the view requires. A
+            uniform grid, or a rectilinear one of equidistant points (other grids are refused,
             with the remedy), a NumPy array as ``add_volume`` takes it, blocks of uniform grids, a
             VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
@@ -177,6 +181,12 @@ class AddVDI(Component):
             Places the actor in the world.
         log_scale : bool
             Map values to colours by their logarithm.
+        resample : "auto" or (int, int, int), optional
+            Take rectilinear, structured and unstructured grids, too, resampled to a uniform grid of
+            so many points along x, y and z; ``"auto"``: voxels as large as the mean cell. What lies
+            outside their cells is not drawn. The log says what differs at the grid's points.
+        mask : pyvista.ImageData, Volume, numpy.ndarray or path, optional
+            Labels at the points of the volume: where they are 0, nothing is drawn.
         max_supersegments : int
             Longest list, 1 to 4096.
         criterion : {"least-error", "homogeneity"}
@@ -306,6 +316,8 @@ class AddVDI(Component):
                 *(user_matrix, scalar_bar_args, show_scalar_bar, status, multi_colors),
             ),
             resolution=resolution,
+            resample=resample,
+            mask=mask,
             camera=camera,
             coverage=coverage,
             device=device,

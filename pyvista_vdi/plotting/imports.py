@@ -22,9 +22,9 @@ def import_pyvista() -> Any:
     return pv
 
 
-def read_volume(file: Path) -> Any:
-    """Read a volume by PyVista's readers; MissingDependencyError says how to get them."""
+def volumes_in(file: Path) -> Any:
+    """Return what PyVista's readers find in a file; MissingDependencyError says how to get them."""
     import_pyvista()
     from pyvista_vdi.plotting import volume_files
 
-    return volume_files.read_volume(file)
+    return volume_files.volumes_in(file)

@@ -72,8 +72,8 @@ LEVELS_WITHIN = {
     "io": (
         ("progress",),
         ("png", "time_steps", "vdi_file"),
-        ("image_stack",),
-        ("stores", "volumes"),
+        ("stores",),
+        ("volumes",),
         ("files",),
     ),
     "vtk_pipeline": (("vtk",), ("filters",), ("interaction",), ("drawing",)),
@@ -88,8 +88,8 @@ WITH_VTK = (
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = """
-aiohttp anywidget cvista dask distributed h5py matplotlib nrrd paraview pyopencl pyvista scipy
-skimage traitlets trame vtk vtkmodules zarr
+aiohttp anywidget astropy cvista dask distributed h5py matplotlib mrcfile nibabel nrrd paraview
+pydicom pyopencl pyvista scipy skimage tifffile traitlets trame vtk vtkmodules xarray zarr
 """
 
 

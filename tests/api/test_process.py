@@ -194,12 +194,11 @@ folder = pathlib.Path(tempfile.mkdtemp())
 for name in ("a.vdi", "a.vti"):
     vdi.save(folder / name)
 assert pvdi.read(folder / "a.vdi").equals(vdi)
-from pyvista_vdi.plotting.volume_files import read_volume
 grid.save(folder / "grid.vti")
 (folder / "broken.vtk").write_text("nothing of VTK's")
-assert read_volume(folder / "grid.vti").n_points == grid.n_points
+assert pvdi.read_volume(folder / "grid.vti").array.size == grid.n_points
 try:
-    read_volume(folder / "broken.vtk")
+    pvdi.read_volume(folder / "broken.vtk")
 except pvdi.InvalidVolumeError:
     pass
 """

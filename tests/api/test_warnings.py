@@ -13,7 +13,7 @@ from PIL import Image
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import with_article
-from pyvista_vdi.io.volumes import read_file
+from pyvista_vdi.io.volumes import read_volume
 
 pytestmark = pytest.mark.gl
 
@@ -47,7 +47,7 @@ def a_mapper_of_vtk(plotter, tmp_path):
 def slices_that_are_missing(plotter, tmp_path):
     for number in (1, 2, 5):
         Image.fromarray(np.full((4, 4), number, np.uint8)).save(tmp_path / f"{number}.png")
-    read_file(tmp_path)
+    read_volume(tmp_path)
 
 
 def an_effect_that_does_not_see_it(plotter, tmp_path):

@@ -18,7 +18,7 @@ from PIL import Image
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io, registry
 from pyvista_vdi.cli import inputs, parser
-from pyvista_vdi.io.volumes import read_file
+from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.model.standard_cases import filling_camera
 
 NAMES = """
@@ -141,7 +141,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing is for volumes"),
         ("view a.vdi --scalars x --screenshot b.png", "--scalars is for volumes"),
         ("view a.vdi --cmap bone --screenshot b.png", "cmap cannot be given with"),
-        ("info none.nrrd", "none.nrrd cannot be read"),
+        ("info none.nrrd", "none.nrrd does not exist"),
         ("render a.vdi -o a.gif", "the name must end in .png"),
         ("render a.vdi -o no/a.png", "no does not exist; create it"),
         ("render none.vdi -o a.png", "none.vdi cannot be read"),
@@ -191,7 +191,7 @@ def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkey
 @pytest.mark.parametrize(
     ("arguments", "message"),
     cases(
-        ("none.nrrd", "none.nrrd cannot be read .*No such file"),
+        ("none.nrrd", "none.nrrd does not exist: check the volume's path, or .*--example"),
         ("none.vti", "none.vti does not exist: check the volume's path"),
         ("x" * 300, "x does not exist: check the volume's path"),
         ("x" * 300 + "_4x4x4_uint8.raw", "raw does not exist: check the volume's path"),
@@ -309,7 +309,7 @@ def test_info_of_a_volume(folder, capsys):
     arguments = ("info", folder / "v.nrrd", "--spacing", "1", "2", "3", "--origin", "0", "0", "5")
     out = run(capsys, *arguments)
     lines = {name: text.strip() for name, text in (x.split("  ", 1) for x in out.splitlines())}
-    volume = read_file(folder / "v.nrrd")
+    volume = read_volume(folder / "v.nrrd")
     nx, ny, nz = volume.dimensions
     assert lines["points"] == f"{nx} x {ny} x {nz}"
     assert lines["spacing"] == "(1, 2, 3)"

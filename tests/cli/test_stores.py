@@ -93,8 +93,8 @@ def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("--example brain --level 0", "--level is for stores of chunks"),
-        ("--example brain --time-index 0", "--time-index is for stores"),
+        ("--example brain --level 0", "--level is for files that hold several volumes"),
+        ("--example brain --time-index 0", "--time-index is for files that hold several"),
         ("--example brain --scheduler x", "--scheduler is for stores"),
         ("none.ome.zarr", "none.ome.zarr cannot be read as zarr"),
         ("x.zarr --level best", "auto, or a level's number"),

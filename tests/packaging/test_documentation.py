@@ -20,7 +20,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.io.volumes import needs_pyvista
+from pyvista_vdi.io.volumes.table import FORMATS, REFUSED, VTK
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
 DOCS = CHECKOUT / "docs"
@@ -259,11 +259,15 @@ def test_formats_on_the_page_of_files_are_written_and_read(tmp_path):
     vdi = pvdi.VDI(camera, (2, 2), [0] * 5, [], [], [], [], (-1, 1) * 3)
     for suffix in suffixes:
         assert pvdi.read(vdi.save(tmp_path / f"a{suffix}")).window_size == (2, 2)
-    volumes = text.partition("| file | read by |")[2].partition("\n\n")[0]
-    for row in re.findall(r"^\| (`\..*)\|$", volumes, re.MULTILINE):
-        for suffix in re.findall(r"`(\.[\w.]+)`", row.split("|")[0]):
-            without = not needs_pyvista(tmp_path / f"a{suffix}")
-            assert without == ("needs no PyVista" in row), suffix
+    # The formats of volumes: what the table in the package says
+    rows = ["| format | names end in | read by | extra |", "|---|---|---|---|"]
+    for each in (*FORMATS, VTK):
+        names = ", ".join(f"`{suffix}`" for suffix in each.suffixes)
+        rows.append(f"| {each.name} | {names} | {each.library} | {each.extra} |")
+    assert "\n".join(rows) in text
+    rows = ["| names end in | what it is, and what to do |", "|---|---|"]
+    rows += [f"| `{suffix}` | {remedy} |" for suffix, remedy in REFUSED.items()]
+    assert "\n".join(rows) in text
 
 
 def test_properties_on_the_page_of_paraview_are_the_plugin_s():

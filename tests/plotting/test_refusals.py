@@ -84,7 +84,7 @@ VOLUMES = {
     ),
     "blocks": (pv.MultiBlock([VOLUME, pv.Sphere()]), errors.UnsupportedError, "no volume"),
     "surface": (pv.Sphere(), errors.UnsupportedError, "a surface has no volume"),
-    "a path": ("brain.nrrd", errors.InvalidVolumeError, "pyvista.ImageData; got str"),
+    "a path": ("brain.nrrd", errors.InvalidVolumeError, "brain.nrrd does not exist"),
 }
 #: Volumes, arguments, kinds of error and words of the message.
 ROWS = {
@@ -269,7 +269,6 @@ REFUSED_BY_BOTH = [
     {"scalar": "v"},
     {"opcity": 1},
     {"volume": None},
-    {"volume": "brain.nrrd"},
     {"volume": [[[1.0]]]},
     {"volume": pv.Sphere()},
     {"volume": EMPTY_POINTS},

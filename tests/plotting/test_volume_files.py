@@ -110,12 +110,14 @@ def write_in(kind, folder, direction):
 
 
 #: Options of stores of chunks, which no other file has.
-_OF_A_STORE = ("level", "channel", "time_index")
+_OF_A_STORE = ("level", "channel", "time_index", "series")
 FORMATS = ("vti", "nrrd", "nhdr", "mha", "mhd", "nii", "nii.gz", "dicom")
 
 
 def read(path, **options):
     """Read as every verb does that takes a volume."""
+    if ".nii" in str(path):
+        pytest.importorskip("nibabel")
     absent = ("example", "scalars", "preference", "spacing", "origin", *_OF_A_STORE)
     return read_volume(Namespace(**dict.fromkeys(absent) | {"file": str(path)} | options))
 
@@ -275,15 +277,16 @@ def test_several_components_are_refused_by_name(kind, tmp_path):
             "ElementType = MET_FLOAT\nElementDataFile = LOCAL\n"
         )
         path.write_bytes(text.encode() + values.tobytes())
-        message = "the scalars 'MetaImage' have 3 components"
+        message = "holds 3 channels, 0 to 2, .* choose one by channel=0"
     with pytest.raises((UnsupportedError, InvalidVolumeError), match=message):
         read(path)
 
 
 def test_several_times_are_refused_by_name(tmp_path):
     path = write_nifti(tmp_path / "a.nii", scan(), SPACING, nt=4)
-    with pytest.raises(UnsupportedError, match=r"a\.nii holds 4 time points.*extract one"):
+    with pytest.raises(UnsupportedError, match=r"a\.nii holds 4 times.* choose one by time=0"):
         read(path)
+    assert read(path, time_index=3).dimensions == (7, 6, 5)
 
 
 def dicom_folder(tmp_path, **options):
@@ -391,7 +394,7 @@ def test_a_folder_without_slices(files, tmp_path, capsys):
 def test_without_pydicom_the_extra_is_named(tmp_path, monkeypatch):
     folder = dicom_folder(tmp_path)
     monkeypatch.setitem(sys.modules, "pydicom", None)
-    with pytest.raises(MissingDependencyError, match=r"pydicom.*pyvista-vdi\[plot\]"):
+    with pytest.raises(MissingDependencyError, match=r"pydicom.*pyvista-vdi\[medical\]"):
         read(folder)
 
 
@@ -400,12 +403,12 @@ def test_several_series_are_named(tmp_path):
     other = write_dicom(tmp_path / "other", scan()[:3], SPACING, ORIGIN, np.eye(3), series="7.8")
     for file in other.iterdir():
         shutil.copy(file, folder / f"other{file.name}")
-    with pytest.raises(
-        InvalidVolumeError,
-        match=r"holds 2 DICOM series: 1\.2\.3 'series 1\.2\.3' \(5 slices\), "
-        r"7\.8 'series 7\.8' \(3 slices\); put the slices of one",
-    ):
+    said = (
+        r"holds 2 volumes, 0: 'series 1\.2\.3': 7 x 6 x 5 .*1: 'series 7\.8': 7 x 6 x 3 .*series="
+    )
+    with pytest.raises(UnsupportedError, match=said):
         read(folder)
+    assert read(folder, series="series 7.8").dimensions == (7, 6, 3)
 
 
 def test_slices_that_do_not_make_a_volume(tmp_path):
@@ -415,8 +418,8 @@ def test_slices_that_do_not_make_a_volume(tmp_path):
         (ORIGIN, along, {}, InvalidVolumeError, "several slices .* lie in the same place"),
         (ORIGIN + 40, across, {}, InvalidVolumeError, "turned against each other"),
         (
-            *(ORIGIN, along, {"syntax": JPEG}),
-            *(UnsupportedError, rf"10\.dcm .* {re.escape(JPEG)}.*gdcmconv --raw"),
+            *(ORIGIN + np.array([0, 0, 7.5]), along, {"syntax": JPEG}),
+            *(UnsupportedError, rf"10\.dcm .*{re.escape(JPEG)}.*gdcmconv --raw"),
         ),
     ):
         data = dicom_slice(scan()[0], place, orientation, SPACING, **options)
@@ -464,29 +467,19 @@ def test_a_folder_that_is_named_like_a_file(kind, tmp_path):
         read(tmp_path / f"a.{kind}")
 
 
-#: A NIfTI is seen to be compressed whatever it is called.
-_MISNAMED = [
-    (written, named)
-    for written in ("mha", "nii", "vti")
-    for named in ("mha", "nii", "nii.gz", "vti", "nrrd", "dat")
-    if not named.startswith(written)
-]
-
-
-@pytest.mark.parametrize(("written", "named"), _MISNAMED)
-def test_another_formats_name(written, named, tmp_path, expected_messages):
+@pytest.mark.parametrize("written", ["mha", "nii", "vti"])
+@pytest.mark.parametrize("named", ["nii.gz", "nrrd", "dat"])
+def test_another_formats_name_changes_nothing(written, named, tmp_path):
     path = tmp_path / f"b.{named}"
     shutil.copy(write_in(written, tmp_path, np.eye(3)), path)
-    said = rf"b\.{re.escape(named)} (cannot be read|holds no)"
-    with pytest.raises(InvalidVolumeError, match=said):
-        read(path)
+    assert_marked_at(path, SPACING * MARK + ORIGIN)
 
 
 @pytest.mark.parametrize("kind", ["mha", "nii", "nii.gz"])
 def test_a_file_that_ends_too_soon(kind, tmp_path):
     path = write_in(kind, tmp_path, np.eye(3))
     path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(InvalidVolumeError, match="cannot be read as a volume|holds no scalars"):
+    with pytest.raises(InvalidVolumeError, match="cannot be read as"):
         read(path)
 
 

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import examples
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.io.volumes import read_file
+from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
 from pyvista_vdi.model.host_memory import require_free_memory
-from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -146,7 +145,7 @@ def find_dataset(name: str, seed: int = DEFAULT_SEED) -> Dataset:
     looks = _LOOKS.get(label, "ramp")
     return Dataset(
         *(label, "file", paper, file.name, looks, None),
-        lambda: as_volume(read_file(file), None, "point"),
+        lambda: read_volume(file),
     )
 
 

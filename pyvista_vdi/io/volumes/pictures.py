@@ -1,4 +1,4 @@
-"""A folder of TIFF or PNG pictures as a volume, one slice each."""
+"""Folders of TIFF or PNG pictures, one slice each, and pictures of several frames, by Pillow."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
+from pyvista_vdi.errors import InvalidVolumeError, warn_external
 from pyvista_vdi.io.time_steps import natural_key
-from pyvista_vdi.model.host_memory import require_free_memory
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
 
 #: What pictures of slices are called, kind by kind.
 _KINDS = ((".tif", ".tiff"), (".png",))
@@ -36,36 +35,55 @@ def slices_in(folder: Path) -> list[Path]:
     return sorted(pictures, key=lambda file: natural_key(file.name.lower()))
 
 
-def read_stack(files: list[Path]) -> Volume:
-    """Read pictures as slices along z: rows run along x, the lowest first, as VTK has pictures.
+def volumes_in(path: Path) -> list[VolumeInFile]:
+    """Return pictures as slices along z: the top row is the last along y, as VTK has pictures.
 
     Grey values keep their type; RGBA of 8 bits is taken as colours with opacity. Spacing is 1.
     """
-    folder = files[0].parent
+    if not path.is_dir():
+        return _frames(path)
+    files = slices_in(path)
     if len(files) < 2:
-        raise InvalidVolumeError(f"the folder {folder} holds one slice: a volume needs two")
+        raise InvalidVolumeError(f"the folder {path} holds one slice: a volume needs two")
     found = [re.findall(r"\d+", file.stem) for file in files]
     numbers = [int(each[-1]) for each in found if each]
     if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
         warn_external(
-            f"the numbers of the slices in the folder {folder} are not evenly spaced "
+            f"the numbers of the slices in the folder {path} are not evenly spaced "
             f"({files[0].name} to {files[-1].name}, {len(files)} files), and are taken as if: are "
             "some missing?"
         )
     first = _read(files[0])
-    require_free_memory(
-        first.nbytes * len(files), f"the {len(files)} slices in {folder}", "take fewer of them"
-    )
-    array = np.empty((len(files), *first.shape), dtype=first.dtype)
-    for i, file in enumerate(files):
-        picture = _read(file)
-        if picture.shape != first.shape or picture.dtype != first.dtype:
+    shape = (len(files), *first.shape)
+
+    def read() -> NDArray[Any]:
+        array = np.empty(shape, dtype=first.dtype)
+        for i, file in enumerate(files):
+            picture = _read(file)
+            if picture.shape != first.shape or picture.dtype != first.dtype:
+                raise InvalidVolumeError(
+                    f"{file} is {_form(picture)}, and {files[0].name} is {_form(first)}: the "
+                    "slices of a volume have one size and one type"
+                )
+            array[i] = picture[::-1]
+        return array
+
+    return [VolumeInFile(Lazy(shape, first.dtype, read), "zyxs"[: len(shape)])]
+
+
+def _frames(file: Path) -> list[VolumeInFile]:
+    """Return the frames of a GIF, PNG or WebP picture."""
+    from PIL import Image, ImageSequence
+
+    with Image.open(file) as picture:
+        count = getattr(picture, "n_frames", 1)
+        if count < 2:
             raise InvalidVolumeError(
-                f"{file} is {_form(picture)}, and {files[0].name} is {_form(first)}: the slices of "
-                "a volume have one size and one type"
+                f"{file} holds one picture: give the folder that holds all slices of the volume"
             )
-        array[i] = picture[::-1]
-    return Volume(_grey(array, folder))
+        frames = [np.asarray(frame.convert("RGBA")) for frame in ImageSequence.Iterator(picture)]
+    array = np.stack(frames)[:, ::-1]
+    return [VolumeInFile(array, "zyxs")]
 
 
 def _is_dicom(file: Path) -> bool:
@@ -77,10 +95,16 @@ def _is_dicom(file: Path) -> bool:
 
 
 def _read(file: Path) -> NDArray[Any]:
-    from skimage.io import imread
-
     try:
-        picture = np.asarray(imread(file))
+        if file.suffix.lower() in _KINDS[0]:
+            import tifffile
+
+            picture = tifffile.imread(file)
+        else:
+            from skimage.io import imread
+
+            with file.open("rb") as stream:
+                picture = np.asarray(imread(stream))
     except Exception as error:  # each format has readers, and exceptions, of its own
         raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
     if picture.ndim != 2 and not (picture.ndim == 3 and picture.shape[2] in (2, 3, 4)):
@@ -93,20 +117,3 @@ def _read(file: Path) -> NDArray[Any]:
 
 def _form(picture: NDArray[Any]) -> str:
     return f"{' x '.join(str(n) for n in picture.shape)} {picture.dtype}"
-
-
-def _grey(array: NDArray[Any], folder: Path) -> NDArray[Any]:
-    """Return scalars where colours are all grey and opaque, as many programs write them."""
-    if array.ndim == 3:
-        return array
-    n_colors = array.shape[3] - 1 + array.shape[3] % 2  # without opacity
-    most = 1 if array.dtype.kind == "f" else np.iinfo(array.dtype).max
-    opaque = n_colors == array.shape[3] or bool((array[..., -1] == most).all())
-    if opaque and all((array[..., 0] == array[..., i]).all() for i in range(1, n_colors)):
-        return np.ascontiguousarray(array[..., 0])
-    if array.shape[3] == 4 and array.dtype == np.uint8 and not opaque:
-        return array
-    raise UnsupportedError(
-        f"the slices in the folder {folder} are coloured: write them as grey values, or as 8-bit "
-        "RGBA whose fourth channel is the opacity"
-    )

@@ -1,0 +1,10 @@
+"""Volumes in files of many formats: one door, and a thin adapter for each format.
+
+``table.py`` has the formats; ``in_file.py`` makes a volume of what an adapter finds.
+"""
+
+from __future__ import annotations
+
+from pyvista_vdi.io.volumes.read import list_volumes, needs_pyvista, read_volume
+
+__all__ = ["list_volumes", "needs_pyvista", "read_volume"]

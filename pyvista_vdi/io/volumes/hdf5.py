@@ -1,0 +1,67 @@
+"""HDF5: which arrays there are, and Imaris's channels, times and extents, by h5py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.io.stores import array_store, arrays_in
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
+
+
+def volumes_in(file: Path) -> list[VolumeInFile]:
+    """Return the arrays of three axes or more, or the levels of an Imaris file."""
+    import h5py
+
+    with h5py.File(file, "r") as data:
+        if "DataSet" in data and "DataSetInfo/Image" in data:
+            return _imaris(file, data)
+        return [_described(file, name, array) for name, array in arrays_in(data).items()]
+
+
+def _described(file: Path, name: str, array: Any) -> VolumeInFile:
+    import h5py
+
+    store = array_store(str(file), (name, array), "HDF5")
+    axes = "".join(axis if len(axis) == 1 else "?" for axis in store.axes)
+
+    def read(index: Any) -> Any:
+        with h5py.File(file, "r") as again:
+            return again[name][index]
+
+    lazy = Lazy(array.shape, array.dtype, read, in_parts=True)
+    return VolumeInFile(lazy, axes, store.levels[0].grid.index_to_model, name, store.unit)
+
+
+def _imaris(file: Path, data: Any) -> list[VolumeInFile]:
+    """Return the levels of an Imaris file, whose arrays are padded, and whose extents are outer."""
+    import h5py
+
+    image = data["DataSetInfo/Image"].attrs
+    text = {key: b"".join(np.atleast_1d(value).tolist()).decode() for key, value in image.items()}
+    low, high = (
+        np.array([float(text[f"{end}{i}"]) for i in range(3)]) for end in ("ExtMin", "ExtMax")
+    )
+    found = []
+    for level in range(len(data["DataSet"])):
+        times = data[f"DataSet/ResolutionLevel {level}"]
+        channels = times["TimePoint 0"]
+        first = channels["Channel 0"]
+        size = [int(b"".join(np.atleast_1d(first.attrs[f"ImageSize{a}"]).tolist())) for a in "ZYX"]
+        step = (high - low) / size[::-1]
+        place = np.diag([*step, 1.0])
+        place[:3, 3] = low + step / 2
+
+        def read(index: Any, level: int = level, size: list[int] = size) -> Any:
+            t, c = index[:2]
+            name = f"DataSet/ResolutionLevel {level}/TimePoint {t}/Channel {c}/Data"
+            with h5py.File(file, "r") as again:
+                return again[name][tuple(slice(n) for n in size)]
+
+        shape = (len(times), len(channels), *size)
+        lazy = Lazy(shape, first["Data"].dtype, read, in_parts=True)
+        unit = text.get("Unit", "").replace("µm", "um")
+        found.append(VolumeInFile(lazy, "tczyx", place, f"level {level}", unit, (), level))
+    return found

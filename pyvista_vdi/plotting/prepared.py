@@ -1,0 +1,136 @@
+"""What ``add_vdi`` makes of paths, stores, masks and grids that are not uniform: a uniform grid."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
+from pyvista_vdi.io import is_vdi_file, read
+from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.io.volumes import read_volume
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.volumes import as_image
+from pyvista_vdi.vtk_pipeline.vtk import vtkCommonDataModel, vtkImageData
+
+_log = logging.getLogger(__name__)
+
+#: Points that ``resample="auto"`` takes, at most.
+_MOST_POINTS = 2**27
+#: VTK's bit for a point that is not shown.
+_HIDDEN = 2
+
+
+def prepared(plotter: Any, volume: Any, scalars: Any, resample: Any, mask: Any) -> Any:
+    """Return what can be shown of what is given: a path is read, a store's level loaded."""
+    if isinstance(volume, str | os.PathLike):
+        array = scalars if isinstance(scalars, str) else None
+        volume = read(volume) if is_vdi_file(volume) else read_volume(volume, array=array)
+    if isinstance(volume, StoredVolume):
+        volume = _level_in_view(plotter, volume)
+    if resample is not None and isinstance(volume, vtkCommonDataModel.vtkDataSet):
+        volume = resampled(pv.wrap(volume), resample)
+    return volume if mask is None else masked(volume, mask)
+
+
+def _level_in_view(plotter: Any, volume: StoredVolume) -> Volume:
+    """Load the level of a store that the plotter's view requires, and say which in the log."""
+    if len(volume.store.levels) > 1 and volume.why != "asked for":
+        if plotter.renderer.camera.is_set:
+            camera = Camera.from_any(plotter.camera)
+        else:
+            framed = pv.Camera()
+            box = pv.Box(volume.bounds)
+            framed.position = np.add(box.center, np.multiply(box.length, (1.0, 1.0, 1.0)))
+            framed.focal_point = box.center
+            camera = Camera.from_any(framed)
+        volume = volume.at_level("auto", camera, plotter.window_size)
+    remedy = "open a coarser level by pyvista_vdi.open_volume(path, level=...), or generate a VDI"
+    require_free_memory(volume.array.nbytes, f"the volume in {volume.store.path}", remedy)
+    _log.info("%s: %s", volume.store.path, volume.describe())
+    return volume.load()
+
+
+def resampled(grid: Any, resample: str | Sequence[int]) -> pv.ImageData:
+    """Return a grid's arrays at the points of a uniform one; points outside are hidden.
+
+    ``resample``: numbers of points along x, y and z, or ``"auto"``, by which voxels are as large as
+    the grid's mean cell. The log says how large the difference at the grid's own points is.
+    """
+    if isinstance(grid, vtkImageData):
+        return pv.wrap(grid)
+    low, high = np.reshape(grid.bounds, (3, 2)).T
+    size = high - low
+    if grid.n_cells == 0 or not (size > 0).all():
+        raise InvalidVolumeError(
+            f"a {type(grid).__name__} of {grid.n_cells} cells, {size.tolist()} long, cannot be "
+            "resampled: it must have cells, and a length along each axis"
+        )
+    if isinstance(resample, str) and resample == "auto":
+        step = (np.prod(size) / grid.n_cells) ** (1 / 3)
+        numbers = np.maximum(2, np.ceil(size / step).astype(int) + 1)
+    else:
+        numbers = np.asarray(resample)
+    if numbers.shape != (3,) or numbers.dtype.kind not in "iu" or (numbers < 2).any():
+        raise InvalidArgumentError(
+            f'resample must be "auto" or three numbers of points, 2 or more; got {resample!r}'
+        )
+    count = int(np.prod(numbers, dtype=object))
+    if count > _MOST_POINTS and isinstance(resample, str):
+        raise UnsupportedError(
+            f"the mean cell of the grid asks for {' x '.join(map(str, numbers))} points: give "
+            "resample=(nx, ny, nz)"
+        )
+    need = count * 8 * max(1, len(grid.array_names))
+    require_free_memory(need, f"the grid of {count} points", "resample to fewer")
+    image = pv.ImageData(dimensions=numbers, spacing=size / (numbers - 1), origin=low)
+    found = image.sample(grid, categorical=False)
+    valid = found.point_data.pop("vtkValidPointMask")
+    found.point_data.pop("vtkGhostType", None)
+    if not valid.any():
+        raise InvalidVolumeError("no point of the uniform grid lies in a cell of the other")
+    found.point_data["vtkGhostType"] = np.where(valid, 0, _HIDDEN).astype(np.uint8)
+    name = grid.active_scalars_name
+    if name in found.point_data:
+        found.set_active_scalars(name, "point")
+    if name in grid.point_data and grid.point_data[name].ndim == 1:
+        seen = pv.PolyData(grid.points).sample(found)
+        at = seen["vtkValidPointMask"].astype(bool)
+        off = np.abs(seen[name][at].astype(float) - grid.point_data[name][at].astype(float))
+        if off.size:
+            text = (
+                "%s resampled to %s points: at its own points %r differs by %.3g at most, %.3g on "
+            )
+            text += "the mean"
+            size_of = " x ".join(map(str, numbers))
+            _log.info(text, type(grid).__name__, size_of, name, off.max(), off.mean())
+    return found
+
+
+def masked(volume: Any, mask: Any) -> pv.ImageData:
+    """Return a volume without the points at which a mask of the same grid is 0."""
+    image = pv.wrap(as_image(volume, None, None)[0]).copy(deep=False)
+    if isinstance(mask, str | os.PathLike):
+        mask = read_volume(mask)
+    if isinstance(mask, np.ndarray):  # as an array of add_volume's: along x, y, z
+        labels = mask.ravel(order="F") if mask.ndim == 3 else mask
+        dimensions = mask.shape if mask.ndim == 3 else image.dimensions
+    else:
+        grid = pv.wrap(as_image(mask, None, None)[0])
+        labels, dimensions = grid.active_scalars, grid.dimensions
+    if tuple(dimensions) != tuple(image.dimensions) or labels.shape != (image.n_points,):
+        raise InvalidArgumentError(
+            f"mask must have a label for each of the volume's {image.dimensions} points; got "
+            f"{tuple(dimensions)}"
+        )
+    hidden = np.where(np.asarray(labels) == 0, _HIDDEN, 0).astype(np.uint8)
+    before = image.point_data.get("vtkGhostType", np.uint8(0))
+    image.point_data["vtkGhostType"] = hidden | before
+    return image

@@ -1,0 +1,191 @@
+"""Volumes in files of sixty kinds: values, place, direction and unit, against another library.
+
+And what is truncated, damaged, missing or foreign: right, or a sentence, and no process ends.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from volume_kinds import ITK, KINDS, NEEDS
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVolumeError,
+    UnsupportedError,
+    VDIError,
+)
+
+
+def made(name, folder):
+    for library, names in NEEDS.items():
+        if name.startswith(tuple(names.split())):
+            pytest.importorskip(library)
+    return KINDS[name](folder)
+
+
+def loaded(volume):
+    return volume.load() if volume.chunked else volume
+
+
+def sampled(values):
+    """The corners' indices (z, y, x), and a hundred others."""
+    shape = values.shape[:3]
+    corners = np.stack(np.meshgrid(*[(0, n - 1) for n in shape]), -1).reshape(-1, 3)
+    rng = np.random.default_rng(1)
+    return np.concatenate([corners, rng.integers(0, shape, (100, 3))])
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_values_place_and_unit(name, tmp_path):
+    right = made(name, tmp_path)
+    volume = loaded(pvdi.read_volume(right.path, **right.options))
+    assert volume.unit == right.unit
+    assert sorted(volume.array.shape) == sorted(right.values.shape)
+    for z, y, x in sampled(right.values):
+        world = right.to_world @ [x, y, z, 1]
+        i, j, k = (np.linalg.inv(volume.index_to_model) @ world)[:3]
+        assert np.allclose([i, j, k], np.round([i, j, k]), atol=2e-4)
+        value = volume.array[round(k), round(j), round(i)]
+        assert np.allclose(value, right.values[z, y, x], rtol=1e-6)
+    listed = pvdi.list_volumes(right.path)
+    assert volume.dimensions in [each.dimensions for each in listed]
+
+
+@pytest.mark.parametrize("name", ITK)
+def test_simpleitk_says_the_same(name, tmp_path):
+    sitk = pytest.importorskip("SimpleITK")
+    right = made(name, tmp_path)
+    if right.path.is_dir():
+        names = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(right.path))
+        image = sitk.ReadImage(names)
+    else:
+        image = sitk.ReadImage(str(right.path))
+    volume = pvdi.read_volume(right.path, **right.options)
+    values = sitk.GetArrayFromImage(image)
+    turn = np.diag([-1, -1, 1]) if right.flipped else np.eye(3)
+    for z, y, x in sampled(values):
+        world = turn @ image.TransformIndexToPhysicalPoint([int(x), int(y), int(z)])
+        i, j, k = np.round((np.linalg.inv(volume.index_to_model) @ [*world, 1])[:3], 3)
+        assert volume.array[int(k), int(j), int(i)] == values[z, y, x]
+
+
+def tried(path, options):
+    """What reading gives: a volume, and whether a sentence was said; or the error's text."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            return loaded(pvdi.read_volume(path, **options)).array, bool(said)
+        except VDIError as error:
+            return str(error), True
+
+
+@pytest.mark.every(4)
+@pytest.mark.parametrize("name", KINDS)
+def test_cut_off_or_changed_is_right_or_a_sentence(name, tmp_path, capfd):
+    right = made(name, tmp_path)
+    whole = right.path
+    if whole.is_dir():
+        whole = max((f for f in whole.rglob("*") if f.is_file()), key=lambda f: f.stat().st_size)
+    content = whole.read_bytes()
+    rng = np.random.default_rng(4)
+    capfd.readouterr()
+    for share in np.linspace(0, 0.97, 10):
+        whole.write_bytes(content[: int(share * len(content))])
+        found, said = tried(right.path, right.options)
+        if not said:  # what was cut is filling
+            assert np.allclose(np.sort(found.ravel()), np.sort(right.values.ravel())), share
+    for at in rng.integers(0, len(content), 10):
+        changed = bytearray(content)
+        changed[at] ^= 1 << rng.integers(8)
+        whole.write_bytes(changed)
+        tried(right.path, right.options)
+    printed = capfd.readouterr()
+    assert (printed.out, printed.err) == ("", "")
+
+
+def test_what_holds_several_is_asked_for_by_name(tmp_path):
+    pytest.importorskip("tifffile")
+    np.savez(tmp_path / "a.npz", one=np.zeros((3, 4, 5)), two=np.zeros((3, 4, 6)))
+    with pytest.raises(UnsupportedError, match=r"holds 2 volumes, 0: 'one': 5 x 4 x 3 .* array="):
+        pvdi.read_volume(tmp_path / "a.npz")
+    assert pvdi.read_volume(tmp_path / "a.npz", array=1).dimensions == (6, 4, 3)
+    with pytest.raises(InvalidArgumentError, match="no array 'three'"):
+        pvdi.read_volume(tmp_path / "a.npz", array="three")
+    with pytest.raises(InvalidArgumentError, match="holds arrays?, and series='x' was asked for"):
+        pvdi.read_volume(tmp_path / "a.npz", series="x")
+    kind = made("tiff_ome_channels", tmp_path)
+    with pytest.raises(UnsupportedError, match="2 channels, DAPI, GFP, .* channel=0"):
+        pvdi.read_volume(kind.path)
+    with pytest.raises(InvalidArgumentError, match="has no channel 'RFP'"):
+        pvdi.read_volume(kind.path, channel="RFP")
+    (listed,) = pvdi.list_volumes(kind.path)
+    assert listed.channels == ("DAPI", "GFP")
+    assert str(listed).startswith("7 x 6 x 5 uint16, 2 channels (DAPI, GFP)")
+
+
+def test_one_door(tmp_path):
+    """A path is a volume wherever one is taken."""
+    kind = made("meta_image", tmp_path)
+    assert pvdi.open_volume(kind.path).dimensions == (7, 6, 5)
+    from pyvista_vdi.model.inputs import as_volume
+
+    assert as_volume(str(kind.path)).dimensions == (7, 6, 5)
+    placed = pvdi.read_volume(kind.path, spacing=(1, 2, 3), origin=(4, 5, 6))
+    assert (placed.spacing, placed.origin) == ((1, 2, 3), (4, 5, 6))
+
+
+FOREIGN = {
+    "a.vdb": "OpenVDB",
+    "a.am": "Amira",
+    "a.bov": "BOV",
+    "a.mif": "MRtrix",
+    "a.czi": "Zeiss.*OME-TIFF",
+    "a.zip": "unpack it",
+    "a.mat": "v7.3",
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_what_no_library_reads_is_refused_with_the_remedy(name, tmp_path):
+    (tmp_path / name).write_bytes(bytes(2000))
+    with pytest.raises(UnsupportedError, match=FOREIGN[name]):
+        pvdi.read_volume(tmp_path / name)
+
+
+def test_what_cannot_be_opened_is_said(tmp_path):
+    with pytest.raises(InvalidVolumeError, match=r"none\.nrrd does not exist: check .*--example"):
+        pvdi.read_volume(tmp_path / "none.nrrd")
+    (tmp_path / "empty.tif").touch()
+    with pytest.raises(InvalidVolumeError, match="it is empty"):
+        pvdi.read_volume(tmp_path / "empty.tif")
+    (tmp_path / "loop.nrrd").symlink_to(tmp_path / "loop.nrrd")
+    with pytest.raises(InvalidVolumeError, match=r"loop\.nrrd"):
+        pvdi.read_volume(tmp_path / "loop.nrrd")
+    with pytest.raises(InvalidVolumeError, match=r"cannot be read|does not exist"):
+        pvdi.read_volume("x" * 5000)
+    header = b"NRRD0005\ntype: short\ndimension: 3\nsizes: 900000 900000 900000\n"
+    header += b"endian: little\nencoding: raw\n\n"
+    (tmp_path / "enormous.nrrd").write_bytes(header)
+    with pytest.raises(VDIError, match=r"enormous\.nrrd.* GiB"):
+        pvdi.read_volume(tmp_path / "enormous.nrrd")
+
+
+def test_what_is_missing_is_named(tmp_path, monkeypatch):
+    kind = KINDS["nifti"](tmp_path)
+    monkeypatch.setitem(sys.modules, "nibabel", None)
+    with pytest.raises(pvdi.MissingDependencyError, match=r'pip install "pyvista-vdi\[medical\]"'):
+        pvdi.read_volume(kind.path)
+
+
+def test_a_plotter_takes_a_path(tmp_path, default_runtime):
+    pv = pytest.importorskip("pyvista")
+    kind = made("nrrd_rgba", tmp_path)
+    plotter = pv.Plotter(off_screen=True)
+    actor = plotter.add_vdi(str(kind.path))
+    assert actor.bounds == pytest.approx((-10, -4, 20, 27.5, 30, 40))
+    plotter.close()

@@ -1,0 +1,83 @@
+"""Grids that are not uniform, masks and stores in a plotter: what is drawn of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+
+pytestmark = pytest.mark.usefixtures("default_runtime")
+
+
+def linear(grid):
+    grid["T"] = grid.points @ np.array([1.0, 2.0, 3.0])
+    return grid
+
+
+def grids():
+    rectilinear = pv.RectilinearGrid(*[np.array([0, 1, 1.5, 4.0])] * 3)
+    image = pv.ImageData(dimensions=(5, 5, 5))
+    return {
+        "rectilinear": linear(rectilinear),
+        "structured": linear(image.cast_to_structured_grid()),
+        "unstructured": linear(image.cast_to_unstructured_grid()),
+    }
+
+
+def shown(volume, **how):
+    plotter = pv.Plotter(off_screen=True, window_size=(16, 12))
+    try:
+        actor = plotter.add_vdi(volume, show_scalar_bar=False, **how)
+        return actor.mapper.GetSource().GetVolume()
+    finally:
+        plotter.close()
+
+
+@pytest.mark.parametrize("kind", ["rectilinear", "structured", "unstructured"])
+def test_other_grids_are_resampled_where_that_is_asked_for(kind, caplog):
+    grid = grids()[kind]
+    with pytest.raises(UnsupportedError, match="not a uniform grid"):
+        shown(grid)
+    caplog.set_level("INFO", "pyvista_vdi")
+    volume = shown(grid, resample=(5, 6, 7))
+    assert volume.dimensions == (5, 6, 7)
+    x, y, z = volume.spacing
+    assert volume.array[3, 2, 1] == pytest.approx(x + 2 * 2 * y + 3 * 3 * z)
+    assert "differs by" in caplog.text
+    assert min(shown(grid, resample="auto").dimensions) >= 4
+    with pytest.raises(InvalidArgumentError, match="three numbers of points"):
+        shown(grid, resample=(1, 2))
+
+
+def test_what_a_mask_leaves_out_is_blank():
+    image = pv.ImageData(dimensions=(4, 5, 6))
+    image["T"] = np.arange(120.0)
+    labels = image.copy()
+    labels["T"] = (np.arange(120) % 4 > 1).astype(np.uint8)
+    volume = shown(image, mask=labels)
+    assert volume.blanked is not None
+    seen = volume.blanked == 0
+    assert not seen[..., 0].any()
+    with pytest.raises(InvalidArgumentError, match="a label for each"):
+        shown(image, mask=np.zeros((4, 5, 7)))
+
+
+def test_a_store_is_shown_at_the_level_that_the_view_requires(tmp_path, caplog):
+    zarr = pytest.importorskip("zarr", minversion="3")
+    group = zarr.open_group(str(tmp_path / "a.ome.zarr"), mode="w", zarr_format=2)
+    fine = np.arange(64**3, dtype=np.uint16).reshape(64, 64, 64)
+    datasets = []
+    for level, step in enumerate((1, 2, 4)):
+        group.create_array(str(level), data=fine[::step, ::step, ::step])
+        scale = [{"type": "scale", "scale": [float(step)] * 3}]
+        datasets.append({"path": str(level), "coordinateTransformations": scale})
+    axes = [{"name": a, "type": "space"} for a in "zyx"]
+    group.attrs["multiscales"] = [{"version": "0.4", "datasets": datasets, "axes": axes}]
+    caplog.set_level("INFO", "pyvista_vdi")
+    path = tmp_path / "a.ome.zarr"
+    assert max(shown(pvdi.open_volume(path)).dimensions) < 64
+    assert "level" in caplog.text
+    assert shown(pvdi.open_volume(path, level=1)).dimensions == (32, 32, 32)
