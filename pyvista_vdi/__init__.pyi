@@ -19,7 +19,7 @@ from pyvista_vdi.extensions.series.series import VDISeries as VDISeries
 from pyvista_vdi.extensions.series.writer import SeriesWriter as SeriesWriter
 from pyvista_vdi.extensions.sets.generate import generate_set as generate_set
 from pyvista_vdi.extensions.sets.vdi_set import VDISet as VDISet
-from pyvista_vdi.generation.estimate import Estimate as Estimate
+from pyvista_vdi.generation.slices import Estimate as Estimate
 from pyvista_vdi.io.stores import open_volume as open_volume
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion as AmbientOcclusion
 from pyvista_vdi.model.camera import Camera as Camera

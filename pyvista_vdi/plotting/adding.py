@@ -15,16 +15,16 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.drawing_options import DrawingOptions
 from pyvista_vdi.model.options import GenerationOptions, Options, QualityTarget, option, record
+from pyvista_vdi.model.render_options import DrawingOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image, held
+from pyvista_vdi.quality.background import REGENERATE_BELOW
 from pyvista_vdi.quality.dial import refuse_settings
-from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, require_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array

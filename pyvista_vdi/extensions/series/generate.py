@@ -34,7 +34,7 @@ from pyvista_vdi.model.types import Progress
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import bytes_of, warn_missed
-from pyvista_vdi.quality.generate_anywhere import generate_anywhere
+from pyvista_vdi.quality.probe import generate_anywhere
 
 _DIAL = tuple(declared(QualityTarget))
 _GRID = ("spacing", "origin")
