@@ -391,10 +391,10 @@ KERNEL_MUTANTS = (
 
 OPTIONS, RENDER = "pyvista_vdi/model/options.py", "pyvista_vdi/model/render_options.py"
 SCENE, CHOOSE = "pyvista_vdi/raycasting/scene.py", "pyvista_vdi/raycasting/choose.py"
-PICTURES = "pyvista_vdi/quality/tiles.py"
+PICTURES = "pyvista_vdi/quality/pictures.py"
 PACKING = "pyvista_vdi/model/packing.py"
 DECIDE = "pyvista_vdi/quality/decide.py"
-WHEN, WAYS = "pyvista_vdi/quality/background.py", "pyvista_vdi/quality/render_mode.py"
+WHEN, WAYS = "pyvista_vdi/quality/regeneration_policy.py", "pyvista_vdi/quality/render_mode.py"
 SET, SHOWN = (
     "pyvista_vdi/extensions/sets/vdi_set.py",
     "pyvista_vdi/extensions/sets/shown.py",

@@ -1,5 +1,7 @@
 """A new VDI made in a thread of its own while frames of the old one are drawn."""
 
+from __future__ import annotations
+
 import weakref
 from collections.abc import Callable, Hashable
 from typing import Any
@@ -11,32 +13,6 @@ from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.raycast import render_vdi
-
-#: Estimated SSIM below which a view at rest gets a VDI of its own. Over the measured views a VDI
-#: of 20 supersegments keeps .96 to .99 when it is only turned; zooming in by two, or looking past
-#: what V_O's window covered, falls below (docs/regeneration.md).
-REGENERATE_BELOW = 0.95
-#: Nearer to V_O than this, a VDI of the view itself would show the same.
-AT_HOME = 0.02
-#: Farther than this from the view that a VDI is being made for, it is given up.
-OUT_OF_DATE = 0.7
-
-#: While the view moves this multiple of the error is borne: what is made then is soon out of date.
-_PATIENCE_IN_MOTION = 2.0
-#: Farther than this from the last estimate's view, another is made: at rest, and in motion.
-_ANOTHER_ESTIMATE = 0.005
-_ANOTHER_ESTIMATE_IN_MOTION = 0.3
-
-
-def estimate_is_old(apart: float, *, moving: bool) -> bool:
-    """Whether a view that is so far from the last estimate's asks for another estimate."""
-    return apart > (_ANOTHER_ESTIMATE_IN_MOTION if moving else _ANOTHER_ESTIMATE)
-
-
-def is_poor(ssim: float, bound: float, *, moving: bool) -> bool:
-    """Whether a picture of this estimated SSIM asks for another VDI."""
-    return ssim < 1 - (1 - bound) * (_PATIENCE_IN_MOTION if moving else 1)
-
 
 #: Pixels along each edge of the frame that a new VDI is tried with: what the first real frame
 #: would have to compile and upload is there then.
@@ -126,7 +102,7 @@ class BackgroundGeneration:
         self._worker.close()
         self._worker.join()
 
-    def __enter__(self) -> "BackgroundGeneration":
+    def __enter__(self) -> BackgroundGeneration:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -14,13 +14,6 @@ from dataclasses import replace
 from typing import Any
 
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.background import (
-    AT_HOME,
-    OUT_OF_DATE,
-    REGENERATE_BELOW,
-    estimate_is_old,
-    is_poor,
-)
 from pyvista_vdi.quality.frame_state import (
     Action,
     AskAgain,
@@ -57,14 +50,21 @@ from pyvista_vdi.quality.frame_state import (
     ViewPicked,
     Warn,
 )
-from pyvista_vdi.quality.render_mode import choose, took
-from pyvista_vdi.quality.tiles import (
+from pyvista_vdi.quality.pictures import (
     FINE_ENOUGH,
     SIMILAR,
     deserves_vdi,
     drawn_by_volume,
     serves,
 )
+from pyvista_vdi.quality.regeneration_policy import (
+    AT_HOME,
+    OUT_OF_DATE,
+    REGENERATE_BELOW,
+    estimate_is_old,
+    is_poor,
+)
+from pyvista_vdi.quality.render_mode import choose, took
 
 #: Seconds between two estimates while the view moves: each takes time from the frames.
 ESTIMATE_PERIOD_IN_MOTION = 0.5

@@ -11,8 +11,9 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.model.options import QualityTarget
 from pyvista_vdi.quality import probe as dial_measurement
-from pyvista_vdi.quality.background import REGENERATE_BELOW, BackgroundGeneration
+from pyvista_vdi.quality.background import BackgroundGeneration
 from pyvista_vdi.quality.dial import LADDER
+from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 

@@ -9,7 +9,7 @@ from plugin_scenes import LOOKS, add_judge, shown, soft_ball
 from skimage.metrics import structural_similarity
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.quality.tiles import SIMILAR
+from pyvista_vdi.quality.pictures import SIMILAR
 
 pytestmark = pytest.mark.gl
 

@@ -9,7 +9,8 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.frame_state import Estimate, FrameAsked, Pictures, Sight
-from pyvista_vdi.quality.tiles import SIMILAR, contrast_ratio, deserves_vdi, drawn_by_volume, serves
+from pyvista_vdi.quality.pictures import SIMILAR, deserves_vdi, drawn_by_volume, serves
+from pyvista_vdi.quality.tiles import contrast_ratio
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 
 SIZE = (64, 64)

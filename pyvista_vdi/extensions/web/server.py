@@ -32,7 +32,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.render_options import checked_bound
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.quality.background import REGENERATE_BELOW
+from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web

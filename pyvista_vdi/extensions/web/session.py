@@ -18,7 +18,7 @@ from pyvista_vdi.errors import Cancelled, VDIError
 from pyvista_vdi.extensions.web.encode import encoded
 from pyvista_vdi.extensions.web.messages import Wish
 from pyvista_vdi.extensions.web.source import Made, Source
-from pyvista_vdi.quality.background import AT_HOME, estimate_is_old, is_poor
+from pyvista_vdi.quality.regeneration_policy import AT_HOME, estimate_is_old, is_poor
 
 #: Farther than this (View.distance) from the view that a full VDI is made for, it is given up: a
 #: coarse one is what a view in motion needs. Coarse ones are never given up for another wish, so
