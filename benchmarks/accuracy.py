@@ -17,8 +17,7 @@ from shared import benches, execute, mean_of, parser_of  # beside this file
 
 from pyvista_vdi import generate
 from pyvista_vdi.measure.harness import Case, accuracy
-from pyvista_vdi.measure.report import number, table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, number, table
 from pyvista_vdi.model.metrics import list_edges, list_places
 from pyvista_vdi.model.options import QUALITIES, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS

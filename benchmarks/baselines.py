@@ -21,8 +21,7 @@ from shared import execute, load, parser_of  # beside this file
 
 from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.harness import Bench, Case, Latest, accuracy
-from pyvista_vdi.measure.report import mebibytes, milliseconds, section, table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, mebibytes, milliseconds, section, table
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 

@@ -29,8 +29,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.io import read
 from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.harness import Bench, Case
-from pyvista_vdi.measure.report import mebibytes, table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, mebibytes, table
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI

@@ -21,8 +21,7 @@ import pyvista as pv
 from shared import Latest, execute, load, mean_of, parser_of  # beside this file
 
 from pyvista_vdi.measure.harness import ROOMS, Case
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, table
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera

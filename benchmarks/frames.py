@@ -22,8 +22,7 @@ from shared import benches, execute, load, mean_of, parser_of  # beside this fil
 
 from pyvista_vdi.measure.clock import ratios, take_turns
 from pyvista_vdi.measure.harness import ROOMS, Case, Latest
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, table
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import ANGLES, TRANSFER_FUNCTIONS, filling_camera

@@ -16,8 +16,7 @@ from shared import benches, execute, mean_of, parser_of  # beside this file
 from pyvista_vdi import render_volume
 from pyvista_vdi.measure.clock import ratios, take_turns
 from pyvista_vdi.measure.harness import Case
-from pyvista_vdi.measure.report import number, table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, number, table
 
 #: Degrees from V_O at which VTK's mappers and ours draw the volume.
 ANGLE = 5.0

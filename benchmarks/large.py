@@ -21,8 +21,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.extensions.large.generate import generate_chunked
 from pyvista_vdi.extensions.large.on_dask import generate_on_dask
 from pyvista_vdi.measure.harness import Case, accuracy
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, table
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera

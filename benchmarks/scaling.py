@@ -18,9 +18,8 @@ from shared import execute, load, parser_of, table_of  # beside this file
 
 from pyvista_vdi.measure.clock import take_turns
 from pyvista_vdi.measure.harness import Bench, Case, Latest
-from pyvista_vdi.measure.paper.procedural import PROCEDURAL
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.paper.datasets import PROCEDURAL
+from pyvista_vdi.measure.results import Results, table
 
 #: What is timed, and on which axes.
 QUANTITIES = ("VDI frame", "render_volume", "generation")

@@ -23,8 +23,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import Volume, examples
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.measure.harness import Bench, Case
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, table
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 

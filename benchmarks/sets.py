@@ -18,8 +18,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.extensions.sets.sphere import orbit
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.harness import Bench, Case
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, table
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 VOLUMES = ("brain", "visible_female_head", "rayleigh_taylor")

@@ -25,8 +25,7 @@ from shared import execute, mean_of, parser_of  # beside this file
 
 from pyvista_vdi.measure.clock import rank_sum_chance, ratios
 from pyvista_vdi.measure.harness import Case
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, table
 
 #: A sample has these, which differ most in what their rays meet.
 VOLUMES = ("brain", "heptane", "rayleigh_taylor", "visible_female_head")

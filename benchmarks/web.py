@@ -34,8 +34,7 @@ from web_client import WebClient
 import pyvista_vdi as pvdi
 from pyvista_vdi.extensions import web
 from pyvista_vdi.measure.harness import Bench, Case
-from pyvista_vdi.measure.report import table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, table
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 

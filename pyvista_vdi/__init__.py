@@ -19,7 +19,7 @@ _HOMES = {
     "AmbientOcclusion": "model.ambient_occlusion",
     "Camera": "model.camera",
     "Cropping": "model.cropping",
-    "Estimate": "generation.estimate",
+    "Estimate": "generation.slices",
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",

@@ -25,7 +25,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from pyvista_vdi.measure.provenance import outdated
+from pyvista_vdi.measure.clock import outdated
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"^\s*(?:<!--|%)\s*(figures|measured):\s*(.*?)\s*(?:-->)?\s*$")

@@ -41,7 +41,7 @@ def _m(name: str, file: str, old: str, new: str, rooms: tuple[str, ...] = ()) ->
 MARCH, MARCH_LISTS = "opencl/volume/march.cl", "opencl/cpu16/generation_march.cl"
 RUNS, SHORTEN = "opencl/generation/runs.cl", "opencl/cpu16/generation_shorten.cl"
 HOMOGENEITY = "opencl/generation/homogeneity.cl"
-LISTS, RAYS = "opencl/raycasting/first_supersegment.cl", "opencl/raycasting/ray.cl"
+LISTS = "opencl/raycasting/first_supersegment.cl"
 DECODE = "opencl/series/decode.cl"
 LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
     ("extensions/large",),
@@ -223,7 +223,7 @@ KERNEL_MUTANTS = (
     ),
     _m(
         "list ray: length by one end's depth",
-        RAYS,
+        "opencl/raycasting/lengths.cl",
         " * reciprocal_depth_at(ray, to));",
         " * reciprocal_depth_at(ray, from));",
     ),

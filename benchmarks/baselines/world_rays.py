@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, Runtime
-from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF

@@ -14,8 +14,7 @@ from pyvista_vdi import Volume, examples
 from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.measure.harness import ROOMS, Bench, Case, Latest, run
 from pyvista_vdi.measure.paper import find_dataset
-from pyvista_vdi.measure.report import closing, write_text
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, closing, write_text
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from shared.sampling import SampledMean, estimate, sample

@@ -65,7 +65,7 @@ typedef struct {
 
 // Pass by what is empty for the lanes that look, which are in column P; a lane that comes to
 // another stack has a `new_stack` there.
-inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, const ListRays *rays,
+inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, const ListRay *rays,
                              const Axis *p, const Axis *q, const Sense *sense, const Grid *grid,
                              float depth_origin)
 {
@@ -115,13 +115,12 @@ typedef struct {
 } Met;
 
 // Composite what waits.
-inline void composite_met(Seen *seen, Met *met, const ListRays *rays, const Sense *sense)
+inline void composite_met(Seen *seen, Met *met, const ListRay *rays, const Sense *sense)
 {
     Real from, to;
     clip_to_faces(&from, &to, sense, met->near, met->far, met->r, met->r_next,
                   depth_at(sense, met->r), depth_at(sense, met->r_next));
-    composite_medium(seen, met->medium.w * lengths_between(rays, from, to), met->medium,
-                     met->waits);
+    composite_medium(seen, met->medium.w * length_between(rays, from, to), met->medium, met->waits);
     met->waits = 0;
 }
 
@@ -139,7 +138,7 @@ inline float far_face(const Lists *lists, List list, int n, bool away, float dep
 }
 
 // Follow the rays that are `going`, which step the same way, through all lists that they cross.
-__attribute__((always_inline)) inline void sweep(Seen *seen, const ListRays *rays, const Axis *p,
+__attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays, const Axis *p,
                                                  const Axis *q, Int going, Int first_p, Int first_q,
                                                  bool away, const Lists *lists, const Grid *grid,
                                                  float depth_origin, float cutoff)
@@ -260,8 +259,8 @@ KERNEL_OF_LANES void raycast_packets(
     const Int x = UPRIGHT ? across : along, y = UPRIGHT ? along : across;
     const Pixels pixels = pixels_at(x, y, in_window, frame.width, frame.height);
     const Real t_end = frame.has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Real)(INFINITY);
-    const ListRays rays = begin_rays(forms, &frame, offsets_from_middle(x, frame.width),
-                                     offsets_from_middle(y, frame.height), t_end, in_window);
+    const ListRay rays = begin_rays(forms, &frame, offsets_from_middle(x, frame.width),
+                                    offsets_from_middle(y, frame.height), t_end, in_window);
     const Lists lists = LISTS_OF(frame);
     const Grid grid = GRID_OF(frame);
 

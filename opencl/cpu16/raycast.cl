@@ -7,48 +7,18 @@
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Model lengths of what is kept of the rays from r = from to r = to.
-inline Real lengths_crossed(const ListRays *rays, Real from, Real to, Int chosen)
+typedef Seen Made;
+
+inline Int are_done(const Seen *seen, const Frame *frame) { return seen->sums.w < frame->cutoff; }
+
+// Composite what the rays that are chosen cross of a medium, from r = from to r = to.
+inline void take_medium(Seen *seen, const ListRay *rays, Real from, Real to, Real4 medium,
+                        Int chosen)
 {
-    if (!CROPPED)
-        return lengths_between(rays, from, to);
-    Real length = 0.0f;
-    for (int n = 0; n < MOST_KEPT; ++n) { // not to an end of each ray's own, see lib/cropping.cl
-        if (!ANY(chosen && rays->kept.count > n))
-            break;
-        Real kept_from = from, kept_to = to;
-        cut_to_part(&rays->kept, n, &kept_from, &kept_to);
-        length +=
-            select((Real)(0.0f), lengths_between(rays, kept_from, kept_to), kept_from < kept_to);
-    }
-    return length;
+    composite_medium(seen, medium.w * length_crossed(rays, from, to, chosen), medium, chosen);
 }
 
-// Follow the rays that are `active`, of which all go away or come back.
-__attribute__((always_inline)) inline void follow(Seen *seen, const Paths *paths, Int active,
-                                                  bool away, const Lists *lists, const Grid *grid,
-                                                  const Frame *frame)
-{
-    const Sense sense = sense_of(paths->rays.along.z, paths->rays.deep.z, away);
-    Cursors at = begin_walk(paths, &sense, active);
-    for (int turn = 0; ANY(at.active); ++turn) {
-        if (SKIP_EMPTY && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
-            skip_empty_cells(&at, at.new_stack && at.active, paths, &sense, grid,
-                             frame->depth_origin);
-            at.new_stack = 0;
-            if (!ANY(at.active))
-                break;
-        }
-        Crossings crossing = next_crossings(&at, paths, &sense, lists);
-        if (ANY(crossing.meets)) {
-            Real from, to;
-            const Real4 medium = media_crossed(&at, &crossing, &sense, lists, &from, &to);
-            const Real length = lengths_crossed(&paths->rays, from, to, crossing.meets);
-            composite_medium(seen, medium.w * length, medium, crossing.meets);
-        }
-        step_on(&at, &crossing, paths, seen->sums.w < frame->cutoff);
-    }
-}
+#include "cpu16/follow.cl"
 
 KERNEL_OF_LANES void
 raycast_blocks(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
@@ -71,14 +41,6 @@ raycast_blocks(__global const HEADER_T *headers, // these as of raycasting/rayca
     Seen seen = nothing_seen();
     const Paths paths = begin_paths(forms, &frame, offsets_from_middle(x, frame.width),
                                     offsets_from_middle(y, frame.height), t_end, in_window);
-    if (ANY(paths.rays.present)) {
-        prefetch_ends(&paths, &lists, frame.height);
-        const Int away = paths.rays.present && paths.rays.away;
-        const Int back = paths.rays.present && !paths.rays.away;
-        if (ANY(away))
-            follow(&seen, &paths, away, true, &lists, &grid, &frame);
-        if (ANY(back))
-            follow(&seen, &paths, back, false, &lists, &grid, &frame);
-    }
+    follow_all(&seen, &paths, &lists, &grid, &frame);
     write_pixels(image, &pixels, composited(&seen));
 }

@@ -20,38 +20,24 @@ typedef struct {
     Real t_deep;  // t where r is 0
     Real t_scale; // t per unit of r, but for the division by w(r) in perspective
     Kept kept;    // parts of them, in r
-} ListRays;
+} ListRay;
 
 // 1 / Z at r. Not used in parallel projection.
-inline Real reciprocal_depth_at(const ListRays *rays, Real r)
+inline Real reciprocal_depth_at(const ListRay *rays, Real r)
 {
     return fma(r, rays->w_along, rays->w_deep);
 }
 
-// The kept parts of rays from t_deep, where r is 0, to t_other.
-inline Kept kept_parts_of_rays(__global const float *forms, int planes, Real a, Real b, Real t_deep,
-                               Real t_other, Real r_other, uint regions)
-{
-    __global const float *form = forms + (PLANE_FORMS + planes) * FORM_SIZE;
-    Real at_deep[CROPPING_PLANES], at_other[CROPPING_PLANES];
-    Real w_deep = 1.0f, w_other = 1.0f;
-    if (DEPTH != PARALLEL) {
-        w_deep = 1.0f / list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_deep);
-        w_other = 1.0f / list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_other);
-    }
-    for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
-        at_deep[k] = list_form(form, a, b, t_deep) * w_deep;
-        at_other[k] = list_form(form, a, b, t_other) * w_other;
-    }
-    return kept_parts(at_deep, at_other, (Real)(0.0f), r_other, regions);
-}
+typedef Real Time;
+#define form_on_ray(form, a, b, t) list_form(form, a, b, t)
+#include "raycasting/lengths.cl"
 
 // Begin the rays of pixel offsets (a, b) that are `wanted`, which end at `t_end`; `forms` as for
 // begin_ray of raycasting/ray.cl.
-inline ListRays begin_rays(__global const float *forms, const Frame *frame, Real a, Real b,
-                           Real t_end, Int wanted)
+inline ListRay begin_rays(__global const float *forms, const Frame *frame, Real a, Real b,
+                          Real t_end, Int wanted)
 {
-    ListRays rays;
+    ListRay rays;
     Real t0 = -INFINITY;
     Real t1 = t_end;
     rays.present =
@@ -88,26 +74,9 @@ inline ListRays begin_rays(__global const float *forms, const Frame *frame, Real
     }
     if (CROPPED) {
         const Real t_other = select(t1, t0, rays.away);
-        rays.kept = kept_parts_of_rays(forms, frame->planes, a, b, rays.t_deep, t_other, r_other,
-                                       frame->regions);
+        rays.kept = kept_parts_of_ray(forms, frame->planes, a, b, rays.t_deep, t_other, r_other,
+                                      frame->regions);
         rays.present = rays.present && rays.kept.count > 0;
     }
     return rays;
-}
-
-// t at r, see raycasting/ray.cl.
-inline Real ray_times(const ListRays *rays, Real r)
-{
-    if (DEPTH == PARALLEL)
-        return fma(r, rays->t_scale, rays->t_deep);
-    return rays->t_deep + r * rays->t_scale / reciprocal_depth_at(rays, r);
-}
-
-// Model lengths from r = from to r = to.
-inline Real lengths_between(const ListRays *rays, Real from, Real to)
-{
-    if (DEPTH == PARALLEL)
-        return rays->scale * (to - from);
-    return rays->scale * (to - from) /
-           (reciprocal_depth_at(rays, from) * reciprocal_depth_at(rays, to));
 }

@@ -10,61 +10,46 @@
 // What is written of the rays.
 typedef struct {
     __global float *rows;
-    int capacity;  // slots of a ray
-    Int slots;     // behind the last segments
-    Real reached;  // t, so that rounding puts no segment before the end of another
-    Real absorbed; // optical depth
+    int capacity;      // slots of a ray
+    Int slots;         // behind the last segments
+    Real reached;      // t, so that rounding puts no segment before the end of another
+    Real absorbed;     // optical depth
+    float depth_shift; // see multi_vdi/segments.cl
 } Streams;
 
-// Append what the rays that are chosen cross of a medium, from r = from to r = to.
-inline void append_segments(Streams *streams, const ListRays *rays, Real from, Real to,
-                            Real4 medium, Int chosen, float depth_shift)
+typedef Streams Made;
+
+inline Int are_done(const Streams *streams, const Frame *frame)
 {
-    Segments segments;
-    segments.color = medium;
-    segments.optical_depth = fmin(medium.w * lengths_between(rays, from, to), MAX_OPTICAL_DEPTH);
-    chosen = chosen && from < to && segments.optical_depth > 0.0f;
-    segments.from = HIGHER_OF(ray_times(rays, from) + depth_shift, streams->reached);
-    segments.to = HIGHER_OF(ray_times(rays, to) + depth_shift, segments.from);
-    store_segments(streams->rows, streams->slots, streams->capacity, &segments);
-    streams->reached = select(streams->reached, segments.to, chosen);
-    streams->absorbed += select((Real)(0.0f), segments.optical_depth, chosen);
-    streams->slots += COUNT(chosen);
+    return streams->absorbed > frame->cutoff;
 }
 
-// Follow the rays that are `active`, of which all go away or come back.
-__attribute__((always_inline)) inline void follow(Streams *streams, const Paths *paths, Int active,
-                                                  bool away, const Lists *lists, const Grid *grid,
-                                                  const Frame *frame, float depth_shift)
+// Append what the rays that are chosen cross of a medium, from r = from to r = to.
+inline void take_medium(Streams *streams, const ListRay *rays, Real from, Real to, Real4 medium,
+                        Int chosen)
 {
-    const ListRays *rays = &paths->rays;
-    const Sense sense = sense_of(rays->along.z, rays->deep.z, away);
-    Cursors at = begin_walk(paths, &sense, active);
-    for (int turn = 0; ANY(at.active); ++turn) {
-        if (SKIP_EMPTY && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
-            skip_empty_cells(&at, at.new_stack && at.active, paths, &sense, grid,
-                             frame->depth_origin);
-            at.new_stack = 0;
-            if (!ANY(at.active))
-                break;
-        }
-        Crossings crossing = next_crossings(&at, paths, &sense, lists);
-        if (ANY(crossing.meets)) {
-            Real from, to;
-            const Real4 medium = media_crossed(&at, &crossing, &sense, lists, &from, &to);
-            for (int n = 0; n < (CROPPED ? MOST_KEPT : 1); ++n) {
-                if (CROPPED && !ANY(crossing.meets && rays->kept.count > n))
-                    break;
-                Real kept_from = from, kept_to = to;
-                if (CROPPED)
-                    cut_to_part(&rays->kept, n, &kept_from, &kept_to);
-                append_segments(streams, rays, kept_from, kept_to, medium, crossing.meets,
-                                depth_shift);
-            }
-        }
-        step_on(&at, &crossing, paths, streams->absorbed > frame->cutoff);
+    for (int n = 0; n < (CROPPED ? MOST_KEPT : 1); ++n) {
+        if (CROPPED && !ANY(chosen && rays->kept.count > n))
+            break;
+        Real kept_from = from, kept_to = to;
+        if (CROPPED)
+            cut_to_part(&rays->kept, n, &kept_from, &kept_to);
+        Segments segments;
+        segments.color = medium;
+        segments.optical_depth =
+            fmin(medium.w * length_between(rays, kept_from, kept_to), MAX_OPTICAL_DEPTH);
+        const Int appended = chosen && kept_from < kept_to && segments.optical_depth > 0.0f;
+        segments.from =
+            HIGHER_OF(ray_time(rays, kept_from) + streams->depth_shift, streams->reached);
+        segments.to = HIGHER_OF(ray_time(rays, kept_to) + streams->depth_shift, segments.from);
+        store_segments(streams->rows, streams->slots, streams->capacity, &segments);
+        streams->reached = select(streams->reached, segments.to, appended);
+        streams->absorbed += select((Real)(0.0f), segments.optical_depth, appended);
+        streams->slots += COUNT(appended);
     }
 }
+
+#include "cpu16/follow.cl"
 
 // Which of the rays that meet the VDI would meet its bounds, too, `margin` pixels to each side.
 inline Int surely_covered(__global const float *forms, Real a, Real b, float margin, Int meet)
@@ -111,20 +96,13 @@ segments_of_blocks(__global const HEADER_T *headers, // these as of multi_vdi/se
     t_end = select(t_end, fmin(t_end, DARK_FROM(dark_before, depth_shift)), dark_before < INFINITY);
     const Int first_slots =
         number > 0 ? vload16(0, ends + (number - 1) * band_rays + first_ray) : (Int)(0);
-    Streams streams = {pool_of(pool, first_ray, capacity), capacity, first_slots, -INFINITY, 0.0f};
+    Streams streams = {
+        pool_of(pool, first_ray, capacity), capacity, first_slots, -INFINITY, 0.0f, depth_shift};
     const Lists lists = LISTS_OF(frame);
     const Grid grid = GRID_OF(frame);
     const Real a = offsets_from_middle(x, frame.width), b = offsets_from_middle(y, frame.height);
     const Paths paths = begin_paths(forms, &frame, a, b, t_end, in_window);
-    if (ANY(paths.rays.present)) {
-        prefetch_ends(&paths, &lists, frame.height);
-        const Int away = paths.rays.present && paths.rays.away;
-        const Int back = paths.rays.present && !paths.rays.away;
-        if (ANY(away))
-            follow(&streams, &paths, away, true, &lists, &grid, &frame, depth_shift);
-        if (ANY(back))
-            follow(&streams, &paths, back, false, &lists, &grid, &frame, depth_shift);
-    }
+    follow_all(&streams, &paths, &lists, &grid, &frame);
     vstore16(streams.slots, 0, ends + number * band_rays + first_ray);
     const Real reached = fmin(dark_before, streams.reached);
     vstore16(select(dark_before, reached, streams.absorbed > frame.cutoff), 0, dark + first_ray);

@@ -24,7 +24,7 @@ typedef Real Border;
 
 // The rays, and what stepping along them takes.
 typedef struct {
-    ListRays rays;
+    ListRay rays;
     Axis u, v;
 } Paths;
 

@@ -42,7 +42,7 @@ first_hits(__global const HEADER_T *headers, // these as of raycasting/raycast.c
              meets = ONE_LIST && next_in_list(&at, &crossing, &path, &lists)) {
             // Is it a hit?
             const float2 ends = ends_inside(&at, &crossing, &path);
-            const float crossed = length_crossed(ray, ends.x, ends.y);
+            const float crossed = length_crossed(ray, ends.x, ends.y, true);
             const float optical_depth = medium_met(&at, &crossing, &path, &lists).w * crossed;
             met = accumulated ? met + optical_depth : optical_depth;
             hit = met > 0.0f && met >= least_optical_depth;

@@ -105,24 +105,13 @@ inline Span clip_ray(__global const float *planes, int count, float a, float b, 
 }
 #endif
 
-// The kept parts of a ray from t_deep, where r is 0, to t_other. Over the homogeneous denominator,
-// what is affine in t is linear in r.
-inline Kept kept_parts_of_ray(__global const float *forms, int planes, float a, float b,
-                              Time t_deep, Time t_other, float r_other, uint regions)
+// 1 / Z at r. Not used in parallel projection.
+inline float reciprocal_depth_at(const ListRay *ray, float r)
 {
-    __global const float *form = forms + (PLANE_FORMS + planes) * FORM_SIZE;
-    float at_deep[CROPPING_PLANES], at_other[CROPPING_PLANES];
-    float w_deep = 1.0f, w_other = 1.0f;
-    if (DEPTH != PARALLEL) {
-        w_deep = 1.0f / form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_deep);
-        w_other = 1.0f / form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_other);
-    }
-    for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
-        at_deep[k] = form_on_ray(form, a, b, t_deep) * w_deep;
-        at_other[k] = form_on_ray(form, a, b, t_other) * w_other;
-    }
-    return kept_parts(at_deep, at_other, 0.0f, r_other, regions);
+    return reciprocal_depth(fma(r, ray->along.z, ray->deep.z), ray->depths);
 }
+
+#include "raycasting/lengths.cl"
 
 // Begin the ray of pixel offsets (a, b), which ends at `t_end`. `forms`: list coordinates, model
 // direction, planes to clip to, then those of cropping if CROPPED.
@@ -162,42 +151,4 @@ inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *fr
                               ends_at_zero ? t0 : t1, ends_at_zero ? -1.0f : 1.0f, frame->regions);
         ray->present = ray->present && ray->kept.count > 0;
     }
-}
-
-// 1 / Z at r. Not used in parallel projection.
-inline float reciprocal_depth_at(const ListRay *ray, float r)
-{
-    return reciprocal_depth(fma(r, ray->along.z, ray->deep.z), ray->depths);
-}
-
-// t at r. With w = 1/Z linear in r and Z linear in t, the share of the ray between r and its deep
-// end is r w_shallow / w(r): small where r is, so that nothing cancels there.
-inline float ray_time(const ListRay *ray, float r)
-{
-    if (DEPTH == PARALLEL)
-        return fma(r, ray->t_scale, ray->t_deep);
-    return ray->t_deep + r * ray->t_scale / reciprocal_depth_at(ray, r);
-}
-
-// Model length from r = from to r = to.
-inline float length_between(const ListRay *ray, float from, float to)
-{
-    if (DEPTH == PARALLEL)
-        return ray->scale * (to - from);
-    return ray->scale * (to - from) /
-           (reciprocal_depth_at(ray, from) * reciprocal_depth_at(ray, to));
-}
-
-// The same of what is kept between them.
-inline float length_crossed(const ListRay *ray, float from, float to)
-{
-    if (!CROPPED)
-        return length_between(ray, from, to);
-    float length = 0.0f;
-    for (int n = 0; n < MOST_KEPT; ++n) { // not to an end of each ray's own, see lib/cropping.cl
-        float kept_from = from, kept_to = to;
-        cut_to_part(&ray->kept, n, &kept_from, &kept_to);
-        length += kept_from < kept_to ? length_between(ray, kept_from, kept_to) : 0.0f;
-    }
-    return length;
 }

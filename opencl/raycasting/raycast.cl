@@ -42,8 +42,8 @@ __kernel void raycast(
             const float4 medium = medium_met(&at, &crossing, &path, &lists);
             const float2 ends = ends_inside(&at, &crossing, &path);
             // medium.w is the extinction: optical depth for each unit of model length
-            composite_medium(&seen, medium.w * length_crossed(&path.ray, ends.x, ends.y), medium,
-                             true);
+            composite_medium(&seen, medium.w * length_crossed(&path.ray, ends.x, ends.y, true),
+                             medium, true);
             crossing.stays = crossing.stays && !(ONE_LIST && seen.sums.w < frame.cutoff);
         }
         // Step on (Amanatides and Woo)

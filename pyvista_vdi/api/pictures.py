@@ -127,8 +127,7 @@ def render(
             raise InvalidArgumentError(
                 "transmittance_cutoff is for a single VDI: leave it out for several"
             )
-        from pyvista_vdi.raycasting.multi_vdi import render_vdis
-        from pyvista_vdi.raycasting.placed import common_window_size, placed_vdis
+        from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
         several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
         seen = _seen_in_scene(several, view, model_transforms)
@@ -140,10 +139,10 @@ def render(
     size = shown.picture_size if window_size is None else window_size
     request = FrameRequest(view, size, options, opaque_depth, device)
     if _is_of_views(shown):
-        from pyvista_vdi.raycasting.blend import blended
+        from pyvista_vdi.raycasting.multi_vdi import blended
 
         return blended(shown.parts(view), request)
-    from pyvista_vdi.raycasting.bands import render_fitting
+    from pyvista_vdi.raycasting.raycast import render_fitting
 
     return render_fitting(shown, request)
 
@@ -373,7 +372,7 @@ def render_volume(
     )
     medium = MediumOptions.checked(sample_distance, lights, ambient_occlusion, memory_limit)
     if blending != BLENDINGS[0]:
-        from pyvista_vdi.volume.project import project_volume
+        from pyvista_vdi.volume.render import project_volume
 
         return project_volume(read, table, request, blending, medium)
     from pyvista_vdi.volume.render import raycast_volume

@@ -28,7 +28,7 @@ from pyvista_vdi.model.types import (
 from pyvista_vdi.model.vdi import VDI
 
 if TYPE_CHECKING:
-    from pyvista_vdi.generation.estimate import Estimate
+    from pyvista_vdi.generation.slices import Estimate
 
 
 def generate(
@@ -208,7 +208,7 @@ def generate(
         progress=progress,
         metadata={"classification": look.describe(), "scalars": read.name},
     )
-    from pyvista_vdi.quality.generate_anywhere import generate_anywhere
+    from pyvista_vdi.quality.probe import generate_anywhere
 
     vdi = generate_anywhere(request, target, client)
     if target:
@@ -293,7 +293,7 @@ def estimate(
     )
     look.require_composite()
     read = as_volume(volume, scalars, preference)
-    from pyvista_vdi.generation.estimate import estimate as estimate_bytes
+    from pyvista_vdi.generation.slices import estimate as estimate_bytes
 
     return estimate_bytes(
         read,

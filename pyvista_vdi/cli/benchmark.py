@@ -13,7 +13,7 @@ from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.io import check_writable
 from pyvista_vdi.measure.paper import PROFILES, Plan, describe, find_dataset, open_results, run
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.results import write_text
 
 
 def benchmark(options: argparse.Namespace) -> int:

@@ -21,7 +21,7 @@ from pyvista_vdi.cli.inputs import (
 from pyvista_vdi.io import write_png
 from pyvista_vdi.measure.compare import Settings, contact_sheet, measure, table
 from pyvista_vdi.measure.front import FrontPlan, left_out, measure_front, summary
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.results import write_text
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 

@@ -11,10 +11,9 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.drawing_options import DrawingOptions
 from pyvista_vdi.model.options import QUALITIES, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.packing import PRECISIONS
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 #: More than any screen shows.

@@ -18,7 +18,7 @@ from pyvista_vdi.cli.inputs import (
     say_vdi,
 )
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.generation.estimate import estimate
+from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera

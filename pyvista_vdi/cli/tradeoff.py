@@ -20,7 +20,7 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.paper.datasets import look
-from pyvista_vdi.measure.report import write_text
+from pyvista_vdi.measure.results import write_text
 from pyvista_vdi.measure.tradeoff import AXES, Setting, measure_tradeoff, sweep
 from pyvista_vdi.measure.tradeoff.report import summary
 from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, QUICK_AXES

@@ -6,9 +6,9 @@ import argparse
 from typing import Any
 
 from pyvista_vdi.cli import declare
-from pyvista_vdi.model.drawing_options import DrawingOptions
 from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.render_options import DrawingOptions
 from pyvista_vdi.model.standard_cases import ANGLES, ELEVATION, WINDOW_SIZE
 
 

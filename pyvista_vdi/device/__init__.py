@@ -6,17 +6,12 @@ when a device is first asked for.
 
 from __future__ import annotations
 
-from pyvista_vdi.device.buffers import (
-    DeviceBuffer,
-    bytes_text,
-    kept_together,
-)
 from pyvista_vdi.device.choice import describe_devices, get_runtime, list_devices
-from pyvista_vdi.device.declarations import KernelDeclaration, Struct
-from pyvista_vdi.device.devices import DeviceInfo
+from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.launches import Launch, padded
-from pyvista_vdi.device.profiling import KernelTime, Profile
-from pyvista_vdi.device.programs import Kernel
+from pyvista_vdi.device.memory import DeviceBuffer, kept_together
+from pyvista_vdi.device.programs import Kernel, KernelDeclaration, Struct
+from pyvista_vdi.device.queues import KernelTime, Profile
 from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty
 

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.buffers import bytes_text
-from pyvista_vdi.device.declarations import KernelDeclaration
-from pyvista_vdi.device.devices import Candidate, DeviceInfo
+from pyvista_vdi.device.devices import Candidate, DeviceInfo, bytes_text
+from pyvista_vdi.device.programs import KernelDeclaration
 from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
@@ -55,32 +54,17 @@ def list_devices() -> list[DeviceInfo]:
 
 
 def get_runtime(device: Any = None) -> Runtime:
-    """The runtime of a device, made once per process.
+    """Return the runtime of a device, made once per process: the same object for the same device.
 
-    Parameters
-    ----------
-    device : str, DeviceInfo, Runtime, pyopencl.Device or pyopencl.Context, optional
-        A string is a part of ``"platform / device"``, letter case ignored, or
-        ``"platform_index:device_index"``. By default the environment variable
-        ``PYVISTA_VDI_DEVICE``, read in the same way, and without it the best device that passes
-        the probe: GPU, then CPU (Intel's runtime before PoCL). A context is shared and must have
-        one device.
+    ``device`` is a part of ``"platform / device"``, letter case ignored,
+    ``"platform_index:device_index"``, a DeviceInfo, a Runtime, or pyopencl's Device or Context,
+    which is shared and must have one device. By default it is what the environment variable
+    ``PYVISTA_VDI_DEVICE`` says, and without it the best device that passes the probe: GPU, then CPU
+    (Intel's runtime before PoCL).
 
-    Returns
-    -------
-    Runtime
-        The same object for the same device; safe to use from any thread.
-
-    Raises
-    ------
-    NoDeviceError
-        If there is no usable device, or the one asked for is absent, ambiguous or not usable.
-    InvalidArgumentError
-        If ``device`` is of another type.
-    MissingDependencyError
-        If pyopencl cannot be imported.
-    DeviceError
-        In a fork of a process that had used or listed devices.
+    Raises NoDeviceError if there is no usable device, or the one asked for is absent, ambiguous or
+    not usable; InvalidArgumentError for another type; MissingDependencyError without pyopencl;
+    DeviceError in a fork of a process that had used or listed devices.
     """
     if devices.forked:
         devices.require_drivers()

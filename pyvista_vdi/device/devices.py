@@ -4,8 +4,6 @@ Everything here but :func:`find_candidates` works on plain :class:`DeviceInfo` l
 driver.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import re
@@ -198,6 +196,14 @@ def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
     found = f"found {listing(infos)}" if infos else "no OpenCL driver lists a device"
     details = "".join(f"; {note}" for note in notes if note)
     return f"no usable OpenCL device: {found}{details}. Remedy: {REMEDY}"
+
+
+def bytes_text(nbytes: int) -> str:
+    """Return a number of bytes for people: ``"1.50 GiB (1610612736 bytes)"``."""
+    for unit, size in (("GiB", 2**30), ("MiB", 2**20), ("KiB", 2**10)):
+        if nbytes >= size:
+            return f"{nbytes / size:.2f} {unit} ({nbytes} bytes)"
+    return f"{nbytes} bytes"
 
 
 _lock = threading.RLock()

@@ -12,8 +12,6 @@ ParaView loads is, and hwloc asks it when MPI starts. pyopencl's calls would the
 which knows nothing of pip's driver any more. :func:`own_loader_bound` binds them to pyopencl's.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import importlib.metadata

@@ -1,7 +1,5 @@
 """Launches of kernels: arguments by name, and work in pieces behind frames."""
 
-from __future__ import annotations
-
 import math
 import operator
 import time
@@ -9,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.device.buffers import DeviceBuffer
-from pyvista_vdi.device.declarations import Parameter
-from pyvista_vdi.device.programs import Kernel
-from pyvista_vdi.device.queues import Queues
+from pyvista_vdi.device.memory import DeviceBuffer
+from pyvista_vdi.device.programs import Kernel, Parameter
+from pyvista_vdi.device.queues import Device
 from pyvista_vdi.device.scheduling import Worker
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError
 
@@ -40,18 +37,13 @@ class Launch:
     """A kernel and its arguments, to be launched again and again; made by :meth:`Runtime.bind`.
 
     Arguments keep their values, and buffers are kept, until they are given anew. One thread at a
-    time may use it.
-
-    Attributes
-    ----------
-    divisible : bool
-        Whether launches of its parts, with offsets, do what one launch does: set it to False for a
-        kernel that asks where in the whole its work-group is.
+    time may use it. Set ``divisible`` to False for a kernel that asks where in the whole its
+    work-group is: launches of its parts, with offsets, would not do what one launch does.
     """
 
     divisible = True
 
-    def __init__(self, queues: Queues, kernel: Kernel) -> None:
+    def __init__(self, queues: Device, kernel: Kernel) -> None:
         self._queues, self._kernel = queues, kernel
         self._missing = dict.fromkeys(kernel.parameters)  # in order
         self._buffers: dict[str, DeviceBuffer | None] = {}
@@ -107,24 +99,14 @@ class Launch:
     def __call__(self, size: Size, group: Size | None = None, /, **arguments: Any) -> None:
         """Set the arguments that change, and enqueue the kernel.
 
-        It returns at once; inside :meth:`Runtime.background`, when all is done, in pieces.
+        It returns at once; inside :meth:`Runtime.background`, when all is done, in pieces. ``size``
+        is the work-items in each dimension, of which none are launched if one is 0; ``group`` those
+        of a work-group, which divide them (see :func:`padded`), or else the driver's choice;
+        arguments are as of :meth:`Runtime.bind`.
 
-        Parameters
-        ----------
-        size : int or tuple of int
-            Work-items in each dimension; nothing is launched if one is 0.
-        group : int or tuple of int, optional
-            Those of a work-group, which divide ``size`` (see :func:`padded`); by default the driver
-            chooses.
-        **arguments
-            As of :meth:`Runtime.bind`.
-
-        Raises
-        ------
-        InvalidArgumentError, TypeError
-            If the sizes do not fit each other, or the arguments not the kernel's.
-        DeviceMemoryError, DeviceError
-            If the driver refuses, or a buffer has been released.
+        Raises InvalidArgumentError or TypeError if the sizes do not fit each other or the arguments
+        not the kernel's, DeviceMemoryError or DeviceError if the driver refuses or a buffer has
+        been released.
         """
         # Set what changes
         queues, kernel = self._queues, self._kernel

@@ -1,32 +1,169 @@
-"""Memory of a device: buffers, checked before they are taken."""
+"""Memory of a device: buffers, checked before they are taken, and page-locked host memory."""
 
-from __future__ import annotations
-
+import contextlib
+import math
 import threading
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Iterator
+from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.buffers import (
-    DeviceBuffer,
-    Held,
-    PinnedArrays,
-    bytes_text,
-    shape_of,
-)
-from pyvista_vdi.device.devices import Candidate
-from pyvista_vdi.device.queues import Queues
+from pyvista_vdi.device.devices import Candidate, bytes_text
+from pyvista_vdi.device.queues import Device
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
+
+#: Page-locked host memory that a device may have, and the least worth it, bytes.
+PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
+
+
+class PinnedArrays:
+    """Arrays in page-locked host memory, into which a GPU copies several times as fast.
+
+    Memory of an array that nobody has any more is given out again. It is scarce: what
+    :data:`PINNED_BYTES` has no room for is in ordinary memory. ``allocate`` takes bytes and returns
+    a uint8 array, and what gives its memory back.
+    """
+
+    def __init__(self, allocate: Callable[[int], tuple[NDArray[np.uint8], Callable[[], None]]]):
+        self._allocate = allocate
+        self._free: list[tuple[NDArray[np.uint8], Callable[[], None]]] = []
+        self._taken = 0  # bytes, those that are free included
+        self._lock = threading.Lock()
+
+    def empty(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
+        """Return an uninitialised array, ordinary memory where there is no room."""
+        nbytes = math.prod(shape) * dtype.itemsize
+        with self._lock:
+            places = (k for k, (memory, _) in enumerate(self._free) if memory.nbytes == nbytes)
+            place = next(places, None)
+            if place is not None:
+                block = self._free.pop(place)
+            else:
+                while self._free and self._taken + nbytes > PINNED_BYTES:
+                    memory, release = self._free.pop(0)
+                    self._taken -= memory.nbytes
+                    release()
+                if self._taken + nbytes > PINNED_BYTES:
+                    return np.empty(shape, dtype)
+                try:
+                    block = self._allocate(nbytes)
+                except DeviceMemoryError:
+                    return np.empty(shape, dtype)
+                self._taken += nbytes
+        # Views have this array as their base, so that it lives as long as they do
+        array = np.frombuffer(memoryview(block[0]), dtype)  # type: ignore[arg-type]
+        weakref.finalize(array, self._free.append, block).atexit = False
+        return array.reshape(shape)
+
+
+class Held:
+    """What goes back with a buffer: bytes that are accounted for, and the driver's memory.
+
+    ``readers``: where the memory is a host's array, the queues whose kernels use it.
+    """
+
+    nbytes = 0
+    memory: Any = None
+    readers: set[int] | None = None
+
+
+class DeviceBuffer:
+    """Memory on a device, made by :class:`~pyvista_vdi.device.Runtime`, with a shape and a dtype.
+
+    Released by :meth:`release`, at the end of a ``with`` block, or with its last reference.
+    ``nbytes`` is its size as asked for, ``name`` what it holds, for messages, and ``memory`` the
+    driver's object, None when it has been given back. :meth:`Runtime.write` and
+    :meth:`Runtime.fill` change it if it is ``writable``. Where its memory is a host array's,
+    ``readers`` are the queues whose kernels use it, and ``host`` is the array, if kernels write it
+    (:meth:`Runtime.result`, :meth:`Runtime.target`).
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, ...],
+        dtype: np.dtype[Any],
+        name: str,
+        give_back: Callable[[Held], None],
+        *,
+        writable: bool = True,
+    ) -> None:
+        self.shape = shape
+        self.dtype = dtype
+        self.nbytes = math.prod(shape) * dtype.itemsize
+        self.name = name
+        self.writable = writable
+        self.memory: Any = None
+        self.readers: set[int] | None = None
+        self.host: NDArray[Any] | None = None
+        # Nothing is held yet, so that wherever an interrupt comes, what is held goes back
+        self.held = Held()
+        self._finalizer = weakref.finalize(self, give_back, self.held)
+        self._finalizer.atexit = False  # the driver frees everything at exit
+
+    def release(self) -> None:
+        """Return the memory; a second call does nothing. Enqueued work still finishes."""
+        self.memory = None
+        self._finalizer()
+
+    @property
+    def released(self) -> bool:
+        """Whether the memory has been given back."""
+        return self.memory is None
+
+    def __enter__(self) -> "DeviceBuffer":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.release()
+
+    def __repr__(self) -> str:
+        state = "released" if self.released else bytes_text(self.nbytes)
+        return f"<DeviceBuffer {self.name!r}: {self.dtype} {self.shape}, {state}>"
+
+
+@contextlib.contextmanager
+def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
+    """Keep the buffers that the block hands over, or release them all if it fails.
+
+    An object whose buffers are made one after the other is otherwise kept half made by the error
+    that tells of it, for as long as somebody looks at the error.
+    """
+    with contextlib.ExitStack() as made:
+        yield made.enter_context
+        made.pop_all()
+
+
+def shape_of(nbytes_or_shape: int | tuple[int, ...], dtype: np.dtype[Any]) -> tuple[int, ...]:
+    """Return the shape for an integer number of *bytes*, or the given shape, checked."""
+    if isinstance(nbytes_or_shape, (int, np.integer)):
+        nbytes = int(nbytes_or_shape)
+        if nbytes < 0 or nbytes % dtype.itemsize:
+            raise InvalidArgumentError(
+                f"{nbytes} bytes are no whole number of {dtype} ({dtype.itemsize} bytes each); "
+                "an integer size is in bytes, a shape is a tuple"
+            )
+        return (nbytes // dtype.itemsize,)
+    shape = tuple(map(int, nbytes_or_shape))
+    if min(shape, default=0) < 0:
+        raise InvalidArgumentError(f"a buffer's shape must not be negative: {shape}")
+    return shape
+
 
 #: Bytes of the largest results whose memory on a GPU is kept for the next ones, and how many.
 MOST_POOLED, BLOCKS_HELD = 64 * 2**20, 4
 
 
-class Memory(Queues):
+class Memory(Device):
     """A device with buffers on it."""
 
     def __init__(self, candidate: Candidate, context: Any = None) -> None:
@@ -71,15 +208,10 @@ class Memory(Queues):
     ) -> DeviceBuffer:
         """Return uninitialised memory on the device, checked against its limits before.
 
-        An integer is a number of **bytes**, a tuple a shape in elements; zero is allowed. ``name``
-        is what it is for: messages say it. Release it, use it in a ``with`` block, or drop it.
-
-        Raises
-        ------
-        DeviceMemoryError
-            If it is larger than the device allows per buffer or has left, or the driver fails.
-        InvalidArgumentError
-            If the size is negative or no whole number of elements.
+        An integer is a number of **bytes**, a tuple a shape in elements; zero is allowed, less or
+        no whole number of elements an InvalidArgumentError. ``name`` is what it is for: messages
+        say it. Release it, use it in a ``with`` block, or drop it. DeviceMemoryError if it is
+        larger than the device allows per buffer or has left, or the driver fails.
         """
         dtype, flags = np.dtype(dtype), self.cl.mem_flags
         access = flags.READ_ONLY if read_only else flags.READ_WRITE

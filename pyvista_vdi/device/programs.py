@@ -1,6 +1,9 @@
-"""Programs compiled once per (device, source, options), and kernels that threads may share."""
+"""Kernels as Python knows them, their text with its includes, and programs compiled once.
 
-from __future__ import annotations
+A declaration has a kernel's arguments by name and type. Files of the package are expanded once per
+program, with ``#line`` marks, and compiled once per device, source and options; threads may share
+kernels.
+"""
 
 import contextlib
 import hashlib
@@ -11,17 +14,219 @@ import re
 import sqlite3
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from importlib import import_module
-from pathlib import Path
+from importlib.resources import files
+from pathlib import Path, PurePosixPath
 from typing import Any
 
-from pyvista_vdi.device import sources
-from pyvista_vdi.device.constants import literal
-from pyvista_vdi.device.declarations import Define as Define
-from pyvista_vdi.device.declarations import KernelDeclaration, Parameter
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device.constants import definitions, literal
 from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 from pyvista_vdi.model.user_cache import user_cache
+
+Define = str | int | float | bool | None
+
+#: OpenCL's types of a number, as NumPy has them.
+SCALARS: dict[str, np.dtype[Any]] = {
+    "char": np.dtype(np.int8),
+    "uchar": np.dtype(np.uint8),
+    "short": np.dtype(np.int16),
+    "ushort": np.dtype(np.uint16),
+    "int": np.dtype(np.int32),
+    "uint": np.dtype(np.uint32),
+    "long": np.dtype(np.int64),
+    "ulong": np.dtype(np.uint64),
+    "float": np.dtype(np.float32),
+    "double": np.dtype(np.float64),
+}
+
+
+class Struct:
+    """A structure of numbers and vectors, passed to kernels by value and laid out as in OpenCL C.
+
+    ``fields`` are types by name, in order: ``width="int"``, ``origin="float4"``.
+    """
+
+    def __init__(self, name: str, /, **fields: str) -> None:
+        self.name, self.fields = name, fields
+        formats, offsets, end, alignment = [], [], 0, 1
+        for kind in fields.values():
+            number, count = _numbers(kind, {})
+            assert number is not None, f"{kind} is no type of a number in OpenCL"
+            size = number.itemsize * count  # a vector is aligned to its size
+            offsets.append(-(-end // size) * size)
+            formats.append(number if count == 1 else np.dtype((number, (count,))))
+            end, alignment = offsets[-1] + size, max(alignment, size)
+        self.dtype = np.dtype(
+            {
+                "names": list(fields),
+                "formats": formats,
+                "offsets": offsets,
+                "itemsize": -(-end // alignment) * alignment,
+            }
+        )
+
+    def __call__(self, **values: Any) -> NDArray[np.void]:
+        """Return a value of it, with every field given by name."""
+        if values.keys() != self.fields.keys():
+            wrong = sorted(values.keys() ^ self.fields.keys())
+            raise InvalidArgumentError(
+                f"fields of {self.name} that are missing or unknown: {wrong}"
+            )
+        return np.array(tuple(map(values.__getitem__, self.fields)), self.dtype)
+
+
+class Parameter:
+    """An argument of a compiled kernel: its place and type, and the numbers that it consists of.
+
+    ``number`` is None where it is not known: of a type that the kernel's file defines. ``held``
+    says what buffers a pointer may have: of its numbers, or of parts of them such as two floats for
+    a ulong; None where that is not known. ``scalar`` is NumPy's type of a single number.
+    """
+
+    def __init__(self, index: int, kind: str, number: np.dtype[Any] | None, count: int = 1) -> None:
+        self.index, self.kind, self.number, self.count = index, kind, number, count
+        local, pointer = kind.startswith("local "), kind.endswith("*")
+        single = number is not None and number.names is None and count == 1
+        self.scalar: Any = number.type if number is not None and single and not pointer else None
+        self.held: set[np.dtype[Any]] | None = set()
+        if pointer and not local:
+            whole = 0 if number is None else number.itemsize
+            parts = {n for n in SCALARS.values() if whole % (2 * n.itemsize) == 0}
+            self.held = None if number is None else {number, *parts}
+
+
+class KernelDeclaration:
+    """A kernel function, with the types of its arguments by name and in order.
+
+    ``path`` is a file of ``pyvista_vdi.opencl``, any other one as a Path. An argument is a number
+    (``"int"``), a vector (``"float4"``), a pointer to a buffer (``"float4*"``), to memory of each
+    work-group (``"local ulong*"``), or a structure. A type may be named by a ``-D`` option
+    (``"VOXEL_T*"``). What only programs with an option have ends in ``" if OPTION"`` or ``" if
+    OPTION=value"``, what only those without it have, in ``" if not OPTION"``; there may be several.
+    """
+
+    def __init__(self, path: str | Path, name: str, /, **arguments: str | Struct) -> None:
+        self.path, self.name, self.arguments = path, name, arguments
+
+    def __repr__(self) -> str:
+        return f"<KernelDeclaration {self.name!r} of {self.path}>"
+
+    def parameters(self, defines: Mapping[str, Define]) -> dict[str, Parameter]:
+        """Return the arguments in a program with these ``-D`` options, by name and in order."""
+        found: dict[str, Parameter] = {}
+        for name, declared in self.arguments.items():
+            if isinstance(declared, Struct):
+                found[name] = Parameter(len(found), declared.name, declared.dtype)
+                continue
+            kind, *conditions = declared.split(" if ")
+            if not all(_holds(condition, defines) for condition in conditions):
+                continue
+            element = kind.removeprefix("local ").removesuffix("*")
+            found[name] = Parameter(len(found), kind, *_numbers(element, defines))
+        return found
+
+
+def _holds(condition: str, defines: Mapping[str, Define]) -> bool:
+    """Whether a program has, or has not, an option: ``NAME``, ``NAME=value`` or ``not NAME``."""
+    option, _, value = condition.removeprefix("not ").partition("=")
+    there = option in defines and value in ("", str(defines[option]))
+    return there != condition.startswith("not ")
+
+
+def _numbers(kind: str, defines: Mapping[str, Define]) -> tuple[np.dtype[Any] | None, int]:
+    """Return the numbers that a type consists of, None if not known, and how many."""
+    kind = str(defines.get(kind, kind))
+    name = kind.rstrip("0123456789")
+    number = SCALARS.get(name)
+    return number, int(kind[len(name) :] or 1)
+
+
+_INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
+_CONDITIONAL = re.compile(r"^\s*#\s*(if|endif)")
+
+
+def read_resource(path: str) -> str:
+    """Return the text of a file of the package ``pyvista_vdi.opencl``: ``"lib/rays.cl"``, say.
+
+    FileNotFoundError if there is no such file, or the path leaves the package.
+    """
+    parts = PurePosixPath(path).parts
+    if not parts or ".." in parts or PurePosixPath(path).is_absolute():
+        raise FileNotFoundError(path)
+    resource = files("pyvista_vdi.opencl").joinpath(*parts)
+    if not resource.is_file():
+        raise FileNotFoundError(path)
+    return resource.read_text(encoding="utf-8")
+
+
+def expand(path: str | Path) -> str:
+    """Return a kernel file's text with its includes, and the constants that it may use, in place.
+
+    Each file is expanded where it is first included and left out afterwards, so files need no
+    include guards. An include inside ``#if`` is refused, as a missing file is (KernelBuildError):
+    it would depend on the first place. A string is a path inside ``pyvista_vdi.opencl``; a Path is
+    any file on disk (tests and users' own kernels), whose includes are taken from there.
+    """
+    if isinstance(path, str):
+        return _expand_resource(path)
+    try:
+        return _expand_text(path.name, path.read_text(encoding="utf-8"))
+    except OSError as exc:
+        raise KernelBuildError(f"the kernel file {str(path)!r} cannot be read: {exc}") from exc
+
+
+@cache
+def _expand_resource(path: str) -> str:
+    try:
+        text = read_resource(path)
+    except FileNotFoundError as exc:
+        raise KernelBuildError(f"no kernel file {path!r} in pyvista_vdi.opencl") from exc
+    return _expand_text(path, text)
+
+
+def _expand_text(name: str, text: str) -> str:
+    lines: list[str] = []
+    seen = {name}
+    _append_file(name, text, seen, lines)
+    constants = definitions({file.partition("/")[0] for file in seen})
+    return "\n".join([*constants, *lines]) + "\n"
+
+
+def _append_file(name: str, text: str, seen: set[str], out: list[str]) -> None:
+    out.append(f'#line 1 "{name}"')
+    depth = 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        conditional, found = _CONDITIONAL.match(line), _INCLUDE.match(line)
+        if conditional:
+            depth += 1 if conditional[1] == "if" else -1
+        if found is None:
+            out.append(line)
+            continue
+
+        # Replace the directive by the file's text, or by nothing where it stands already
+        target = str(PurePosixPath(found.group(1)))
+        if depth > 0:
+            raise KernelBuildError(
+                f'{name}:{number}: #include "{target}" stands inside #if; files are included once '
+                "for the whole program, so move the include out of the conditional"
+            )
+        if target not in seen:
+            seen.add(target)
+            try:
+                included = read_resource(target)
+            except FileNotFoundError as exc:
+                raise KernelBuildError(
+                    f'{name}:{number}: #include "{target}": no such file in pyvista_vdi.opencl '
+                    "(paths are relative to that package, not to the including file)"
+                ) from exc
+            _append_file(target, included, seen, out)
+        out.append(f'#line {number + 1} "{name}"')
+
 
 LOG_LINES_SHOWN = 30
 #: Seconds from which a driver that keeps programs itself is taken to be compiling.
@@ -33,18 +238,12 @@ on_compiling: set[Callable[[], object]] = set()
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 _NOT_IN_OPTIONS = re.compile(r"[\s\"'\\;]")
 _logger = logging.getLogger(__name__)
-_numbers = itertools.count(1)
+_program_numbers = itertools.count(1)
 _kernel_lock = threading.RLock()
 
 
 def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
-    """Return ``-D`` options in sorted order; None is a name alone.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a name is no identifier, or a value holds what drivers split options at.
-    """
+    """Return ``-D`` options in sorted order; None is a name alone."""
     options = []
     for name, value in sorted(defines.items()):
         if not _IDENTIFIER.fullmatch(name):
@@ -63,18 +262,8 @@ class Kernel:
     """A kernel function of a compiled program; threads may share it.
 
     OpenCL's kernel objects carry their arguments and are not thread safe, so each launch has one of
-    its own while it is there.
-
-    Attributes
-    ----------
-    path, name : str
-        The file that it comes from, and the function.
-    argument_count : int
-        How many arguments it takes.
-    parameters : dict of str to Parameter
-        These, by name and in order; empty until they are declared.
-    free : list of pyopencl.Kernel
-        The driver's objects that no launch has.
+    its own while it is there: ``free`` are those that no launch has. ``parameters`` are its
+    arguments, by name and in order; empty until they are declared.
     """
 
     def __init__(self, program: Any, path: str, name: str) -> None:
@@ -112,10 +301,7 @@ class Kernel:
 class ProgramCache:
     """Programs of one device, with a context that has it alone.
 
-    Attributes
-    ----------
-    known : dict
-        Kernels of the package's files by path, name and ``-D`` options with their types.
+    ``known`` are kernels of the package's files by path, name and ``-D`` options with their types.
     """
 
     def __init__(self, context: Any, device: Any) -> None:
@@ -132,13 +318,10 @@ class ProgramCache:
     def kernel(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel:
         """Return a kernel, compiled when first asked for, and the same for the same source.
 
-        Raises
-        ------
-        KernelBuildError
-            If the source cannot be assembled or compiled, or has no such function.
+        KernelBuildError if it cannot be assembled or compiled, or has no such function.
         """
         options = (*self._options, *define_options(defines))
-        source = sources.expand(path)
+        source = expand(path)
         program, key = (source, options), (source, name, options)
         # Different programs are compiled side by side. OpenCL has every function thread safe but
         # the one that sets arguments (1.2, A.2); compilers that are not are locked by their drivers
@@ -162,10 +345,7 @@ class ProgramCache:
 def build(context: Any, device: Any, path: str, source: str, options: tuple[str, ...]) -> Any:
     """Compile a source, or take it from the cache; the compiler's remarks go to the log (DEBUG).
 
-    Raises
-    ------
-    KernelBuildError
-        With the compiler's log, the options and the source.
+    KernelBuildError has the compiler's log, the options and the source.
     """
     # Not Program.build: that warns of all that compilers say, and to silence warnings would silence
     # those of other threads; and its cache fails where its folder cannot be written
@@ -208,7 +388,7 @@ def _announced(path: str, delay: float) -> Iterator[None]:
     """Tell that a program is being compiled, if that takes longer than a delay in seconds."""
 
     def announce() -> None:
-        number = next(_numbers)
+        number = next(_program_numbers)
         level = logging.INFO if number == 1 else logging.DEBUG
         _logger.log(level, "compiling kernels, program %d of this process: %s", number, path)
         for tell in tuple(on_compiling):

@@ -1,19 +1,106 @@
-"""Command queues of threads, frames before background work, and device times."""
-
-from __future__ import annotations
+"""A device, the command queues of its threads, frames before background work, and device times."""
 
 import atexit
 import contextlib
+import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.device import Device
-from pyvista_vdi.device.devices import Candidate
-from pyvista_vdi.device.profiling import KernelTime, Profile, profiling_wanted, table
+from pyvista_vdi.device.devices import Candidate, DeviceInfo, bytes_text, opencl
 from pyvista_vdi.device.scheduling import ThisThread, Turns
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError
+
+PROFILE_VARIABLE = "PYVISTA_VDI_PROFILE"
+PENDING_LIMIT = 512  # events kept before finished ones are turned into sums
+
+
+def profiling_wanted() -> bool:
+    """Whether ``PYVISTA_VDI_PROFILE`` asks for profiling; empty, "0", "false", "no", "off": no."""
+    value = os.environ.get(PROFILE_VARIABLE, "").strip().lower()
+    return value not in ("", "0", "false", "no", "off")
+
+
+@dataclass(frozen=True)
+class KernelTime:
+    """Device time of one kernel.
+
+    Attributes
+    ----------
+    name : str
+        Kernel, or ``[write]``, ``[read]``, ``[fill]`` for transfers; ``[map]`` where what was
+        written in place is read.
+    calls : int
+        How often it ran.
+    total_ms, mean_ms : float
+        Milliseconds from start to end on the device, waiting in the queue left out.
+    share : float
+        Part of the total of all rows, 0 to 1.
+    """
+
+    name: str
+    calls: int
+    total_ms: float
+    mean_ms: float
+    share: float
+
+
+class Profile:
+    """Collects events of any thread and sums their device times."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._pending: list[tuple[str, Any]] = []
+        self._sums: dict[str, tuple[int, int]] = {}  # name -> calls, nanoseconds
+
+    def record(self, name: str, event: Any) -> None:
+        """Note an enqueued command's event; its times are read once it has finished."""
+        with self._lock:
+            self._pending.append((name, event))
+            if len(self._pending) >= PENDING_LIMIT:
+                self._drain()
+
+    def _drain(self) -> None:
+        for name, event in self._pending:
+            event.wait()
+            calls, nanoseconds = self._sums.get(name, (0, 0))
+            elapsed = event.profile.end - event.profile.start
+            self._sums[name] = (calls + 1, nanoseconds + elapsed)
+        self._pending.clear()
+
+    def kernel_seconds(self) -> float:
+        """Wait for what is pending; device time of all kernels so far, without transfers."""
+        kernels = [row for row in self.figures() if not row.name.startswith("[")]
+        return sum(row.total_ms for row in kernels) * 1e-3
+
+    def figures(self) -> list[KernelTime]:
+        """Wait for what is pending, and return rows, longest total first."""
+        with self._lock:
+            self._drain()
+            sums = sorted(self._sums.items(), key=lambda item: item[1][1], reverse=True)
+        whole = sum(elapsed for _, (_, elapsed) in sums) or 1
+        return [
+            KernelTime(name, calls, elapsed * 1e-6, elapsed * 1e-6 / calls, elapsed / whole)
+            for name, (calls, elapsed) in sums
+        ]
+
+
+def table(title: str, rows: list[KernelTime]) -> str:
+    """Return the figures as fixed-width text under a title, without a newline at the end."""
+    width = max([len("kernel"), *(len(row.name) for row in rows)])
+    lines = [
+        f"OpenCL profile: {title}",
+        f"{'kernel':<{width}}  {'calls':>7}  {'total ms':>11}  {'mean ms':>10}  {'share':>6}",
+    ]
+    lines += [
+        f"{row.name:<{width}}  {row.calls:>7d}  {row.total_ms:>11.3f}  {row.mean_ms:>10.4f}"
+        f"  {row.share:>6.1%}"
+        for row in rows
+    ]
+    return "\n".join(lines)
 
 
 class _ThisThread(ThisThread):
@@ -23,21 +110,26 @@ class _ThisThread(ThisThread):
     profile: Profile | None = None
 
 
-class Queues(Device, Turns):
-    """A device with a command queue for all threads, and others for those that ask for one.
+class Device(Turns):
+    """A device and a context on it, a command queue for all threads, and others for those that ask.
 
-    Attributes
-    ----------
-    thread : object
-        Beside what :class:`Turns` says of it:
-        ``number`` of the calling thread's queue, and ``profile``, where its times go.
-    profiled : Profile or None
-        Where the times of all others go: with ``PYVISTA_VDI_PROFILE``.
+    ``cl`` is pyopencl. ``thread`` has, beside what :class:`Turns` says, the ``number`` of the
+    calling thread's queue, and ``profile``, where its times go; those of all others go to
+    ``profiled`` (with ``PYVISTA_VDI_PROFILE``).
     """
 
+    _allocated = 0  # bytes that its buffers hold
+
     def __init__(self, candidate: Candidate, context: Any = None) -> None:
-        Device.__init__(self, candidate, context)
-        Turns.__init__(self)
+        super().__init__()
+        self.info: DeviceInfo = candidate.info
+        self.is_cpu = candidate.info.kind == "CPU"
+        self._device = candidate.device
+        self.cl: Any = opencl()
+        try:
+            self._context = context or self.cl.Context([self._device])
+        except self.cl.Error as exc:
+            raise self.failure(exc, "making a context") from exc
         self.thread: _ThisThread = _ThisThread()
         self._queues: dict[int, Any] = {}  # those that exist, numbered as they were made
         self._queues_made = 0
@@ -47,6 +139,41 @@ class Queues(Device, Turns):
             self.profiled = Profile()
             atexit.register(self._print_profile)
         self._new_queue()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} on {self.info.full_name}>"
+
+    def failure(self, error: Any, doing: str) -> DeviceError | DeviceMemoryError:
+        """Return the package's error for one of the driver's, naming what was being done."""
+        codes = self.cl.status_code
+        code = getattr(error, "code", None)  # what pyopencl raises by itself has none
+        if code in (
+            codes.MEM_OBJECT_ALLOCATION_FAILURE,
+            codes.OUT_OF_RESOURCES,
+            codes.OUT_OF_HOST_MEMORY,
+            codes.INVALID_BUFFER_SIZE,
+        ):
+            return DeviceMemoryError(
+                f"{self.info.full_name!r} ran out of memory or resources while {doing} "
+                f"({error}); it has {bytes_text(self.info.global_memory)}, of which this "
+                f"process holds {bytes_text(self._allocated)}: use a smaller volume, window "
+                "size or max_supersegments, or another device"
+            )
+        remedy = "try again, or use another device"
+        if code in (
+            codes.DEVICE_NOT_AVAILABLE,
+            codes.INVALID_COMMAND_QUEUE,
+            codes.INVALID_CONTEXT,
+            codes.INVALID_DEVICE,
+        ):
+            remedy = (
+                "it may be lost (unplugged, or reset by its driver): start the program again, or "
+                "use another device"
+            )
+        return DeviceError(
+            f"{self.info.full_name!r} failed while {doing}: {error}; {remedy} (device=, or the "
+            "environment variable PYVISTA_VDI_DEVICE; pyvista-vdi devices lists them)"
+        )
 
     @property
     def queue(self) -> Any:

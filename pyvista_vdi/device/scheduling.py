@@ -7,8 +7,6 @@ arrives waits for the piece in progress. Where frames follow each other without 
 work still gets a turn after each, as long as a fixed share of a recent frame.
 """
 
-from __future__ import annotations
-
 import contextlib
 import statistics
 import threading
@@ -43,14 +41,8 @@ POLL = 0.02
 class Worker:
     """A thread inside :meth:`Turns.background`.
 
-    Attributes
-    ----------
-    cancelled : callable
-        Says whether the work is no longer wanted.
-    turn_began : float
-        When its turn began, seconds of ``time.perf_counter``.
-    worked : float
-        How long its turns before took, seconds.
+    ``cancelled`` says whether the work is no longer wanted; ``turn_began`` when its turn began, by
+    ``time.perf_counter``, and ``worked`` how long its turns before took, seconds.
     """
 
     def __init__(self, cancelled: Callable[[], bool]) -> None:
@@ -80,11 +72,8 @@ class ThisThread(threading.local):
 class Turns:
     """The order in which frames and background work use one device.
 
-    Attributes
-    ----------
-    thread : object
-        ``worker``, the calling thread as one that works in turns, None for any other; and
-        ``in_frame``, whether it draws a frame.
+    ``thread`` has ``worker``, the calling thread as one that works in turns, None for any other,
+    and ``in_frame``, whether it draws a frame.
     """
 
     def __init__(self) -> None:

@@ -1,15 +1,12 @@
 """Volume to VDI, on a device: rays are marched, what they record is merged, and packed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation.list_arrays import growing_lists, require_room
-from pyvista_vdi.generation.march import March
-from pyvista_vdi.generation.records import Records
+from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.types import Progress
@@ -19,27 +16,16 @@ from pyvista_vdi.volume.rays import GridRays
 
 
 def generate_vdi(request: GenerationRequest) -> VDI:
-    """Make a VDI of a classified volume.
+    """Make a VDI of a classified volume: the view, the arrays, and in its metadata what made it.
 
     Each list's ray is marched once. Neighbouring samples are merged while the medium stays
     homogeneous; what is recorded is then merged where the error is least, or cut by homogeneity,
-    until the budget of supersegments is kept. Lists go on behind what V_O sees, because other
-    views may see it.
+    until the budget of supersegments is kept. Lists go on behind what V_O sees, because other views
+    may see it.
 
-    Returns
-    -------
-    VDI
-        With the view, the arrays, and in its metadata what made it.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If an argument is out of range.
-    Cancelled
-        If the request's ``progress`` returned False.
-    DeviceMemoryError
-        If the device lacks the memory, see :func:`pyvista_vdi.estimate`, or the memory limit is too
-        little even for one brick.
+    Raises InvalidArgumentError if an argument is out of range, Cancelled if the request's
+    ``progress`` returned False, and DeviceMemoryError if the device lacks the memory, see
+    :func:`pyvista_vdi.estimate`, or the memory limit is too little even for one brick.
     """
     volume, options, progress = request.volume, request.options, request.progress
     camera, size = request.camera, request.window_size

@@ -1,7 +1,5 @@
 """The arguments of the kernels of ``opencl/generation/``, by name and type."""
 
-from __future__ import annotations
-
 from pyvista_vdi.device import KernelDeclaration, Struct
 from pyvista_vdi.volume.kernels import CLASSIFIED, MEDIUM, VIEW
 

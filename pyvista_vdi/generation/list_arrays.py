@@ -1,7 +1,5 @@
 """The arrays of a VDI while slices of lists are written into them, one behind the other."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
@@ -16,8 +14,7 @@ from pyvista_vdi.device import (
     aligned_empty,
     kept_together,
 )
-from pyvista_vdi.device.constants import LISTS_PER_ITEM
-from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
 from pyvista_vdi.generation.kernels import LIST_OFFSETS, SUM_LENGTHS
 from pyvista_vdi.model.host_memory import require_host_memory
 
@@ -61,7 +58,7 @@ class GrowingLists(ABC):
         self._sum_lengths = runtime.bind(SUM_LENGTHS, **shared)
         self._place_lists = runtime.bind(LIST_OFFSETS, **shared)
 
-    def __enter__(self) -> GrowingLists:
+    def __enter__(self) -> "GrowingLists":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -74,10 +71,7 @@ class GrowingLists(ABC):
     def follow(self, lengths: DeviceBuffer, n: int) -> dict[str, Any]:
         """Find where the next n lists go, of which there are so many lengths, on the device.
 
-        Returns
-        -------
-        dict
-            Arguments ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
+        Returns the arguments ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
         """
         self.wait()
         items, made, offsets = blocks_to_sum(n) * GROUP, self._first, self._offsets_on_device

@@ -24,9 +24,8 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunk_ranges import ZARR_FILES
 from pyvista_vdi.model.chunked import closed, opened
-from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.levels import required_level
-from pyvista_vdi.model.volume import Volume, chunked_array
+from pyvista_vdi.model.volume import Grid, Volume, chunked_array
 from pyvista_vdi.model.whole_file import as_path
 
 _HDF5 = (".h5", ".hdf5", ".he5")

@@ -30,8 +30,7 @@ from pyvista_vdi.measure.harness import (
     check_angles,
     check_count,
 )
-from pyvista_vdi.measure.report import describe_system
-from pyvista_vdi.measure.results import Results, now
+from pyvista_vdi.measure.results import Results, describe_system, now
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import Comparison, compare_images, over_background
 from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE
@@ -73,24 +72,13 @@ Images = dict[str, Image]
 
 @dataclass(frozen=True)
 class Settings:
-    """What is measured.
+    """What is measured: a classification, by arguments of :func:`pyvista_vdi.generate`, and views.
 
-    Parameters
-    ----------
-    classification : mapping
-        Classification arguments, those of :func:`pyvista_vdi.generate`.
-    window_size, angles : tuple
-        Of the VDI and of all frames, pixels; new views, degrees of ``Azimuth`` from V_O.
-    max_supersegments, precision : int, str
-        Longest list, and form of its supersegments, see :meth:`VDI.with_precision`.
-    sample_distance : float, optional
-        The accuracy step, model units; half the smallest spacing by default.
-    repeats : int
-        Timed frames of each candidate and view; 0 compares pictures and times nothing.
-    vtk, device : optional
-        Whether VTK's mappers take part, and the OpenCL device of ours.
-    name : str
-        What the volume and the transfer function are called in the report.
+    ``window_size`` is that of the VDI and of all frames, ``angles`` are degrees of ``Azimuth`` from
+    V_O. ``sample_distance`` is the accuracy step, model units, half the smallest spacing by
+    default; ``repeats`` are timed frames of each candidate and view, of which 0 compares pictures
+    and times nothing. ``vtk``: whether VTK's mappers take part; ``name``: what the volume and the
+    transfer function are called in the report.
     """
 
     classification: Mapping[str, Any]
@@ -205,23 +193,11 @@ def measure(
 ) -> tuple[Report, VDI, dict[float, Images]]:
     """Render one volume in every way, compare the pictures and time the frames.
 
-    ``progress`` is called with the finished fraction, 0 to 1.
-
-    Returns
-    -------
-    report : Report
-        The figures.
-    vdi : VDI
-        What was generated from V_O.
-    images : dict of float to dict of str to numpy.ndarray
-        By angle and by the keys of :data:`NAMES`: float32 (H, W, 3 or 4) over black.
-
-    Raises
-    ------
-    MissingDependencyError, DeviceError
-        If VTK takes part and cannot be loaded, or draws nothing; or the OpenCL device fails.
-    InvalidArgumentError
-        If the transfer function leaves nothing to see.
+    ``progress`` is called with the finished fraction, 0 to 1. Returns the figures, what was
+    generated from V_O, and the pictures by angle and by the keys of :data:`NAMES`, float32 (H, W, 3
+    or 4) over black. Raises MissingDependencyError or DeviceError if VTK takes part and cannot be
+    loaded, or draws nothing, or the OpenCL device fails; InvalidArgumentError if the transfer
+    function leaves nothing to see.
     """
     looks = Classification.composited(settings.classification, "compare")
     done, begun = Pieces(progress, 1 + 2 * len(settings.angles)), now()
@@ -391,17 +367,7 @@ def table(report: Report) -> str:
 def contact_sheet(report: Report, images: Mapping[float, Images]) -> NDArray[np.uint8]:
     """Return all panels in one picture: a row per angle, a column per renderer.
 
-    Parameters
-    ----------
-    report : Report
-        What :func:`measure` found.
-    images : mapping of float to dict
-        Its pictures, by angle and renderer.
-
-    Returns
-    -------
-    numpy.ndarray
-        uint8 (height, width, 3), top row first; black behind the panels, captions above them.
+    uint8 (height, width, 3), top row first; black behind the panels, captions above them.
     """
     from PIL import Image, ImageDraw, ImageFont
 

@@ -5,13 +5,11 @@ distance) and longer steps, and is held against the own full picture: every pixe
 voxel, by ``render_volume``'s kernel for ours and by the same mapper for VTK's.
 """
 
-from __future__ import annotations
-
+import contextlib
 import os
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import product
@@ -19,10 +17,9 @@ from typing import Any
 
 from pyvista_vdi import examples
 from pyvista_vdi.errors import DataNotFoundError, DeviceMemoryError
-from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import median, take_turns
 from pyvista_vdi.measure.harness import ROOMS, Case, Latest, Progress, check_count, run
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import ABSENT, Results, closing, table
 from pyvista_vdi.measure.vtk_baselines import (
     MAPPERS,
     OffScreenVolume,
@@ -125,7 +122,7 @@ class FrontPlan:
         check_count("repeats", self.repeats)
 
     @classmethod
-    def quick(cls, **more: Any) -> FrontPlan:
+    def quick(cls, **more: Any) -> "FrontPlan":
         """Return that of a short run."""
         return cls(QUICK_VOLUMES, views=QUICK_VIEWS, **more)
 
@@ -228,16 +225,18 @@ class _Everybody:
         looks, size = TRANSFER_FUNCTIONS[look], plan.window_size
         classified = Classification.composited(looks, "a front").transfer_function_of(volume)
         prop = property_from_transfer_function(volume, classified)
-        with ExitStack() as stack:
+        with contextlib.ExitStack() as stack:
 
             def own(draw: str, step: float) -> OurVolume:
                 drawn = OurVolume(volume, looks, size, draw, step * voxel, view, device)
-                return stack.enter_context(closing(drawn))
+                return stack.enter_context(contextlib.closing(drawn))
 
             self._vdi = own("vdi", FULL_STEP)
             self._volumes = {step: own("volume", step) for step in (FULL_STEP, *STEPS)}
             self._theirs = {
-                name: stack.enter_context(closing(VTKBaseline(volume, prop, size, name, voxel)))
+                name: stack.enter_context(
+                    contextlib.closing(VTKBaseline(volume, prop, size, name, voxel))
+                )
                 for name in MAPPERS
             }
             self.opengl = self._theirs["gpu"].opengl
@@ -312,8 +311,8 @@ def summary(found: Results) -> list[str]:
                 rows.append([title, str(len(gained)), _mean(gained), least, full, alone])
         head = [first, "points of VTK's front", "VTK's time / ours, geometric mean", "worst"]
         more = ["of VTK's full picture", "a VDI's alone / VTK's"]
-        lines += [*report.table([*head, *more], rows), ""]
-    return lines[:-1] + report.closing(found.data)
+        lines += [*table([*head, *more], rows), ""]
+    return lines[:-1] + closing(found.data)
 
 
 def left_out(found: Results) -> Iterator[str]:
@@ -325,4 +324,4 @@ def left_out(found: Results) -> Iterator[str]:
 
 
 def _mean(ratios: Sequence[float]) -> str:
-    return f"{statistics.geometric_mean(ratios):.2f}" if ratios else report.ABSENT
+    return f"{statistics.geometric_mean(ratios):.2f}" if ratios else ABSENT

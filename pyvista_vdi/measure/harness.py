@@ -1,7 +1,5 @@
 """What every measurement shares: cases, who draws them, and the run over them."""
 
-from __future__ import annotations
-
 import math
 import statistics
 import tempfile
@@ -20,8 +18,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, VDIError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.measure.clock import Step, Times, take_turns
-from pyvista_vdi.measure.report import across
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, across
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.host_memory import require_free_memory
@@ -180,7 +177,7 @@ class Latest(Generic[_Made]):
         self._found.clear()
         self._key = self._error = None
 
-    def __enter__(self) -> Latest[_Made]:
+    def __enter__(self) -> "Latest[_Made]":
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -465,7 +462,7 @@ class Bench:
         self.vtk.clear()
         self._media.clear()
 
-    def __enter__(self) -> Bench:
+    def __enter__(self) -> "Bench":
         return self
 
     def __exit__(self, *exception: object) -> None:

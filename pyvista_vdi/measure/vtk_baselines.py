@@ -1,7 +1,5 @@
 """VTK's own volume mappers, off-screen: the outside opinion that our pictures are compared with."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Mapping

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_number, as_whole
-from pyvista_vdi.model.grid import Geometry
+from pyvista_vdi.model.volume import Geometry
 
 #: Radius by default, as a share of the bounds' diagonal.
 DEFAULT_RADIUS = 0.05
@@ -198,15 +198,11 @@ class OcclusionGrid:
 
 
 def spread_directions(n: int) -> NDArray[np.float64]:
-    """Return n unit vectors spread evenly over all directions, float64 (n, 3).
+    """Return n unit vectors spread evenly over all directions, float64 (n, 3); always the same.
 
     A spherical Fibonacci lattice: bands of equal area, from one to the next turned by the golden
-    angle [1]_. The same at every call.
-
-    References
-    ----------
-    .. [1] R. Swinbank, R. J. Purser, "Fibonacci grids: A novel approach to global modelling",
-       Quarterly Journal of the Royal Meteorological Society 132(619), 2006.
+    angle (R. Swinbank, R. J. Purser, "Fibonacci grids", Quarterly Journal of the Royal
+    Meteorological Society 132(619), 2006).
     """
     i = np.arange(n)
     z = 1 - (2 * i + 1) / n

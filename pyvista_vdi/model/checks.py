@@ -4,8 +4,6 @@ Range checks that are written so that NaN fails them then refuse it, in the word
 asked for it.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

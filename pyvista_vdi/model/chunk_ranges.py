@@ -5,8 +5,6 @@ the user's cache folder does. Ranges of a store that has changed since are not u
 is open.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io
@@ -30,7 +28,7 @@ Ranges = tuple[NDArray[np.float64], NDArray[np.float64]]
 ZARR_FILES = ("zarr.json", ".zgroup", ".zarray", ".zattrs")
 
 
-def keeper_of(array: Any, index: Sequence[int | slice] | None = None) -> RangeFile | None:
+def keeper_of(array: Any, index: Sequence[int | slice] | None = None) -> "RangeFile | None":
     """Return what keeps the ranges of an array's chunks, if it is in a file or a folder here.
 
     ``array``: others have no place. ``index``: what is taken of it: its time and its channel.

@@ -3,8 +3,6 @@
 Whoever gives such an array has its library. Nothing is read until a part is asked for.
 """
 
-from __future__ import annotations
-
 import importlib
 import itertools
 import math

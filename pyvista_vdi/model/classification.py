@@ -1,7 +1,5 @@
 """The classification arguments: ``Plotter.add_volume``'s, or what may stand in their place."""
 
-from __future__ import annotations
-
 import difflib
 import inspect
 import json
@@ -126,11 +124,8 @@ class Look(Described):
 class Classification(Look, ArrayChoice):
     """The classification arguments of one call, checked.
 
-    Raises
-    ------
-    InvalidArgumentError
-        If ``transfer_function`` or ``volume_property`` is mixed with arguments that it replaces,
-        or a value cannot be used.
+    InvalidArgumentError if ``transfer_function`` or ``volume_property`` is mixed with arguments
+    that it replaces, or a value cannot be used.
     """
 
     volume_property: VTKObject | None = option(
@@ -157,17 +152,12 @@ class Classification(Look, ArrayChoice):
     @classmethod
     def composited(
         cls, given: Mapping[str, Any], function: str, others: Sequence[str] = ()
-    ) -> Classification:
+    ) -> "Classification":
         """Return the classification of a VDI by arguments that a function was given.
 
-        ``others`` are the function's other keyword arguments, for suggestions.
-
-        Raises
-        ------
-        TypeError
-            If a name is unknown; the message suggests the nearest one.
-        InvalidArgumentError, UnsupportedError
-            If a value cannot be used.
+        ``others`` are the function's other keyword arguments: a TypeError for an unknown name
+        suggests the nearest one. InvalidArgumentError or UnsupportedError if a value cannot be
+        used.
         """
         refuse_unknown(given, function, (*declared(Classification), *others))
         made = cls(**given)
@@ -179,19 +169,16 @@ class Classification(Look, ArrayChoice):
         """Whether a transfer function or a property stands in place of ``add_volume``'s."""
         return any(getattr(self, name) is not None for name in IN_PLACE)
 
-    def changed(self, changes: Mapping[str, Any]) -> Classification:
+    def changed(self, changes: Mapping[str, Any]) -> "Classification":
         """Return these arguments with some of them changed."""
         return replace(self, **changes)
 
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
         """Return the transfer function that the arguments describe for a volume.
 
-        Raises
-        ------
-        InvalidArgumentError
-            If a colour map, an opacity or another value is not one that ``add_volume`` takes.
-        MissingDependencyError
-            If PyVista is needed to build it and not installed.
+        InvalidArgumentError if a colour map, an opacity or another value is not one that
+        ``add_volume`` takes, MissingDependencyError if PyVista is needed to build it and not
+        installed.
         """
         if self.transfer_function is not None:
             return _checked_transfer_function(self.transfer_function)

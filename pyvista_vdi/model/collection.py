@@ -1,7 +1,5 @@
 """Several VDIs of one scene, shown as one: what extensions derive series and sets from."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any
@@ -14,15 +12,10 @@ RATE = 24.0
 
 
 class VDICollection(Sequence[VDI]):
-    """Several VDIs of one scene: of several times, or of several views.
+    """Several VDIs of one scene: of several ``times``, ascending, or of several views.
 
     One of several views has ``parts(camera)``, which returns the VDIs that a view's picture is
     blended of, with weights, the nearest first.
-
-    Attributes
-    ----------
-    times : tuple of float or None
-        Of the VDIs, ascending, where they are steps in time.
     """
 
     times: tuple[float, ...] | None = None

@@ -6,8 +6,6 @@ two depths; what it absorbs is its optical depth tau, never its opacity, which r
 Colours are straight RGB in segments and premultiplied in images.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

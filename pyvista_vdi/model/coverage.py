@@ -1,7 +1,5 @@
 """What a generating view covers: of the screen's pixel grid, and of another view's rays."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

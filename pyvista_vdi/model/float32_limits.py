@@ -1,7 +1,5 @@
 """What float32 holds, and from where on another arithmetic takes over (docs/numerics.md)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import DTypeLike
 
@@ -68,20 +66,14 @@ def summation(media: float) -> int:
     return 0 if media <= MANY_MEDIA else 1 if media <= VERY_MANY_MEDIA else 2
 
 
-def compensation(media: float) -> dict[str, int]:
-    """Return the ``-D COMPENSATED`` of kernels whose rays may meet so many media, if any."""
-    kind = summation(media)
-    return {"COMPENSATED": kind} if kind else {}
-
-
-def entries(reach: float, points: int) -> dict[str, str | int | None]:
-    """Return the ``-D DOUBLE_FLOAT_RAYS`` of kernels that march, if they need it.
+def enters_far_away(reach: float, points: int) -> bool:
+    """Whether kernels that march need positions of two floats: ``-D DOUBLE_FLOAT_RAYS``.
 
     ``reach`` is the largest grid coordinate of a ray between the depths of the volume's bounds, and
     ``points`` the number of grid points along its longest axis.
     """
     farthest = min(max(NEAR_ENTRY, ENTRY_PER_POINT * points), FAR_ENTRY)
-    return {"DOUBLE_FLOAT_RAYS": 1} if reach > farthest else {}
+    return reach > farthest
 
 
 def lists_are_far(depth: float, thickness: float, extent: float) -> bool:

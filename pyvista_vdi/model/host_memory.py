@@ -1,7 +1,5 @@
 """The host's memory: how much there is, so that what cannot fit is refused; aligned arrays."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import mmap
@@ -24,21 +22,10 @@ _LARGE = 2**22
 def aligned_empty(
     shape: int | tuple[int, ...], dtype: DTypeLike, *, lasting: bool = False
 ) -> NDArray[Any]:
-    """Uninitialised C-contiguous array that a CPU device can use without a copy.
+    """Return an uninitialised C-contiguous array that a CPU device can use without a copy.
 
-    Parameters
-    ----------
-    shape : int or tuple of int
-        Shape.
-    dtype : dtype_like
-        Element type.
-    lasting : bool, default: False
-        Whether it is made seldom and kept for long, so that memory of its own pays.
-
-    Returns
-    -------
-    numpy.ndarray
-        Its data begin at a multiple of 4096 bytes.
+    Its data begin at a multiple of 4096 bytes. ``lasting``: it is made seldom and kept for long, so
+    that memory of its own pays.
     """
     dtype = np.dtype(dtype)
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
@@ -70,20 +57,9 @@ def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
 class GrowingArray:
     """An array whose number of elements is known when the last one is written.
 
-    Systems take memory as it is written, so room for the most that there may be costs nothing.
-    Only where that is refused do its elements move when it grows.
-
-    Parameters
-    ----------
-    item : tuple of int
-        Shape of an element.
-    dtype : dtype_like
-        Element type.
-
-    Attributes
-    ----------
-    room : int
-        Elements that there is room for.
+    Systems take memory as it is written, so room for the most that there may be costs nothing. Only
+    where that is refused do its elements, of the shape ``item``, move when it grows. ``room``:
+    elements that there is room for.
     """
 
     def __init__(self, item: tuple[int, ...] = (), dtype: DTypeLike = np.float32) -> None:
@@ -95,13 +71,7 @@ class GrowingArray:
         self.room = 0
 
     def reserve(self, n: int, most: int) -> None:
-        """Make room for at least n elements, and if it can be had for the most there may be.
-
-        Raises
-        ------
-        MemoryError
-            If not even that many can be had.
-        """
+        """Make room for at least n elements (MemoryError), for the most if it can be had."""
         if n <= self.room:
             return
         for room in (most, 2 * n):
@@ -145,13 +115,7 @@ def free_memory() -> int:
 
 
 def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
-    """Refuse what the host cannot hold beside what is running; parameters as below.
-
-    Raises
-    ------
-    DeviceMemoryError
-        If the host has less memory in all, or less of it free.
-    """
+    """Refuse (DeviceMemoryError) what the host cannot hold beside what is running; see below."""
     require_host_memory(nbytes, what, remedy)
     free = free_memory()
     if nbytes > free:
@@ -162,21 +126,9 @@ def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
 
 
 def require_host_memory(nbytes: int, what: str, remedy: str) -> None:
-    """Refuse what the host cannot hold.
+    """Refuse so many bytes (DeviceMemoryError) where the host has less memory in all.
 
-    Parameters
-    ----------
-    nbytes : int
-        Bytes that would be taken.
-    what : str
-        What needs them, and how large it is.
-    remedy : str
-        What the caller can do.
-
-    Raises
-    ------
-    DeviceMemoryError
-        If the host has less memory in all.
+    ``what`` needs them, and how large it is; ``remedy`` is what the caller can do.
     """
     available = physical_memory()
     if nbytes > available:

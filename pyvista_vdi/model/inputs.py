@@ -1,7 +1,5 @@
 """What a user calls a volume or a VDI, VTK's objects and PyVista's among it, as ours."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from typing import Any
@@ -20,22 +18,12 @@ from pyvista_vdi.model.volume import Volume
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
-    """Return what a user calls a volume as a :class:`Volume`.
+    """Return what a user calls a volume as a :class:`Volume`; VTK is imported for its own only.
 
-    Parameters
-    ----------
-    volume : Volume or vtkImageData or pyvista.ImageData or path-like
-        A file as :func:`read_volume` reads it; or what an extension makes one of. VTK is imported
-        only for its own objects.
-    scalars : str or array_like, optional
-        Name of the array, or values per point; the active array by default.
-    preference : {"point", "cell"}
-        Which array where both kinds have one of that name.
-
-    Raises
-    ------
-    InvalidVolumeError
-        If it is none of these, or has no such scalars.
+    It is a Volume, a file as :func:`read_volume` reads it, an image of VTK's or PyVista's, or what
+    an extension makes one of. ``scalars`` are the name of the array, the active one by default, or
+    values per point; ``preference`` says which array is meant where points and cells have one of
+    that name. InvalidVolumeError if it is none of these, or has no such scalars.
     """
     if isinstance(volume, Volume):
         return _with_scalars(volume, scalars)
@@ -95,13 +83,7 @@ def _with_scalars(volume: Volume, scalars: Any) -> Volume:
 
 
 def as_vdi(vdi: Any) -> VDI:
-    """Return a VDI, or its VTK form, as a :class:`VDI`.
-
-    Raises
-    ------
-    InvalidVDIError
-        If it is neither.
-    """
+    """Return a VDI, or its VTK form, as a :class:`VDI`; InvalidVDIError if it is neither."""
     if isinstance(vdi, VDI):
         return vdi
     if hasattr(vdi, "GetClassName"):

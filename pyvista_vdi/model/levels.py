@@ -1,14 +1,12 @@
 """Which level of a multi-scale volume a view requires."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.grid import Geometry
+from pyvista_vdi.model.volume import Geometry
 
 #: How far beyond a plane a corner may lie by rounding; the volume is of size 1, planes of norm 1.
 _ROUNDING = 1e-9

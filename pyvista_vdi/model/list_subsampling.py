@@ -1,7 +1,5 @@
 """List subsampling: a VDI of every k-th list, for pictures of few pixels from the side."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -163,12 +163,8 @@ def compare_images(
 class ListEdges:
     """How much the error of a picture jumps from list to list: what :func:`list_edges` found.
 
-    Parameters
-    ----------
-    across : float
-        Mean absolute step of the error's luminance between neighbouring pixels of two lists.
-    within : float
-        The same between neighbouring pixels of one list; NaN where no two share a list.
+    ``across`` is the mean absolute step of the error's luminance between neighbouring pixels of two
+    lists, ``within`` that of neighbours in one list; NaN where no two share a list.
     """
 
     across: float
@@ -250,19 +246,11 @@ def list_places(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return where the pixels of a picture from the generating view lie among its lists.
 
-    Parameters
-    ----------
-    camera : Camera
-        The generating view.
-    window_size, lists : (int, int)
-        Pixels of the picture, and lists of the VDI, along each edge.
-
-    Returns
-    -------
-    columns, rows : numpy.ndarray
-        float64 (W,) and (H,): a list's width or height is 1, 0 is the left or the upper end of the
-        first, so that ``floor`` numbers the lists. The picture may reach a little beyond the first
-        and the last: the window of the lists may not have its aspect to the last digit.
+    ``window_size`` and ``lists`` are pixels of the picture, and lists of the VDI, along each edge.
+    Returns columns and rows, float64 (W,) and (H,): a list's width or height is 1, 0 is the left or
+    the upper end of the first, so that ``floor`` numbers the lists. The picture may reach a little
+    beyond the first and the last: the window of the lists may not have its aspect to the last
+    digit.
     """
     size, count = check_window_size(window_size), check_window_size(lists)
     seen, held = camera.half_extent(size), camera.half_extent(count)

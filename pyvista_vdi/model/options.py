@@ -6,8 +6,6 @@ names. The public functions write the same names and defaults out, which ``tests
 compares; the command line and ParaView's properties are made of :func:`declared`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -53,25 +51,13 @@ _Record = TypeVar("_Record", bound="Options")
 
 @dataclass(frozen=True)
 class Option:
-    """An option, as it is declared.
+    """An option, as it is declared: an argument's ``name``, its ``default``, ``what`` it means.
 
-    Attributes
-    ----------
-    name : str
-        Of the argument.
-    default : object
-        What it is where it is not given.
-    what : str
-        What it means, in a sentence that begins small and has no full stop.
-    check : callable, optional
-        Returns a value as it is kept, or raises InvalidArgumentError. Without one a value is one
-        of the choices, a truth value where the default is one, and else whatever is given.
-    choices : tuple of str
-        The texts that are taken, where these are all.
-    aliases : tuple of str
-        Other names by which users may call it.
-    standard : object
-        The default as it is kept.
+    ``what`` is a sentence that begins small and has no full stop. ``check`` returns a value as it
+    is kept, or raises InvalidArgumentError; without one a value is one of the choices, a truth
+    value where the default is one, and else whatever is given. ``choices`` are the texts that are
+    taken, where these are all; ``aliases`` other names by which users may call it; ``standard`` is
+    the default as it is kept.
     """
 
     name: str
@@ -82,7 +68,7 @@ class Option:
     aliases: tuple[str, ...] = ()
     standard: Any = None
 
-    def named(self, name: str) -> Option:
+    def named(self, name: str) -> "Option":
         """Return it with its name, and with a check that follows from choices and default."""
         check = self.check
         if check is None and self.choices:
@@ -106,7 +92,7 @@ def option(
     return field(default=default, metadata={"option": told})
 
 
-def declared(*records: type[Options]) -> dict[str, Option]:
+def declared(*records: "type[Options]") -> dict[str, Option]:
     """Return the options that some records declare, by their names."""
     return {name: told for record in records for name, told in record.declared.items()}
 
@@ -132,13 +118,7 @@ class Options:
 
     @classmethod
     def of(cls: type[_Record], options: _Record | None, changes: Mapping[str, Any]) -> _Record:
-        """Return options with some of them changed; the defaults with changes, if there are none.
-
-        Raises
-        ------
-        TypeError
-            If one of the changes is no option.
-        """
+        """Return options with some of them changed, or the defaults; TypeError if one is none."""
         if options is None:
             return cls(**changes)
         if not isinstance(options, cls):
@@ -428,6 +408,6 @@ class GenerationRequest:
         object.__setattr__(self, "camera", Camera.from_any(self.camera))
         object.__setattr__(self, "window_size", check_window_size(self.window_size))
 
-    def replace(self, **changes: Any) -> GenerationRequest:
+    def replace(self, **changes: Any) -> "GenerationRequest":
         """Return the same request but for some of its fields."""
         return replace(self, **changes)

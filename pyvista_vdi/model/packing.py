@@ -3,8 +3,6 @@
 ``docs/conventions.md`` ("Packed supersegments") has the bits and what each form loses.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

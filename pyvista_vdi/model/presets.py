@@ -4,8 +4,6 @@ The control points are this project's own. CT's stand in Hounsfield units, so a 
 calibrated, as DICOM files are; MRI has no unit, and its points are shares of the values' range.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple

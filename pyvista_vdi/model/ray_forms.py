@@ -6,8 +6,6 @@ depth of the ray's camera less a reference depth. The six numbers of each such f
 here in float64, so that an eye or an origin far away costs the kernels' float32 nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
@@ -54,14 +52,8 @@ class PixelRays:
 
     ``P(t) = pixel @ origin + t * (pixel @ direction)`` with ``pixel = (1, a, b)``, a and b the
     offsets of the pixel's centre from the window's, in pixels, and t view depth less
-    ``reference_depth``.
-
-    Attributes
-    ----------
-    origin, direction : numpy.ndarray
-        float64 (3, 3), rows for 1, a and b; model units.
-    reference_depth : float
-        View depth of t = 0, world units.
+    ``reference_depth``, world units. ``origin`` and ``direction``: float64 (3, 3), rows for 1, a
+    and b; model units.
     """
 
     origin: Floats
@@ -192,30 +184,14 @@ def user_planes(camera: Camera, rays: PixelRays, planes: Sequence[Sequence[float
 class CroppedRays:
     """How a kernel crops: by what it clips to, and what is left.
 
-    Attributes
-    ----------
-    planes : list of numpy.ndarray
-        Forms to clip to: a box, or nothing at all.
-    forms : list of numpy.ndarray
-        Six that are positive beyond the low and the high plane of each axis, for
-        ``opencl/lib/cropping.cl``; empty where clipping is enough.
-    regions : int
-        The flags that belong to them.
+    ``planes`` are forms to clip to: a box, or nothing at all. Six ``forms`` are positive beyond the
+    low and the high plane of each axis, for ``opencl/lib/cropping.cl``, none where clipping is
+    enough; ``regions`` are the flags that belong to them.
     """
 
     planes: list[Floats]
     forms: list[Floats]
     regions: int
-
-    @property
-    def defines(self) -> dict[str, str | int | None]:
-        """``-D`` names: none where clipping is enough."""
-        return {"CROPPED": 1} if self.forms else {}
-
-    @property
-    def arguments(self) -> tuple[np.uint32, ...]:
-        """The kernel's arguments that come with the define."""
-        return (np.uint32(self.regions),) if self.forms else ()
 
 
 def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float]) -> CroppedRays:

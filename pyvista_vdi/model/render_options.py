@@ -4,10 +4,10 @@ One record goes from the public functions, from VTK's mapper and from the measur
 kernels. It is checked once, where it is made.
 """
 
-from __future__ import annotations
-
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,10 +31,7 @@ Planes: TypeAlias = tuple[tuple[float, ...], ...]
 def checked_planes(planes: Any) -> Planes:
     """Return clipping planes as tuples of six floats; none for ``None``.
 
-    Raises
-    ------
-    InvalidArgumentError
-        If the shape is another, a value is not finite or a normal is zero.
+    InvalidArgumentError if the shape is another, a value is not finite or a normal is zero.
     """
     if planes is None:
         return ()
@@ -81,30 +78,8 @@ def checked_transmittance_cutoff(cutoff: Any) -> float:
 class RenderOptions(Options):
     """How a VDI, or a volume, is drawn; the public functions' arguments of these names.
 
-    Options that compare equal give the same picture of the same view.
-
-    Parameters
-    ----------
-    clipping_planes : array_like of float, shape (k, 6), optional
-        Origin and normal of each plane, world coordinates; the normal's side is kept. Held as
-        tuples.
-    cropping : Cropping or what makes one, optional
-        Which regions of the model frame are drawn: see :meth:`pyvista_vdi.Cropping.from_any`.
-    opacity_multiplier : float
-        Factor of the extinction, 0 or above.
-    skip_empty : bool
-        Pass by what is empty, where that gains time. The picture is the same to the last bit.
-    preview_samples : int, optional
-        Look a VDI up at so many points of each ray instead of intersecting its supersegments
-        (paper section 5): an approximation. Fewer pixels are the better one.
-    transmittance_cutoff : float
-        A ray ends where less than this is left, 0 to below 1. It bounds what any channel of the
-        image can lose.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If one of them cannot be used.
+    Options that compare equal give the same picture of the same view. Clipping planes are held as
+    tuples; the side of each to which its normal points is kept.
     """
 
     clipping_planes: Any = option(
@@ -128,37 +103,20 @@ class RenderOptions(Options):
         ),
     )
 
-    def replace(self, **changes: Any) -> RenderOptions:
+    def replace(self, **changes: Any) -> "RenderOptions":
         """Return the same options but for some of them."""
         return replace(self, **changes)
 
 
 @dataclass(frozen=True, eq=False)
 class FrameRequest:
-    """A frame that is asked for: the view, how it looks, and where its picture goes.
+    """A frame that is asked for: the view V_N, how it looks, and where its picture goes.
 
-    Parameters
-    ----------
-    camera : Camera or vtkCamera or pyvista.Camera
-        The new view V_N. Its ``model_transform`` says where the model frame is now.
-    size : (int, int)
-        Width and height of the picture in pixels.
-    options : RenderOptions
-        How it is to look.
-    opaque_depth : array_like of float, shape (height, width), optional
-        View depth at which each ray ends, world units, top row first; inf where nothing is opaque.
-        Checked where rays are made of it.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    out : numpy.ndarray, optional
-        Array for the picture, float32 (height, width, 4), C-contiguous. A CPU device draws into it
-        without a copy if it begins at a multiple of 4096 bytes
-        (:func:`pyvista_vdi.device.aligned_empty`).
-
-    Raises
-    ------
-    InvalidCameraError, InvalidArgumentError
-        If the camera, the size or ``out`` cannot be used.
+    The camera's ``model_transform`` says where the model frame is now. ``opaque_depth`` is the view
+    depth at which each ray ends, world units, (height, width), top row first, inf where nothing is
+    opaque; it is checked where rays are made of it. ``out`` is an array for the picture, float32
+    (height, width, 4), C-contiguous: a CPU device draws into it without a copy if it begins at a
+    multiple of 4096 bytes (:func:`pyvista_vdi.device.aligned_empty`).
     """
 
     camera: Camera
@@ -178,6 +136,71 @@ class FrameRequest:
                 f"out must be float32 of the image's shape {shape}; got {out.dtype}, {out.shape}"
             )
 
-    def replace(self, **changes: Any) -> FrameRequest:
+    def replace(self, **changes: Any) -> "FrameRequest":
         """Return the same request but for some of its fields."""
         return replace(self, **changes)
+
+
+#: When a view gets a VDI of its own; a function gets the actor's status.
+Policy: TypeAlias = Literal["auto", "never"] | Callable[[Any], object]
+
+
+def checked_rate(name: str, value: Any) -> float:
+    """Return a rate in frames per second; 0 or above, finite."""
+    rate = as_float(value)
+    if isinstance(value, bool) or not 0 <= rate < math.inf:
+        raise InvalidArgumentError(
+            f"{name} must be a number of frames per second, 0 or above; got {value!r}"
+        )
+    return rate
+
+
+def checked_policy(policy: Any) -> Policy:
+    """Return ``"auto"``, ``"never"`` or a callable; refuse anything else."""
+    if policy in ("auto", "never") or callable(policy):
+        return policy  # type: ignore[no-any-return]
+    raise InvalidArgumentError(
+        "regenerate must be 'auto', 'never' or a callable that takes a VDIStatus and says whether "
+        f"to regenerate; got {policy!r}"
+    )
+
+
+def checked_bound(ssim: Any) -> float:
+    """Return an SSIM between 0 and 1."""
+    bound = as_float(ssim)
+    if isinstance(ssim, bool) or not 0 <= bound <= 1:
+        raise InvalidArgumentError(
+            f"regenerate_below must be an SSIM between 0 and 1; got {ssim!r}"
+        )
+    return bound
+
+
+def checked_draw(draw: Any) -> Literal["auto", "vdi", "volume"]:
+    """Return what is drawn, ``"auto"``, ``"vdi"`` or ``"volume"``; refuse anything else."""
+    if draw in ("auto", "vdi", "volume"):
+        return draw  # type: ignore[no-any-return]
+    raise InvalidArgumentError(f"draw must be 'auto', 'vdi' or 'volume'; got {draw!r}")
+
+
+@record
+@dataclass(frozen=True)
+class DrawingOptions(Options):
+    """How frames are drawn, with the names and defaults of :meth:`AddVDI.__call__`."""
+
+    target_fps: float | None = option(
+        30.0,
+        "frames per second to be kept while the view moves",
+        lambda rate: None if rate is None else checked_rate("target_fps", rate),
+    )
+    adjust_multi_samples: bool = option(
+        True, "go without multisampling while the view moves and frames would be late"
+    )
+    regenerate: Policy = option("auto", "when a view gets a VDI of its own", checked_policy)
+    regenerate_below: float | None = option(
+        None,
+        "estimated SSIM, 0 to 1, below which a VDI does not do for a view",
+        lambda ssim: None if ssim is None else checked_bound(ssim),
+    )
+    draw: Literal["auto", "vdi", "volume"] = option(
+        "auto", "what is raycast where the volume is at hand", checked_draw
+    )

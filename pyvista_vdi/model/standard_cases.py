@@ -4,8 +4,6 @@ They are those of the design's section 7. Everything that measures (``pyvista-vd
 tests, benchmarks) takes them from here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from types import MappingProxyType
@@ -52,34 +50,14 @@ def filling_camera(
     elevation: float = ELEVATION,
     view_angle: float = VIEW_ANGLE,
 ) -> Camera:
-    """Return the view that a box just fills.
+    """Return the perspective view that a box just fills; z is up, world units and degrees.
 
-    The eye looks at the centre of the bounds; z is up, and at azimuth 0 the eye is on the -y
-    side. The distance is the smallest at which all eight corners lie inside the viewport.
-
-    Parameters
-    ----------
-    bounds : array_like of float, shape (6,)
-        x0, x1, y0, y1, z0, z1; world units.
-    window_size : (int, int)
-        Width and height in pixels.
-    azimuth : float
-        Angle about the z axis, degrees, counter-clockwise seen from above (VTK's ``Azimuth``).
-    elevation : float
-        Angle above the horizontal plane, degrees, between -90 and 90, both excluded.
-    view_angle : float
-        Full vertical opening angle, degrees.
-
-    Returns
-    -------
-    Camera
-        Perspective view with ``view_up`` (0, 0, 1), so that ``camera.azimuth(5)`` is the view
-        that the design calls "5 degrees from V_O".
-
-    Raises
-    ------
-    InvalidArgumentError
-        If the bounds are not finite, enclose nothing, or the elevation looks along the z axis.
+    The eye looks at the centre of ``bounds`` (x0, x1, y0, y1, z0, z1), and is on the -y side at
+    ``azimuth`` 0, which is counter-clockwise seen from above (VTK's ``Azimuth``); ``elevation`` is
+    above the horizontal plane, between -90 and 90, both excluded. The distance is the smallest at
+    which all eight corners lie inside the viewport. ``camera.azimuth(5)`` is the view "5 degrees
+    from V_O". InvalidArgumentError if the bounds are not finite, enclose nothing, or the elevation
+    looks along the z axis.
     """
     width, height = check_window_size(window_size)
     box = np.asarray(bounds, dtype=np.float64)

@@ -4,8 +4,6 @@ Who does not find a chunk of zarr reads zeros, or whatever fills it: so other pr
 that they have the same files. Only metadata and samples are read for it.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import hashlib
@@ -53,7 +51,7 @@ def by_absolute_path(array: Any) -> Any:
     return zarr.open_array(os.path.abspath(found[1]), mode="r")  # noqa: PTH100 - no links
 
 
-def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> StoreIdentity | None:
+def identity_of(array: Any, index: Sequence[int | slice] | None = None) -> "StoreIdentity | None":
     """Return what tells an array's files from others, if it is in files here.
 
     ``array``: others have none. ``index``: what is taken of it: its time and its channel.
@@ -87,10 +85,10 @@ class StoreIdentity:
 
     path: str
     samples: tuple[tuple[str, str | None], ...]
-    chunks: _Chunks | None = None
+    chunks: "_Chunks | None" = None
     absent: frozenset[str] | None = None
 
-    def absolute(self) -> StoreIdentity:
+    def absolute(self) -> "StoreIdentity":
         """Return the same, by an absolute path."""
         return dataclasses.replace(self, path=os.path.abspath(self.path))  # noqa: PTH100 - no links
 
@@ -140,7 +138,7 @@ class _Chunks:
     taken: tuple[int | None, ...]  # the place along time and channel; None along z, y and x
 
     @classmethod
-    def of(cls, metadata: Path, index: Sequence[int | slice] | None) -> _Chunks | None:
+    def of(cls, metadata: Path, index: Sequence[int | slice] | None) -> "_Chunks | None":
         """Read the metadata of an array; ``None`` where its files are called in other ways."""
         said = json.loads(metadata.read_text(encoding="utf-8"))
         if said["zarr_format"] == 2:

@@ -4,8 +4,6 @@ VTK's and PyVista's objects are told by the methods that they have, so that this
 neither.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Union
 

@@ -1,7 +1,5 @@
 """The folder in which this package keeps what it would otherwise make anew in each process."""
 
-from __future__ import annotations
-
 import logging
 import os
 import stat

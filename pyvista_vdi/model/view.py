@@ -1,7 +1,5 @@
 """A view on a screen, and how far two of them are apart."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -19,7 +17,7 @@ class View:
     camera: Camera
     size: tuple[int, int]
 
-    def distance(self, other: View, bounds: tuple[float, ...]) -> float:
+    def distance(self, other: "View", bounds: tuple[float, ...]) -> float:
         """Return by how much the corners of a volume's bounds differ between two pictures.
 
         Largest distance of a corner's places in the two pictures, each from the picture's centre

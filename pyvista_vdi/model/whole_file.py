@@ -1,7 +1,5 @@
 """A file appears whole or not at all: written under a temporary name, then moved into place."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import secrets

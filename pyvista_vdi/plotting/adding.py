@@ -15,8 +15,8 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.drawing_options import DrawingOptions
 from pyvista_vdi.model.options import GenerationOptions, Options, QualityTarget, option, record
+from pyvista_vdi.model.render_options import DrawingOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.model.classification import ArrayChoice, refuse_keywords
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.drawing_options import DrawingOptions, Policy
 from pyvista_vdi.model.options import GenerationOptions, QualityTarget
+from pyvista_vdi.model.render_options import DrawingOptions, Policy
 from pyvista_vdi.model.types import (
     CameraLike,
     ColorMapLike,

@@ -5,8 +5,6 @@ rung gives: a few tiles of one new view are rendered by the volume and by VDIs w
 lists, and the rest is inferred. docs/dial.md says how, and how well that predicts.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -99,13 +97,7 @@ LADDER = (
 
 
 def refuse_settings(target: QualityTarget, options: GenerationOptions) -> None:
-    """Refuse options that are chosen for a target where they do not have their defaults.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If one differs from its default.
-    """
+    """Refuse options that are chosen for a target where they do not have their defaults."""
     fixed = [f"{name}={value!r}" for name, value in options.given.items() if name in _CHOSEN]
     if fixed:
         asked = ", ".join(f"{name}={value!r}" for name, value in target.to_dict().items())
@@ -280,20 +272,12 @@ def chosen(
 class Measurement:
     """What was measured of one scene on one device.
 
-    Attributes
-    ----------
-    rough, sparse, dense : float
-        1 - SSIM of the picture by a VDI of the settings :data:`ROUGH`, :data:`SPARSE` and
-        :data:`DENSE`.
-    least : float
-        The same of what no VDI of this V_O does better: what its window does not cover is
-        missing, and light that has moved with the camera is baked in.
-    counts : numpy.ndarray
-        int64: lists of the rough VDI by their length.
-    frame_seconds : float
-        Of a full frame of the rough VDI.
-    list_edges : mapping
-        Edges along lists of the picture from V_O, by lists per pixel below 1.
+    ``rough``, ``sparse``, ``dense``: 1 - SSIM of the picture by a VDI of the settings
+    :data:`ROUGH`, :data:`SPARSE` and :data:`DENSE`; ``least``: that of what no VDI of this V_O does
+    better, as what its window does not cover is missing, and light that has moved with the camera
+    is baked in. ``counts``: lists of the rough VDI by their length, int64. ``frame_seconds``: of a
+    full frame of the rough VDI. ``list_edges``: of the picture from V_O, by lists per pixel below
+    1.
     """
 
     rough: float

@@ -4,8 +4,6 @@ The controller knows nothing of what a sample is: any unit in proportion to whic
 grows will do, such as the rays of an image with fewer pixels, or the samples along each ray.
 """
 
-from __future__ import annotations
-
 import math
 import statistics
 from dataclasses import dataclass
@@ -86,7 +84,7 @@ class FrameRate:
         """What a sample is expected to cost, seconds; 0 before the first frame."""
         return self.cost().per_sample if self.frames else 0.0
 
-    def choose(self, full: int) -> FrameRate:
+    def choose(self, full: int) -> "FrameRate":
         """Return the same with the samples chosen that the next frame gets."""
         if not self.frames:
             return self
@@ -114,7 +112,7 @@ class FrameRate:
         """Return how many samples the next frame gets: those chosen, or ``full`` if none were."""
         return full if self.choice is None else self.choice
 
-    def record(self, samples: int, work: float, seconds: float) -> FrameRate:
+    def record(self, samples: int, work: float, seconds: float) -> "FrameRate":
         """Return the same after a frame of so many samples, which took so many seconds."""
         least, most = _DURATIONS
         if not (least <= work <= most and least <= seconds <= most):
@@ -133,7 +131,7 @@ class FrameRate:
                 after = replace(after, frames=(before,))
         return replace(after, doubtful=None, frames=(*after.frames, frame)[-_MEMORY:])
 
-    def rest(self) -> FrameRate:
+    def rest(self) -> "FrameRate":
         """Return the same after the end of an interaction."""
         return replace(self, durations=(), doubtful=None, full_excess=1.0, trial=0)
 
@@ -279,51 +277,24 @@ class FrameRateController:
         return self._rate.seconds_per_sample
 
     def choose(self, full: int) -> int:
-        """Return how many samples the next frame gets.
+        """Return how many samples the next frame gets: at least ``floor * full``, at most `full`.
 
-        Parameters
-        ----------
-        full : int
-            Samples of a frame in full quality. It may change from frame to frame, as with the
-            window's size.
-
-        Returns
-        -------
-        int
-            At least ``floor * full`` and at most `full`; `full` while no frame was recorded.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If `full` is not at least 1.
+        `full` are those of a frame in full quality, at least 1 (InvalidArgumentError); it may
+        change from frame to frame, as with the window's size. Returned while no frame was recorded.
         """
         full = _samples("full", full)
         self._rate = self._rate.choose(full)
         return self._rate.chosen(full)
 
     def record(self, samples: int, work_seconds: float, frame_seconds: float) -> None:
-        """Take note of a frame of the interaction.
+        """Take note of a frame of the interaction: its samples, which need not be the ones chosen.
 
-        Parameters
-        ----------
-        samples : int
-            Samples it was drawn with; they need not be the ones chosen.
-        work_seconds : float
-            Time that the samples took.
-        frame_seconds : float
-            Time that the whole frame took: the work, other actors, copies; not the wait for the
-            next event. Taken as no less than the work.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If `samples` is not at least 1.
-
-        Notes
-        -----
+        ``work_seconds`` is what they took, ``frame_seconds`` what the whole frame took: the work,
+        other actors, copies; not the wait for the next event. It is taken as no less than the work.
         A frame whose duration is zero, negative, infinite or NaN is ignored: a clock's fault shall
         not end an interaction. The frame drawn before the first interaction may be recorded as
         well; then that interaction need not begin with a frame in full quality.
+        InvalidArgumentError if `samples` is not at least 1.
         """
         samples = _samples("samples", samples)
         self._rate = self._rate.record(samples, as_float(work_seconds), as_float(frame_seconds))

@@ -1,7 +1,5 @@
 """The short measurement of a scene by which settings are chosen for a quality target."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import threading
@@ -15,15 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import SSIM_WINDOW, ListEdges, list_edges, list_places
 from pyvista_vdi.model.options import GenerationRequest, QualityTarget
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
-from pyvista_vdi.model.types import Progress
+from pyvista_vdi.model.types import ClientLike, Progress
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.dial import (
     DENSE,
@@ -41,6 +40,34 @@ from pyvista_vdi.quality.dial import (
 from pyvista_vdi.quality.tiles import REACH, TileSample, tiles_ssim, window_pixels
 from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
 from pyvista_vdi.raycasting.raycast import render_vdi
+
+
+def generate_anywhere(
+    request: GenerationRequest, target: QualityTarget, client: ClientLike | None = None
+) -> VDI:
+    """Generate a VDI of a volume in memory, or of a chunked one in blocks, here or by workers.
+
+    Errors are those of :func:`pyvista_vdi.generate`.
+    """
+    name = request.volume.name
+    if request.volume.chunked:
+        if target:
+            raise UnsupportedError(
+                "quality, target_ssim, target_fps and max_bytes measure the scene, and "
+                f"{name!r} is chunked: give max_supersegments, or load a coarse level"
+            )
+        return registry.generator("blocks")(request, client)  # type: ignore[no-any-return]
+    if client is not None:
+        raise InvalidArgumentError(
+            f"client is for chunked volumes, and {name!r} is in memory: give a Volume of a "
+            "Dask array (dask.array.from_array), or leave client out"
+        )
+    if not target:
+        return generate_vdi(request)
+    from pyvista_vdi.quality.probe import generate_to_target
+
+    return generate_to_target(request, target)
+
 
 #: Tiles that are measured, and their edge in pixels: docs/decisions/dial.md.
 TILES = 9
@@ -147,7 +174,7 @@ def forget() -> None:
         _measurements.clear()
 
 
-def _measurement(probe: Probe) -> Measurement:
+def _measurement(probe: "Probe") -> Measurement:
     """Return what was measured of a scene before, or measure it."""
     key = probe.key
     with _lock:

@@ -6,8 +6,6 @@ with unequal probabilities), and what they tell scales the guess for the rest of
 docs/regeneration.md says how well that predicts.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -292,19 +290,8 @@ class ViewErrorEstimator:
     def sample(self, vdi: VDI, camera: Camera, window_size: tuple[int, int]) -> TileSample | None:
         """Choose the tiles of a view, by a VDI that shows roughly where the error is.
 
-        Parameters
-        ----------
-        vdi : VDI
-            It may have fewer lists than the VDI that is to be judged.
-        camera : Camera
-            The new view V_N.
-        window_size : (int, int)
-            Width and height of the whole picture in pixels, at least 11 each.
-
-        Returns
-        -------
-        TileSample or None
-            ``None`` where the volume is not in view.
+        It may have fewer lists than the VDI that is to be judged. Returns None where the volume is
+        not in view; both edges of the window have at least 11 pixels.
         """
         request = FrameRequest(camera, window_size, device=self._runtime)
         return self._sample(_PicturePair(self._medium, vdi, request))
@@ -321,7 +308,7 @@ class ViewErrorEstimator:
         frame = FrameRequest(lens, tile_size, shown or RenderOptions())
         return raycast_medium(self._medium, frame, lit_from=lit_from)
 
-    def _sample(self, pair: _PicturePair) -> TileSample | None:
+    def _sample(self, pair: "_PicturePair") -> TileSample | None:
         camera, size = pair.request.camera, pair.request.size
         region = seen_region(camera, size, (pair.vdi.bounds, self._medium.volume.bounds))
         if region is None:

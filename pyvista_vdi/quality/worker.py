@@ -1,7 +1,5 @@
 """A thread that does one job at a time behind the frames: the last that it was given."""
 
-from __future__ import annotations
-
 import atexit
 import threading
 import traceback

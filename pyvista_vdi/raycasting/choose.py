@@ -1,14 +1,11 @@
 """Which kernel draws a scene on a device, with which switches: one record, chosen in one place."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pyvista_vdi.device import KernelDeclaration, Runtime
-from pyvista_vdi.device.constants import COLUMN_ITEMS
-from pyvista_vdi.device.work_order import GROUP, block_items, part_columns
+from pyvista_vdi.device.constants import COLUMN_ITEMS, GROUP, block_items, part_columns
 from pyvista_vdi.model.float32_limits import summation
 from pyvista_vdi.raycasting import kernels
 from pyvista_vdi.raycasting.packets import LANES
@@ -19,20 +16,10 @@ from pyvista_vdi.raycasting.scene import Scene
 class Variant:
     """A kernel that draws a scene, and how it is launched.
 
-    Attributes
-    ----------
-    kernel : KernelDeclaration
-        A file of ``opencl/`` and the kernel in it.
-    switches : mapping
-        ``-D`` names and their values, of which each program has eight at most.
-    items, group : int
-        Work-items, and those of a group; of segments, 0 and those of a group.
-    arguments : mapping
-        Those of the kernel's own, beside what all kernels take that draw a frame.
-    rays : int
-        Rays that a work-item follows.
-    whole : bool
-        Whether it writes every pixel of the window, those beside :attr:`Scene.part`, too.
+    ``switches`` are its ``-D`` options, eight at most. ``items`` are its work-items, each of which
+    follows ``rays`` rays, and ``group`` those of a group; of segments, 0 and those of a group.
+    ``arguments`` are the kernel's own, beside what all kernels take that draw a frame. ``whole``:
+    it writes every pixel of the window, those beside :attr:`Scene.part`, too.
     """
 
     kernel: KernelDeclaration

@@ -1,7 +1,5 @@
 """The arguments of the kernels of ``opencl/raycasting/``, ``cpu16/`` and ``multi_vdi/``."""
 
-from __future__ import annotations
-
 from pyvista_vdi.device import KernelDeclaration, Struct
 
 #: The scalars of a frame (``raycasting/frame.cl``).

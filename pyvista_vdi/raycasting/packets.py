@@ -5,16 +5,13 @@ a CPU a packet of such rays loads each list once. That pays where rays cross man
 do not, a CPU follows them one by one, in blocks.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device.constants import STEEPEST
-from pyvista_vdi.device.work_order import BLOCK_RAYS
+from pyvista_vdi.device.constants import BLOCK_RAYS, STEEPEST
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.ray_forms import Rectangle, inverse_affine
 from pyvista_vdi.model.vdi import VDI

@@ -1,7 +1,5 @@
 """From a volume to samples, to an image and to a plain VDI, in float64."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -19,10 +17,15 @@ from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.reference.homogeneity import cut_where_unlike
-from pyvista_vdi.reference.occlusion import NodeOcclusion, mean_transmittance, trilinear
-from pyvista_vdi.reference.rays import HalfSpace, Ray, clip, inside_box, pixel_ray
-from pyvista_vdi.reference.shading import gradient_factors, lit_colors
+from pyvista_vdi.reference.raycast import HalfSpace, Ray, clip, inside_box, pixel_ray
+from pyvista_vdi.reference.shading import (
+    NodeOcclusion,
+    cut_where_unlike,
+    gradient_factors,
+    lit_colors,
+    mean_transmittance,
+    trilinear,
+)
 
 Array = NDArray[np.float64]
 
@@ -34,22 +37,12 @@ GRID_TOLERANCE = 1e-9
 
 
 class RaySamples(NamedTuple):
-    """The samples of one ray, nearest first; every array has one entry per sample.
+    """The samples of one ray, nearest first; every float64 array has one entry per sample.
 
-    Attributes
-    ----------
-    pixel : tuple of int
-        ``(x, y)``, y = 0 at the bottom.
-    begin, end : numpy.ndarray
-        View depths of V_O between which each step lies, float64 (n,), world units.
-    position : numpy.ndarray
-        Grid coordinates (x, y, z) of the midpoints, in points, float64 (n, 3).
-    length : numpy.ndarray
-        Length of each step, float64 (n,), model units.
-    color : numpy.ndarray
-        Straight RGB, float64 (n, 3).
-    optical_depth : numpy.ndarray
-        tau of each step, float64 (n,).
+    ``pixel`` is (x, y), y = 0 at the bottom. ``begin`` and ``end`` are view depths of V_O between
+    which each step lies, world units; ``position`` grid coordinates (x, y, z) of the midpoints, in
+    points; ``length`` that of each step, model units; ``color`` straight RGB; ``optical_depth`` tau
+    of each step.
     """
 
     pixel: tuple[int, int]
@@ -70,39 +63,14 @@ def samples(
     lights: Lights | None = None,
     ambient_occlusion: AmbientOcclusion | None = None,
 ) -> Iterator[RaySamples]:
-    """Yield the samples of every pixel's ray.
+    """Yield the samples of every pixel's ray, bottom row first, from left to right.
 
-    Samples lie at the midpoints of steps of model length ``sample_distance`` from where the ray
-    enters the grid, the last step being shorter, so that the steps' lengths add up to the ray's
-    length in the grid whatever its directions are: docs/conventions.md#from-a-volume-to-the-medium.
-    In perspective a ray begins no earlier than at the eye.
-
-    Parameters
-    ----------
-    volume : Volume
-        What to sample; outside its grid nothing is seen.
-    camera : Camera
-        The view; its model transform places the volume.
-    window_size : (int, int)
-        Width and height in pixels.
-    transfer_function : TransferFunction
-        Classification and interpolation.
-    sample_distance : float, optional
-        Model units; half the smallest spacing by default.
-    lights : Lights, optional
-        What a shaded volume is lit by; one headlight by default.
-    ambient_occlusion : AmbientOcclusion, optional
-        Darkens samples by what stands around them.
-
-    Yields
-    ------
-    RaySamples
-        Bottom row first, from left to right; a ray that misses the grid has no samples.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If ``sample_distance`` is not positive.
+    Samples lie at the midpoints of steps of model length ``sample_distance``, half the smallest
+    spacing by default, from where the ray enters the grid, the last step being shorter, so that the
+    steps' lengths add up to the ray's length in the grid whatever its directions are:
+    docs/conventions.md#from-a-volume-to-the-medium. In perspective a ray begins no earlier than at
+    the eye; one that misses the grid has no samples. One headlight lights a shaded volume by
+    default.
     """
     width, height = check_window_size(window_size)
     step = min(volume.spacing) / 2 if sample_distance is None else float(sample_distance)
@@ -150,15 +118,7 @@ def volume_image(
 ) -> Array:
     """Return the direct volume rendering: all samples composited, nothing ended early.
 
-    Parameters
-    ----------
-    volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
-        As for :func:`samples`.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (H, W, 4), premultiplied RGBA, top row first.
+    float64 (H, W, 4), premultiplied RGBA, top row first; parameters as for :func:`samples`.
     """
     width, height = check_window_size(window_size)
     image = np.zeros((height, width, 4))
@@ -188,31 +148,16 @@ def build_vdi(
 
     Every sample that is not transparent begins as a supersegment of its own. By the criterion
     least-error, while a list is over budget, the two neighbours whose merging displaces the least
-    optical depth become one: with e the extinction times (r, g, b, 1), the cost is the sum of
-    abs(e - mean e) over length, what lies between the two (e = 0) included. Merging sees opacity as
-    well as colour, so black material that changes density is not homogeneous. Rendered at V_O the
-    result equals :func:`volume_image` for any budget, with colours weighted by transmittance.
+    optical depth become one: with e the extinction times (r, g, b, 1), the cost is the sum of abs(e
+    - mean e) over length, what lies between the two (e = 0) included. Merging sees opacity as well
+    as colour, so black material that changes density is not homogeneous. By homogeneity, lists are
+    cut by :func:`.shading.cut_where_unlike`. Rendered at V_O the result equals :func:`volume_image`
+    for any budget, with colours weighted by transmittance (see
+    :func:`pyvista_vdi.model.compositing.merge`).
 
-    Parameters
-    ----------
-    volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
-        As for :func:`samples`.
-    max_supersegments : int
-        N_S: no list gets longer.
-    criterion : {"least-error", "homogeneity"}
-        What decides where a list is cut; see :mod:`pyvista_vdi.reference.homogeneity`.
-    weighting : {"transmittance", "optical_depth"}
-        Of the colours; see :func:`pyvista_vdi.model.compositing.merge`.
-
-    Returns
-    -------
-    VDI
-        With depths relative to the nearest depth of the bounds where the eye is outside them.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If ``max_supersegments`` is not positive or the criterion is unknown.
+    Depths are relative to the nearest depth of the bounds where the eye is outside them. Parameters
+    are as for :func:`samples`; InvalidArgumentError if ``max_supersegments`` is not positive or the
+    criterion is unknown.
     """
     if criterion not in CRITERIA:
         raise InvalidArgumentError(
@@ -343,25 +288,11 @@ def ambient_transmittance(
     directions: int = 1024,
     step: float | None = None,
 ) -> Array:
-    """Return the mean transmittance around points, by its definition and without a grid.
+    """Return the mean transmittance around points, by its definition and without a grid: 0 to 1.
 
-    Parameters
-    ----------
-    volume, transfer_function
-        What takes the light.
-    position : numpy.ndarray
-        Grid coordinates (x, y, z) in points, float64 (n, 3).
-    radius : float
-        How far to look, model units.
-    directions : int
-        How many of them the mean is taken over.
-    step : float, optional
-        Length of a step, model units; half the smallest spacing by default.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (n,), 0 to 1.
+    ``position`` are grid coordinates (x, y, z) in points, float64 (n, 3); ``radius`` how far to
+    look and ``step`` the length of a step (half the smallest spacing by default), model units;
+    ``directions`` how many of them the mean is taken over.
     """
     step = min(volume.spacing) / 2 if step is None else step
     depth = _optical_depth(volume, transfer_function)

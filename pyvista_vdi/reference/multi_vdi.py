@@ -4,8 +4,6 @@ Written as the definition reads: a ray is cut at every face of every supersegmen
 on each piece the extinctions of what covers it add, and the colour is their mean by extinction.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -86,25 +84,10 @@ def render_joint(
     cropping: Sequence[Any] | None = None,
     opacity_multiplier: Sequence[float] | None = None,
 ) -> Array:
-    """Return the exact image of several VDIs in one scene.
+    """Return the exact image of several VDIs in one scene: float64 (H, W, 4), premultiplied RGBA.
 
-    Parameters
-    ----------
-    vdis : sequence of VDI
-        What to look at.
-    cameras : sequence of Camera
-        The new view, with each VDI's model transform.
-    window_size : (int, int)
-        Width and height of the image.
-    opaque_depth : array_like of float, shape (H, W), optional
-        As for :func:`pyvista_vdi.reference.render`.
-    clipping_planes, cropping, opacity_multiplier : sequence, optional
-        Those of each VDI, as for :func:`pyvista_vdi.reference.render`.
-
-    Returns
-    -------
-    numpy.ndarray
-        float64 (H, W, 4), premultiplied RGBA, top row first.
+    ``cameras`` are the new view, with each VDI's model transform; clipping planes, cropping and
+    opacity multipliers those of each VDI; the rest is as for :func:`pyvista_vdi.reference.render`.
     """
     width, height = window_size
     views = _views(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
@@ -133,27 +116,10 @@ def render_joint_range(
 ) -> tuple[Array, Array]:
     """Return the smallest and largest colour over rays moved by their arithmetic's roundings.
 
-    As :func:`pyvista_vdi.reference.render_range`, which derives how far; each VDI's ray is moved
-    on its own, because each is computed in its own list space. In addition each VDI's segments
-    are moved along the ray, by ``k`` roundings of the depths between which all of them lie.
-
-    Parameters
-    ----------
-    vdis, cameras, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
-        As for :func:`render_joint`.
-    pixels : sequence of (int, int)
-        ``(x, y)`` of each, y = 0 at the bottom.
-    k : float
-        Roundings of a list coordinate, in units of :data:`ROUNDOFF`.
-    n_random : int
-        Sets of moved rays to try in addition to the fixed ones.
-    seed : int
-        Of the random ones.
-
-    Returns
-    -------
-    low, high : numpy.ndarray
-        float64 (len(pixels), 4) each, premultiplied RGBA.
+    As :func:`pyvista_vdi.reference.render_range`, which derives how far and has the other
+    parameters; each VDI's ray is moved on its own, because each is computed in its own list space.
+    In addition each VDI's segments are moved along the ray, by ``k`` roundings of the depths
+    between which all of them lie.
     """
     rng = np.random.default_rng(seed)
     views = _views(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)

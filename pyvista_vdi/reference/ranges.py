@@ -1,7 +1,5 @@
 """What float32 may make of a ray: the oracle's range (docs/conventions.md#borders)."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -145,7 +143,7 @@ def _corners() -> Iterator[_Move]:
 
 
 def _inside(
-    rng: np.random.Generator, count: int, space: _ListSpace, line: Line, size: float
+    rng: np.random.Generator, count: int, space: "_ListSpace", line: Line, size: float
 ) -> Iterator[_Move]:
     """Yield random displacements from the same box, three in four crossing a border on purpose.
 

@@ -5,8 +5,6 @@ the steps in it are sampled, and what was used longest ago makes room for the ne
 those of the whole volume to the last bit, and so is what is made of them.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import OrderedDict
@@ -18,10 +16,10 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
-from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.volume.kernels import BRICKS, SAMPLE_STEPS, WANT_BRICKS
-from pyvista_vdi.volume.variant import Variant
+from pyvista_vdi.volume.rays import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
 _SHIFTS = (6, 5, 4)
@@ -94,7 +92,7 @@ class BrickLayout:
     @classmethod
     def of(
         cls, dimensions: Sequence[int], shift: int, gradients: bool, point_bytes: int
-    ) -> BrickLayout:
+    ) -> "BrickLayout":
         """Return the layout for a grid of so many points along x, y and z."""
         x, y, z = (-(-(points - 1) // 2**shift) for points in dimensions)
         return cls(shift, gradients, (x, y, z), point_bytes)
@@ -171,15 +169,8 @@ class DeviceBricks:
     Parameters are the voxels, read as they are needed; what turns part of them into what kernels
     read, of ``dtype``; how they are cut, how many ``slots`` there are, and the ``memory_limit``
     that was asked for; and which macrocells are ``visible``: other bricks are never copied.
-
-    Attributes
-    ----------
-    pool : DeviceBuffer
-        The bricks.
-    slots : DeviceBuffer
-        Where each brick is whose steps are to be sampled now, int32; -1 for the others.
-    copied : int
-        Bricks that were copied to the device so far.
+    ``pool`` has the bricks, ``slots`` where each is whose steps are to be sampled now, int32, -1
+    for the others; ``copied`` counts bricks that were copied to the device so far.
     """
 
     def __init__(
@@ -211,7 +202,7 @@ class DeviceBricks:
             self.slots = keep(runtime.buffer((layout.n_bricks,), np.int32, "slots of bricks"))
             self._wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
 
-    def __enter__(self) -> DeviceBricks:
+    def __enter__(self) -> "DeviceBricks":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -288,7 +279,7 @@ class StepSampler:
         self._want = runtime.bind(WANT_BRICKS, defines, classified=medium["classified"], **rays)
         self._take = runtime.bind(SAMPLE_STEPS, defines, **medium, slots=bricks.slots, **rays)
 
-    def __enter__(self) -> StepSampler:
+    def __enter__(self) -> "StepSampler":
         return self
 
     def __exit__(self, *_: object) -> None:

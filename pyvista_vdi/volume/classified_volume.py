@@ -1,10 +1,8 @@
 """A volume and its classification on a device, shared by generation and direct volume rendering."""
 
-from __future__ import annotations
-
 import contextlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
-from pyvista_vdi.device.work_order import GROUP
+from pyvista_vdi.device.constants import GROUP
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.float32_limits import compensation, held_unit_distance
+from pyvista_vdi.model.float32_limits import held_unit_distance, summation
 from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import (
@@ -28,16 +25,14 @@ from pyvista_vdi.volume.bricks import (
     least_brick_bytes,
     too_small,
 )
-from pyvista_vdi.volume.grid_part import GridPart
 from pyvista_vdi.volume.kernels import (
     CLASSIFIED,
     MACROCELL_DISTANCES,
     MACROCELL_VISIBILITY,
     SCALAR_MEDIA,
 )
-from pyvista_vdi.volume.light_tables import gradient_table, lighting_table, shading_variant
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
-from pyvista_vdi.volume.rays import GridRays, MarchForms, checked_sample_distance
+from pyvista_vdi.volume.rays import GridPart, GridRays, Variant, checked_sample_distance
 from pyvista_vdi.volume.upload import (
     ENTRY_BYTES,
     TABLE_BYTES,
@@ -45,15 +40,17 @@ from pyvista_vdi.volume.upload import (
     Scale,
     described,
     device_bytes,
+    gradient_table,
     held_voxels,
     integer_ends,
+    lighting_table,
     macrocells_over,
     other_bytes,
+    shading_variant,
     upload_blanked,
     uploads_of,
     voxel_reader,
 )
-from pyvista_vdi.volume.variant import Variant
 
 #: Macrocells: farther than this no march looks for what is not transparent.
 _FARTHEST = 16
@@ -66,52 +63,22 @@ _WORTH_SKIPPING = 0.15
 class DeviceVolume:
     """A classified volume as kernel arguments.
 
-    Parameters
-    ----------
-    runtime : Runtime
-        The device.
-    volume : Volume
-        Uploaded once per device and kept as long as the object lives.
-    transfer_function : TransferFunction
-        Its table is uploaded each time: a few kilobytes.
-    options : MediumOptions, optional
-        How it is sampled; ambient occlusion is computed once for a classification.
-    skip_empty : bool
-        Pass by macrocells that the transfer function makes transparent; the samples stay the same.
-    by_scalar : bool
-        Look up the medium of each scalar where that can be done; otherwise the table stays the
-        transfer function.
-    part : GridPart, optional
-        Where the volume's points lie in a grid of which they are a part: marches then go along the
-        whole grid's rays, and take the steps that belong to the part.
-    ambient : numpy.ndarray, float32 (nz, ny, nx), optional
-        Mean transmittance around the nodes of the whole grid's occlusion, which a part cannot know.
-    room : Room, optional
-        Memory that there is; a volume for which it is too little is held brick by brick. Without
-        it a volume is held in one piece or refused.
-    **changes
-        Options by name, in place of those in ``options``.
+    The volume is uploaded once per device and kept as long as the object lives; the transfer
+    function's table, a few kilobytes, each time; ambient occlusion is computed once for a
+    classification. ``options``, and ``changes`` of them, say how it is sampled; ``skip_empty``
+    passes by macrocells that the transfer function makes transparent, with the same samples;
+    ``by_scalar`` looks up the medium of each scalar where that can be done. With ``part``, the
+    volume's points lie in a grid of which they are a part: marches go along the whole grid's rays,
+    and take the steps that belong to the part; ``ambient``, float32 (nz, ny, nx), is then the mean
+    transmittance around the nodes of the whole grid's occlusion. A volume for which ``room`` is too
+    little is held brick by brick; without it in one piece or refused.
 
-    Attributes
-    ----------
-    volume : Volume
-        The scalars.
-    grid : Volume or Grid
-        What rays are marched through: the volume, or the grid that it is a part of.
-    bricks : DeviceBricks or None
-        What is on the device, where that is not the whole volume: steps must be sampled by a
-        :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
-    variant : Variant
-        What kernels that march through it are compiled for, but for what belongs to a view.
-    zero, unit : float
-        Scalar of a voxel that is 0 on the device, and scalars per unit of the device's voxels.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If ``sample_distance`` is not a positive length.
-    DeviceMemoryError
-        If the volume or the grid of its occlusion does not fit.
+    Rays are marched through ``grid``, the volume or what it is a part of. ``bricks`` are on the
+    device where the whole volume is not: steps must be sampled by a
+    :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them. Kernels are
+    compiled for ``variant``, but for what belongs to a view. ``zero`` is the scalar of a voxel that
+    is 0 on the device, ``unit`` scalars per unit of the device's voxels. InvalidArgumentError if
+    the sample distance is no positive length, DeviceMemoryError if something does not fit.
     """
 
     def __init__(
@@ -170,7 +137,7 @@ class DeviceVolume:
             nearest=nearest,
             by_scalar=ends is not None,
             part=part is not None,
-            compensated=compensation(media).get("COMPENSATED", 0),
+            compensated=summation(media),
             **shading,
         )
         asked = options.ambient_occlusion
@@ -233,12 +200,6 @@ class DeviceVolume:
             table = lighting_table(self.grid, camera, self._looks.shading, self._lights)
             self._lit = (camera, self.runtime.upload(table, "lights"))
         return {**self._arguments, "lighting": self._lit[1]}
-
-    def forms(
-        self, camera: Camera, window_size: Sequence[int], clipping_planes: Planes = ()
-    ) -> MarchForms:
-        """Return what the kernels march along in a view."""
-        return self.rays.forms(camera, window_size, clipping_planes)
 
     def _occluded(self, occlusion: AmbientOcclusion, grid: OcclusionGrid) -> DeviceBuffer:
         """Return the mean transmittances around the occlusion's nodes, made once and kept."""
@@ -349,7 +310,7 @@ def _numbers(
     return CLASSIFIED(
         size=size,
         held=size,
-        macrocells=(*macrocells_over(volume), 0),
+        macrocells=(*macrocells_over(volume.dimensions), 0),
         part_first=(0,) * 4 if part is None else (*part.first, 0),
         part_lower=infinite if part is None else (*part.lower, 0),
         part_upper=infinite if part is None else (*part.upper, 0),
@@ -369,7 +330,7 @@ def _visibility(
     transfer_function: TransferFunction,
 ) -> DeviceBuffer:
     """Return which macrocells hold anything that is not transparent, uint8 on the device."""
-    n = math.prod(macrocells_over(volume))
+    n = math.prod(macrocells_over(volume.dimensions))
     visible = runtime.buffer((n,), np.uint8, "visible macrocells")
     before = np.zeros(table.entries + 1, np.uint32)
     np.cumsum(transfer_function.opacities > 0, out=before[1:])
@@ -405,7 +366,7 @@ def _distances(
     defines = voxels.variant.defines
     launch = runtime.bind(MACROCELL_DISTANCES, defines, macrocells=seen.size, most=_FARTHEST)
     apart = 1
-    for along in macrocells_over(volume):
+    for along in macrocells_over(volume.dimensions):
         with distances as before:
             distances = runtime.buffer((seen.size,), np.uint8, "distances of macrocells")
             group = padded(seen.size, GROUP), GROUP

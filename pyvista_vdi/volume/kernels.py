@@ -1,7 +1,5 @@
 """The arguments of the kernels of ``opencl/volume/``, by name and type."""
 
-from __future__ import annotations
-
 from pyvista_vdi.device import KernelDeclaration, Struct
 
 #: The numbers of a volume, its classification, its ambient occlusion, and the part that is there.

@@ -1,7 +1,5 @@
 """Ambient occlusion of a classified volume, computed on a device."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +11,7 @@ from pyvista_vdi.device import DeviceBuffer, Runtime, padded
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.volume.kernels import AMBIENT_TRANSMITTANCES, STEP_OPACITIES
-from pyvista_vdi.volume.variant import Variant
+from pyvista_vdi.volume.rays import Variant
 
 Triple = tuple[int, int, int]
 

@@ -1,23 +1,43 @@
 """The rays of a view through a volume, as the kernels that march take them."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.device import KernelDeclaration, Runtime
+from pyvista_vdi.device.constants import BLOCK_RAYS, GROUP
+from pyvista_vdi.device.programs import Define
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.float32_limits import MOST_STEPS, entries
-from pyvista_vdi.model.grid import Geometry
+from pyvista_vdi.model.float32_limits import MOST_STEPS, enters_far_away
 from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed, packed_double_float
 from pyvista_vdi.model.render_options import Planes
+from pyvista_vdi.model.volume import Geometry, Grid
 from pyvista_vdi.volume.kernels import RAYS
+
+Ends = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class GridPart:
+    """Where points that are at hand lie in their grid, and which of its cells belong to them.
+
+    ``first``: index x, y, z of the first point at hand; ``lower``, ``upper``: index positions
+    between which the part's own cells lie, the upper ones excluded, infinite at the ends of the
+    grid, where rounding may put a midpoint outside; ``scalar_range``: of the whole grid's values.
+    """
+
+    grid: Grid
+    first: tuple[int, int, int]
+    lower: Ends
+    upper: Ends
+    scalar_range: tuple[float, float]
+
 
 #: As many steps as there are.
 ALL_STEPS = 2**31 - 1
@@ -66,7 +86,7 @@ class GridRays:
         planes += rays.eye_plane(camera, pixel_rays)
         planes += rays.user_planes(camera, pixel_rays, clipping_planes)
         reach = rays.largest_value(camera, window_size, self.grid.bounds, index)
-        two_floats = bool(entries(reach, max(self.grid.dimensions)))
+        two_floats = enters_far_away(reach, max(self.grid.dimensions))
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), two_floats)
 
     def view(
@@ -106,3 +126,90 @@ def checked_sample_distance(volume: Geometry, sample_distance: float | None) -> 
         )
     # No ray is longer than the diagonal; float32 may not hold how much longer the step is
     return min(step, 2 * volume.length)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What changes the code of kernels that march through a volume.
+
+    OpenCL's types of a voxel's component (``voxel``) and of a voxel's address (``index``); a
+    scalar, or colours and a scalar (1 or 4 ``components``); whether the ``nearest`` point is
+    sampled, and the medium of its scalar looked up (``by_scalar``). Samples are not lit, lit, or
+    lit by one headlight and nothing else (``shaded`` 0, 1, 2); opacity may depend on the gradient;
+    voxels may be ``part`` of a grid; what cropping keeps may be no box (``cropped``). With
+    ``double_float``, rays enter the volume so far from where they are formed that float32 does not
+    hold it. ``compensated``: how sums along a ray are kept (``lib/compositing.cl``). ``sharp``, no
+    ``-D`` option: a specular power is so large that cosines round it off.
+    """
+
+    voxel: str = "uchar"
+    index: str = "uint"
+    components: int = 1
+    nearest: bool = False
+    by_scalar: bool = False
+    shaded: int = 0
+    gradient_opacity: bool = False
+    part: bool = False
+    double_float: bool = False
+    compensated: int = 0
+    cropped: bool = False
+    sharp: bool = False
+
+    @property
+    def defines(self) -> dict[str, Define]:
+        """The ``-D`` options, all of them in every program."""
+        return {
+            "VOXEL_T": self.voxel,
+            "INDEX_T": self.index,
+            "COMPONENTS": self.components,
+            "NEAREST": self.nearest,
+            "BY_SCALAR": self.by_scalar,
+            "SHADED": self.shaded,
+            "GRADIENT_OPACITY": self.gradient_opacity,
+            "GRID_PART": self.part,
+            "DOUBLE_FLOAT_RAYS": self.double_float,
+            "COMPENSATED": self.compensated,
+            "CROPPED": self.cropped,
+        }
+
+    @property
+    def one_by_one(self) -> bool:
+        """Whether rays are followed one by one whatever the device."""
+        return (
+            self.index != "uint"
+            or self.components > 1
+            or self.double_float
+            or self.compensated > 1
+            or self.sharp
+        )
+
+
+class RayLaunch:
+    """A launch of a kernel for rays: one for each work-item, or sixteen (``opencl/cpu16/``).
+
+    CPUs follow sixteen, unless there is no way but ``one_by_one``; the bits are the same. Other
+    arguments are those of :meth:`Runtime.bind`; a null pointer that the other form alone takes is
+    left out.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        one: KernelDeclaration,
+        sixteen: KernelDeclaration,
+        defines: Mapping[str, Define],
+        *,
+        one_by_one: bool = False,
+        **arguments: Any,
+    ) -> None:
+        in_blocks = runtime.is_cpu and not one_by_one
+        declaration, self._rays = (sixteen, BLOCK_RAYS) if in_blocks else (one, 1)
+        if in_blocks and runtime.info.platform.startswith("Intel"):
+            # PoCL rounds functions of a vector otherwise than of a number, in one of 10^5 values
+            defines = {**defines, "VECTOR_FUNCTIONS": 1}
+        given = {k: v for k, v in arguments.items() if v is not None or k in declaration.arguments}
+        self._launch = runtime.bind(declaration, defines, **given)
+
+    def __call__(self, rays: int, **arguments: Any) -> None:
+        """Launch it for so many rays, a multiple of a group's."""
+        self._launch(rays // self._rays, GROUP // self._rays, **arguments)

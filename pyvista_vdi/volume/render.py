@@ -1,7 +1,5 @@
 """Direct volume rendering on a device: the baseline that a VDI is measured against."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -10,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime
-from pyvista_vdi.device.work_order import block_items
+from pyvista_vdi.device.constants import block_items
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import MediumOptions
@@ -19,8 +18,8 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.kernels import RENDER_VOLUME, RENDER_VOLUME_16
-from pyvista_vdi.volume.variant import RayLaunch
+from pyvista_vdi.volume.kernels import PROJECT, PROJECT_16, RENDER_VOLUME, RENDER_VOLUME_16
+from pyvista_vdi.volume.rays import RayLaunch
 
 #: Steps of a ray that are sampled at a time where the volume is on the device brick by brick.
 _PART_STEPS = 128
@@ -42,7 +41,7 @@ class ClippedRays:
 
     def __init__(self, medium: DeviceVolume, request: FrameRequest) -> None:
         options = request.options
-        march = medium.forms(request.camera, request.size, options.clipping_planes)
+        march = medium.rays.forms(request.camera, request.size, options.clipping_planes)
         self.ends = rays.checked_opaque_depth(request.opaque_depth, request.size, march.rays)
         cropped = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
         self.planes = march.planes + len(cropped.planes)
@@ -165,3 +164,77 @@ def draw_medium(
                 view = medium.rays.view(size, clipped.planes, None, **part)
                 sampler.sample(view)
                 launch(block_items(width, now), view=view)
+
+
+#: In the kernel's order (``volume/projection.cl``), from 1 on.
+_BLEND_MODES = ("maximum", "minimum", "average", "additive")
+
+
+def project_volume(
+    volume: Volume,
+    transfer_function: TransferFunction,
+    request: FrameRequest,
+    blending: str,
+    sampling: MediumOptions,
+) -> NDArray[np.float32]:
+    """Render a volume by another blend mode than compositing: see ``docs/conventions.md``.
+
+    Premultiplied RGBA, float32 (H, W, 4), top row first. Every step is sampled, and no ray ends
+    early.
+    """
+    _refuse_light(volume, transfer_function, request, blending, sampling)
+    runtime = get_runtime(request.device)
+    medium = DeviceVolume(
+        runtime, volume, transfer_function, sampling, skip_empty=False, by_scalar=False
+    )
+    clipped = ClippedRays(medium, request)
+    width, height = request.size
+    low, high = volume.finite_range()
+    span = high - low or 1.0
+    with ExitStack() as stack:
+        keep = stack.enter_context
+        forms = keep(runtime.upload(clipped.forms, "rays"))
+        ends = None
+        if clipped.ends is not None:
+            ends = keep(runtime.upload(clipped.ends, "opaque depth"))
+        image = keep(runtime.result((height, width, 4), name="image"))
+        launch = RayLaunch(
+            runtime,
+            PROJECT,
+            PROJECT_16,
+            {**clipped.variant.defines, "BLEND_MODE": _BLEND_MODES.index(blending) + 1},
+            one_by_one=clipped.variant.one_by_one,
+            **medium.medium_arguments(request.camera),
+            view=medium.rays.view(request.size, clipped.planes),
+            forms=forms,
+            opaque_depth=ends,
+            regions=clipped.regions,
+            per_range=medium.unit / span,
+            at_zero=(medium.zero - low) / span,
+            image=image,
+        )
+        launch(block_items(width, height))
+        return runtime.download(image)
+
+
+def _refuse_light(
+    volume: Volume,
+    transfer_function: TransferFunction,
+    request: FrameRequest,
+    blending: str,
+    sampling: MediumOptions,
+) -> None:
+    """Raise UnsupportedError for what only compositing has."""
+    asked = {
+        "RGBA values": volume.rgba,
+        "shade": transfer_function.shading is not None,
+        "gradient opacity": transfer_function.gradient_opacities is not None,
+        "ambient_occlusion": sampling.ambient_occlusion is not None,
+        "opacity_multiplier": request.options.opacity_multiplier != 1.0,
+        "memory_limit": sampling.memory_limit is not None,
+    }
+    for name, given in asked.items():
+        if given:
+            raise UnsupportedError(
+                f"blending={blending!r} does not go with {name}: leave one of them out"
+            )

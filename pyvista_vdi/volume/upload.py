@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
-from pyvista_vdi.device.constants import MACROCELL_SHIFT
-from pyvista_vdi.device.work_order import GROUP
-from pyvista_vdi.model.float32_limits import LARGEST_VOXEL, scalars_suit_float32
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.device.constants import GROUP, MACROCELL_SHIFT
+from pyvista_vdi.model import ray_forms as rays
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.float32_limits import LARGEST_POWER, LARGEST_VOXEL, scalars_suit_float32
+from pyvista_vdi.model.lighting import Light, Lights, Shading
+from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
+from pyvista_vdi.model.volume import Geometry, Volume
 from pyvista_vdi.volume.bricks import Room, in_parts
 from pyvista_vdi.volume.kernels import MACROCELL_RANGES
-from pyvista_vdi.volume.variant import Variant
+from pyvista_vdi.volume.rays import Variant
 
 #: Voxel types that the kernels read as they are; the others are scaled to float32 on the host.
 _DEVICE_TYPES = {
@@ -157,13 +159,8 @@ class _Uploads:
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
 
 
-def macrocells_over(volume: Volume) -> tuple[int, int, int]:
-    """Macrocells along x, y and z that cover the cells of a volume."""
-    return _macrocells_of(volume.dimensions)
-
-
-def _macrocells_of(dimensions: Sequence[int]) -> tuple[int, int, int]:
-    """Macrocells along x, y and z that cover the cells of a grid of so many points."""
+def macrocells_over(dimensions: Sequence[int]) -> tuple[int, int, int]:
+    """Return the macrocells along x, y and z that cover the cells of a grid of so many points."""
     (x, y, z), edge = dimensions, 2**MACROCELL_SHIFT
     return -(-(x - 1) // edge), -(-(y - 1) // edge), -(-(z - 1) // edge)
 
@@ -176,7 +173,7 @@ def device_bytes(volume: Volume, scale: Scale | None) -> int:
 def other_bytes(volume: Volume) -> int:
     """Bytes on a device beside the voxels: macrocells, tables and what is blank."""
     blanked = 0 if volume.blanked is None else volume.blanked.nbytes
-    return math.prod(macrocells_over(volume)) * MACROCELL_BYTES + TABLE_BYTES + blanked
+    return math.prod(macrocells_over(volume.dimensions)) * MACROCELL_BYTES + TABLE_BYTES + blanked
 
 
 def described(volume: Volume) -> str:
@@ -224,7 +221,12 @@ def upload_voxels(
         key = (runtime, scale)
         if key not in made:
             _require_a_number(runtime, volume)
-            array = volume.array if scale is None else _all_scaled(runtime, volume.array, scale)
+            array = volume.array
+            if scale is not None:
+                array = aligned_empty(volume.array.shape, np.float32)
+                for plane, target in zip(volume.array, array, strict=True):
+                    runtime.give_way()
+                    target[...] = _scaled(plane, scale)
             with kept_together() as keep:
                 voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
                 ranges = keep(_macrocell_ranges(runtime, volume.dimensions, voxels, variant))
@@ -271,7 +273,7 @@ def _ranges_in_parts(
     room: Room,
 ) -> NDArray[np.float32]:
     """Return the scalar range of each macrocell, float32 (n, 2), from parts of the volume."""
-    macrocells, read = macrocells_over(volume), voxel_reader(scale)
+    macrocells, read = macrocells_over(volume.dimensions), voxel_reader(scale)
     ranges = aligned_empty((*reversed(macrocells), 2), np.float32)
     point_bytes = device_bytes(volume, scale) // math.prod(volume.dimensions)
     nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
@@ -294,7 +296,7 @@ def _macrocell_ranges(
     variant: Variant,
 ) -> DeviceBuffer:
     """Return the scalar range of each macrocell of a grid of so many points along x, y and z."""
-    macrocells = _macrocells_of(dimensions)
+    macrocells = macrocells_over(dimensions)
     n = int(np.prod(macrocells))
     ranges = runtime.buffer((n, 2), name="ranges of macrocells")
     launch = runtime.bind(MACROCELL_RANGES, variant.defines, voxels=voxels, ranges=ranges)
@@ -351,15 +353,6 @@ def scale_of(volume: Volume, low: float, high: float) -> Scale:
     return Scale(low, 2 * farthest or 1.0, True)
 
 
-def _all_scaled(runtime: Runtime, array: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
-    """Scale a volume plane by plane, see :func:`_scaled`."""
-    scaled = aligned_empty(array.shape, np.float32)
-    for plane, target in zip(array, scaled, strict=True):
-        runtime.give_way()
-        target[...] = _scaled(plane, scale)
-    return scaled
-
-
 def _scaled(array: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
     """32-bit integers and float64 to float32, taken relative to the transfer function's range.
 
@@ -373,3 +366,92 @@ def _scaled(array: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
     # voxel stays one
     finite = np.clip(scaled, -_BEYOND, _BEYOND)
     return np.where(np.isinf(array), scaled, finite).astype(np.float32)
+
+
+#: In place of a specular power of 0, as of which a highlight is where the ray is mirrored to the
+#: eye's side: what small powers tend to, while 0 to the power of 0 is 1.
+_LEAST_POWER = 1e-30
+#: In place of a cone's cosine: the light shines everywhere.
+_NO_CONE = -2.0
+
+
+def shading_variant(transfer_function: TransferFunction, lights: Lights) -> dict[str, Any]:
+    """Return the fields of a :class:`Variant` that say how samples are lit."""
+    shading = transfer_function.shading
+    return {
+        "shaded": 0 if shading is None else 2 if lights.headlight_only else 1,
+        "sharp": shading is not None and shading.specular_power > LARGEST_POWER,
+        "gradient_opacity": transfer_function.gradient_opacities is not None,
+    }
+
+
+def lighting_table(
+    grid: Geometry, camera: Camera, shading: Shading, lights: Lights
+) -> NDArray[np.float32]:
+    """Return the material and the lights of a view.
+
+    The lights' frame has its origin at the eye, where float32 resolves the directions. A headlight
+    alone is in the model frame's axes, in which VTK shades it; other lights are in the view's.
+    """
+    to_frame = np.eye(4)
+    if lights.headlight_only:
+        to_frame[:3, 3] = -rays.inverse_affine(camera.model_to_view)[:3, 3]
+    else:
+        to_frame = camera.model_to_view
+    index_to_frame = to_frame @ grid.index_to_model
+    # Of normals only the direction matters: scaled to what float32 holds, whatever the spacing
+    normal = rays.inverse_affine(index_to_frame)[:3, :3].T
+    normal = normal / np.abs(normal).max()
+    head = [
+        *normal.ravel(),
+        *index_to_frame[:3].ravel(),
+        shading.ambient,
+        shading.diffuse,
+        shading.specular,
+        max(shading.specular_power, _LEAST_POWER),
+        float(lights.two_sided),
+        float(shading.specular_power > LARGEST_POWER),
+        len(lights.lights),
+    ]
+    return np.array(
+        [*head, *(v for light in lights.lights for v in _light(light, camera))], dtype=np.float32
+    )
+
+
+def _light(light: Light, camera: Camera) -> list[float]:
+    position, direction = light.in_world(camera)
+    to_view = camera.view_matrix
+    cone = math.cos(math.radians(light.cone_angle)) if light.cone_angle <= 90 else _NO_CONE
+    return [
+        *(light.intensity * c for c in (*light.ambient, *light.diffuse, *light.specular)),
+        *(to_view[:3, :3] @ direction),
+        float(light.positional),
+        *(to_view[:3, :3] @ position + to_view[:3, 3]),
+        *light.attenuation,
+        cone,
+        light.exponent,
+    ]
+
+
+def gradient_table(
+    spacing: Sequence[float],
+    scalar_range: tuple[float, float],
+    transfer_function: TransferFunction,
+    per_difference: float,
+) -> NDArray[np.float32]:
+    """Return the gradient opacities, and how differences on the device lead to their places.
+
+    ``per_difference``: scalars per unit of the device's voxels.
+    """
+    assert transfer_function.gradient_opacities is not None
+    assert transfer_function.gradient_range is not None
+    table = transfer_function.gradient_opacities
+    low, high = transfer_function.gradient_range
+    per_magnitude = (len(table) - 1) / (high - low)
+    smallest, largest = scalar_range
+    to_table = np.mean(spacing) / (2 * np.asarray(spacing)) * per_difference * per_magnitude
+    last = GRADIENT_SHARE * (largest - smallest) * per_magnitude
+    with np.errstate(over="ignore"):
+        return np.array(
+            [*to_table, last, len(table), -low * per_magnitude, *table], dtype=np.float32
+        )

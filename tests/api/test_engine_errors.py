@@ -21,7 +21,7 @@ from pyvista_vdi.errors import (
     InvalidCameraError,
     InvalidVolumeError,
 )
-from pyvista_vdi.generation.estimate import estimate
+from pyvista_vdi.generation.slices import estimate
 
 WINDOW = (12, 9)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))

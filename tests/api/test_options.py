@@ -12,7 +12,6 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import api
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.classification import Classification, Look
-from pyvista_vdi.model.drawing_options import DrawingOptions
 from pyvista_vdi.model.lighting import Light, Lights
 from pyvista_vdi.model.options import (
     GenerationOptions,
@@ -20,7 +19,7 @@ from pyvista_vdi.model.options import (
     QualityTarget,
     declared,
 )
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 
 #: The functions, with the records whose options they take.
 MADE = (Classification, GenerationOptions, QualityTarget)

@@ -23,8 +23,8 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.options import declared
+from pyvista_vdi.model.volume import Grid
 
 PACKAGE = Path(pvdi.__file__).parent
 ARRAY = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import buffers, devices
-from pyvista_vdi.device.buffers import bytes_text
+from pyvista_vdi.device import devices, memory
+from pyvista_vdi.device.devices import bytes_text
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model import host_memory
 
@@ -340,7 +340,7 @@ class TestPinnedArrays:
 
     @pytest.fixture
     def pool(self, monkeypatch):
-        monkeypatch.setattr(buffers, "PINNED_BYTES", 1000)
+        monkeypatch.setattr(memory, "PINNED_BYTES", 1000)
         self.there = []
 
         def allocate(nbytes):
@@ -349,7 +349,7 @@ class TestPinnedArrays:
             self.there.append(nbytes)
             return np.zeros(nbytes, np.uint8), lambda: self.there.remove(nbytes)
 
-        return buffers.PinnedArrays(allocate)
+        return memory.PinnedArrays(allocate)
 
     def test_memory_that_nobody_has_is_given_out_again(self, pool):
         first = pool.empty((10, 4), np.dtype("f4"))

@@ -12,11 +12,11 @@ from pyvista_vdi.device import (
     Struct,
     devices,
     list_devices,
-    sources,
+    programs,
 )
 from pyvista_vdi.device.programs import define_options
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
-from pyvista_vdi.volume.variant import Variant
+from pyvista_vdi.volume.rays import Variant
 
 AFFINE = Struct("Affine", n="int", weights="float4", factor="float")
 SOURCE = """\
@@ -46,7 +46,7 @@ ARGUMENTS = {
 
 @pytest.fixture
 def affine(monkeypatch):
-    monkeypatch.setattr(sources, "expand", lambda path: SOURCE)
+    monkeypatch.setattr(programs, "expand", lambda path: SOURCE)
     return KernelDeclaration("affine.cl", "affine", **ARGUMENTS)
 
 
@@ -160,7 +160,7 @@ def compiler():
 def test_declarations_are_as_compilers_see_kernels(compiler, declaration, defines):
     """Programs from a cache have no names on Intel's, so that every one is compiled here."""
     cl = devices.opencl()
-    program = cl._cl._Program(cl.Context([compiler]), sources.expand(declaration.path))
+    program = cl._cl._Program(cl.Context([compiler]), programs.expand(declaration.path))
     options = (*define_options(defines), "-cl-kernel-arg-info")
     program._build(options=" ".join(("-cl-std=CL1.2", *options)).encode(), devices=[compiler])
     kernel = cl.Kernel(program, declaration.name)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi.device.constants import CELL, CELL_ITEMS
-from pyvista_vdi.device.work_order import GROUP, block_items, part_columns
+from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, block_items, part_columns
 from pyvista_vdi.model.ray_forms import Rectangle
 
 EPS = 2.0**-24  # unit roundoff of float32

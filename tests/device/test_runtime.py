@@ -14,7 +14,7 @@ from fresh_python import run_python
 from runtimes import fresh_runtime
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import devices, profiling, programs, sources
+from pyvista_vdi.device import devices, programs, queues
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
 
 
@@ -28,7 +28,7 @@ def texts(monkeypatch):
             raise FileNotFoundError(path)
         return files[path]
 
-    monkeypatch.setattr(sources, "read_resource", read)
+    monkeypatch.setattr(programs, "read_resource", read)
     return files
 
 
@@ -36,7 +36,7 @@ def test_includes_are_expanded_once_with_line_marks(texts):
     texts["vdi/main.cl"] = '#include "common/a.cl"\n#include "common/b.cl"\nint main_c;\n'
     texts["common/a.cl"] = "int a;\n"
     texts["common/b.cl"] = '  #  include "common/a.cl"\nint b;'
-    assert sources.expand("vdi/main.cl").splitlines() == [
+    assert programs.expand("vdi/main.cl").splitlines() == [
         '#line 1 "vdi/main.cl"',
         '#line 1 "common/a.cl"',
         "int a;",
@@ -49,7 +49,7 @@ def test_includes_are_expanded_once_with_line_marks(texts):
     ]
     texts["itself.cl"] = '#include "b.cl"\nint a;'
     texts["b.cl"] = '#include "itself.cl"\nint b;'
-    assert sources.expand("itself.cl").count("int a;") == 1
+    assert programs.expand("itself.cl").count("int a;") == 1
 
 
 @pytest.mark.parametrize(
@@ -64,13 +64,13 @@ def test_missing_and_conditional_includes_name_the_place(texts, path, text, mess
     if text is not None:
         texts[path] = text
     with pytest.raises(KernelBuildError, match=message):
-        sources.expand(path)
+        programs.expand(path)
 
 
 @pytest.mark.parametrize("path", ["../setup.py", "/etc/passwd", "", "common"])
 def test_resources_outside_the_package_are_not_read(path):
     with pytest.raises(FileNotFoundError):
-        sources.read_resource(path)
+        programs.read_resource(path)
 
 
 SCALE = """\
@@ -155,7 +155,7 @@ def test_lines_of_the_whole_source_become_places(texts):
     """NVIDIA's compiler heeds no #line marks."""
     texts["common/wrong.cl"] = "\nfloat wrong(void) { return missing_name; }\n"
     texts["vdi/outer.cl"] = '// head\n#include "common/wrong.cl"\n__kernel void k() {}\n'
-    source = sources.expand("vdi/outer.cl")
+    source = programs.expand("vdi/outer.cl")
     at = 1 + source.split("\n").index("float wrong(void) { return missing_name; }")
     log = f"<kernel>:{at}:28: error: use of undeclared identifier\n<kernel>:999:1: note"
     assert programs._placed(log, source).startswith("common/wrong.cl:2:28: error")
@@ -287,7 +287,7 @@ def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file, monkeypat
 
 def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
     monkeypatch.setattr("atexit.register", lambda function: None)
-    monkeypatch.setattr(profiling, "PENDING_LIMIT", 3)
+    monkeypatch.setattr(queues, "PENDING_LIMIT", 3)
     monkeypatch.setenv("PYVISTA_VDI_PROFILE", "1")
     profiled = fresh_runtime(runtime)
     launch = profiled.bind(scaling(scale_file), {"ADD": 1}, factor=1, n=4)
@@ -306,7 +306,7 @@ def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
 
 def test_a_scope_can_be_profiled_by_itself(runtime, scale_file):
     launch = runtime.bind(scaling(scale_file), {"ADD": 1}, factor=1, n=4)
-    profile = profiling.Profile()
+    profile = queues.Profile()
     with runtime.buffer((4,)) as x:
         runtime.fill(x, 0)
         launch.set(x=x)

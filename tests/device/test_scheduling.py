@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import devices, programs, sources
+from pyvista_vdi.device import devices, programs
 from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import Cancelled
@@ -361,7 +361,7 @@ def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch,
 def test_a_kernel_that_asks_for_its_groups_number_is_launched_whole(runtime, kernels, monkeypatch):
     """The algorithm says so; none of the package's asks that works behind frames."""
     monkeypatch.setattr(turns.Worker, "piece", lambda *_: 64)
-    monkeypatch.setattr(sources, "expand", lambda path: GROUP_NUMBERS)
+    monkeypatch.setattr(programs, "expand", lambda path: GROUP_NUMBERS)
     numbers = ocl.KernelDeclaration("numbers.cl", "group_numbers", x="uint*")
     with runtime.background(), runtime.buffer((640,), np.uint32) as x:
         launch = runtime.bind(numbers, x=x)

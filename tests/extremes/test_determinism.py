@@ -21,11 +21,10 @@ pytestmark = pytest.mark.extremes
 
 SIZE = (45, 37)
 
-#: Modules that launch kernels by groups of :data:`pyvista_vdi.device.work_order.GROUP`.
+#: Modules that launch kernels by groups of :data:`pyvista_vdi.device.constants.GROUP`.
 LAUNCHING = (
-    "volume.variant",
-    "device.work_order",
-    "raycasting.occupancy",
+    "volume.rays",
+    "device.constants",
     "raycasting.prepared",
     "raycasting.choose",
     "volume.classified_volume",

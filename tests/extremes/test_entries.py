@@ -26,7 +26,7 @@ from pyvista_vdi.model import float32_limits as numerics
 from pyvista_vdi.model.cropping import PRESETS
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
-from pyvista_vdi.reference.rays import pixel_ray
+from pyvista_vdi.reference.raycast import pixel_ray
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays
 
@@ -37,15 +37,15 @@ SHINY = Shading(0.2, 0.6, 0.5, 30.0)
 
 def is_far(runtime, volume, camera, window=WINDOW):
     medium = DeviceVolume(runtime, volume, transfer())
-    return medium.forms(camera, window).double_float
+    return medium.rays.forms(camera, window).double_float
 
 
 @pytest.mark.parametrize(
     ("reach", "points"), [(256, 9), (256, 64), (1600, 400), (2048, 600), (2048, 5000)]
 )
 def test_the_border(reach, points):
-    assert not numerics.entries(reach, points)
-    assert numerics.entries(reach + 1, points)
+    assert not numerics.enters_far_away(reach, points)
+    assert numerics.enters_far_away(reach + 1, points)
 
 
 @pytest.mark.every(3)

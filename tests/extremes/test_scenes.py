@@ -33,7 +33,7 @@ from pyvista_vdi import (
     reference,
 )
 from pyvista_vdi.model.float32_limits import scalars_suit_float32
-from pyvista_vdi.volume.light_tables import GRADIENT_SHARE
+from pyvista_vdi.volume.upload import GRADIENT_SHARE
 
 pytestmark = pytest.mark.extremes
 

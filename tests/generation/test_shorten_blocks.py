@@ -7,7 +7,7 @@ import pytest
 from recorded_runs import EXTREMES, as_runs, random_records
 
 from pyvista_vdi import Volume
-from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.generation.kernels import RECORDING, SHORTEN_LISTS, SHORTEN_LISTS_16
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.volume.rays import GridRays

@@ -21,7 +21,7 @@ from pyvista_vdi.measure.paper import (
     find_dataset,
     paper_cell,
 )
-from pyvista_vdi.measure.paper.procedural import PROCEDURAL, make
+from pyvista_vdi.measure.paper.datasets import PROCEDURAL, make
 from pyvista_vdi.measure.paper.report import paper_tables, paper_targets
 from pyvista_vdi.measure.results import Results
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure import provenance
+from pyvista_vdi.measure import clock
 
 TOOL = Path(__file__).parents[2] / "tools" / "figures.py"
 
@@ -32,7 +32,7 @@ def package(tmp_path, monkeypatch):
     for room in rooms:
         room.mkdir(parents=True)
     places = {"pyvista_vdi": rooms[0].parent, "pyvista_vdi.opencl": rooms[1].parent}
-    monkeypatch.setattr(provenance, "files", places.get)
+    monkeypatch.setattr(clock, "files", places.get)
     (rooms[0] / "half.py").write_text(MODULE)
     (rooms[1] / "half.cl").write_text("float half_of(float x) { return x / 2; } // a remark\n")
     return rooms
@@ -50,27 +50,27 @@ def package(tmp_path, monkeypatch):
     ],
 )
 def test_code_counts_and_remarks_do_not(package, file, old, new, counts):
-    before = {"sources": {"room": provenance.room_hash("room")}}
+    before = {"sources": {"room": clock.room_hash("room")}}
     path = package[file.endswith(".cl")] / file
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
-    assert provenance.outdated(before) == (["room"] if counts else [])
+    assert clock.outdated(before) == (["room"] if counts else [])
 
 
 def test_a_room_that_is_gone_has_changed(package):
-    before = {"sources": {"room": provenance.room_hash("room")}}
+    before = {"sources": {"room": clock.room_hash("room")}}
     for folder in package:
         shutil.rmtree(folder)
-    assert provenance.outdated(before) == ["room"]
+    assert clock.outdated(before) == ["room"]
     with pytest.raises(InvalidArgumentError, match="'room' is no folder"):
-        provenance.room_hash("room")
+        clock.room_hash("room")
 
 
 def test_figures_hold_what_every_picture_passes_through():
-    found = provenance.provenance(["raycasting"])
+    found = clock.provenance(["raycasting"])
     assert set(found["sources"]) == {"device", "lib", "model", "raycasting"}
-    assert provenance.outdated(found) == []
+    assert clock.outdated(found) == []
     place = Path(str(files("pyvista_vdi")))
     assert (found["commit"] is None) or (place.parent / ".git").exists()
 
@@ -80,7 +80,7 @@ def test_the_check_names_figures_older_than_what_they_measured(tmp_path):
     specification = importlib.util.spec_from_file_location("figures", TOOL)
     tool = sys.modules["figures"] = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(tool)
-    measured = provenance.provenance(["raycasting"])
+    measured = clock.provenance(["raycasting"])
     (tmp_path / "now.json").write_text(json.dumps({"measured": measured}))
     measured["sources"]["raycasting"] = "0" * 16
     (tmp_path / "old.json").write_text(json.dumps({"measured": measured}))

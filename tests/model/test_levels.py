@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import Camera
-from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.levels import nearest_depth, nearest_list_width, required_level
+from pyvista_vdi.model.volume import Grid
 
 #: A cube from -1 to 1 at four levels: voxels of 2/64, 2/32, 2/16 and 2/8.
 LEVELS = [Grid((n + 1,) * 3, (2 / n,) * 3, (-1.0,) * 3, np.eye(3)) for n in (64, 32, 16, 8)]

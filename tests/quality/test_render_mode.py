@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.drawing_options import checked_draw
+from pyvista_vdi.model.render_options import checked_draw
 from pyvista_vdi.quality import render_mode
 from pyvista_vdi.quality.frame_state import Costs, FrameTook
 

@@ -13,7 +13,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.device import aligned_empty
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
-from pyvista_vdi.raycasting import bands, raycast
+from pyvista_vdi.raycasting import raycast
 
 SIZE = (31, 17)
 
@@ -88,7 +88,7 @@ def test_bands_are_the_picture(vdi, n):
     for camera in views:
         request = FrameRequest(camera, (70, 60))
         expected = raycast.render_vdi(vdi, request)
-        found = bands.render_in_bands(vdi, request, n)
+        found = raycast.render_in_bands(vdi, request, n)
         # A ray on the face between two bands rounds to either: nothing else differs by more than
         # a compositing's rounding
         differ = np.abs(found - expected).max(axis=2) > 1e-5
@@ -98,15 +98,15 @@ def test_bands_are_the_picture(vdi, n):
 
 def test_what_does_not_fit_is_drawn_in_bands(vdi, monkeypatch):
     expected = pvdi.render(vdi, vdi.camera, (70, 60))
-    drawn, most = [], vdi.n_supersegments / 3
+    drawn, most, render_vdi = [], vdi.n_supersegments / 3, raycast.render_vdi
 
     def small(part, request):
         if part.n_supersegments > most:
             raise DeviceMemoryError("the device is too small")
         drawn.append(part)
-        return raycast.render_vdi(part, request)
+        return render_vdi(part, request)
 
-    monkeypatch.setattr(bands, "render_vdi", small)
+    monkeypatch.setattr(raycast, "render_vdi", small)
     found = pvdi.render(vdi, vdi.camera, (70, 60))
     assert len(drawn) >= 4
     assert np.abs(found - expected).mean() < 1e-6

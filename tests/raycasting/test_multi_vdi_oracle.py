@@ -22,9 +22,8 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, Cropping, InvalidArgumentError, reference
 from pyvista_vdi.model.ray_forms import cells_of_points
 from pyvista_vdi.raycasting import multi_vdi
-from pyvista_vdi.raycasting.occupancy import OccupancyGrid
-from pyvista_vdi.raycasting.placed import PlacedVDI
-from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.raycasting.multi_vdi import PlacedVDI
+from pyvista_vdi.raycasting.prepared import OccupancyGrid, prepared_vdi
 
 #: Largest difference per channel from the oracle; see above.
 TOLERANCE = 4e-5

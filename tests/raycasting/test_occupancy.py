@@ -14,8 +14,7 @@ from ray_scenes import generating_view, with_lists
 from pyvista_vdi import Camera, read
 from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
-from pyvista_vdi.raycasting.occupancy import OccupancyGrid
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.prepared import OccupancyGrid, PreparedVDI
 
 VIEWS = ["perspective", "parallel", "long lens", "very long lens", "inside", "any matrix"]
 

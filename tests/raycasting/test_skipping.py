@@ -24,8 +24,7 @@ from ray_scenes import generating_view, random_ends, rebuilt, with_lists
 from pyvista_vdi import VDI, Camera
 from pyvista_vdi.device.constants import SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
-from pyvista_vdi.raycasting.occupancy import OccupancyGrid
-from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.raycasting.prepared import OccupancyGrid, prepared_vdi
 
 #: Lists of the sparse VDIs: many tiles, those of the last column cut off. The middle is a corner of
 #: lists, and lies on a border between two rows of tiles.

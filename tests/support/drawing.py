@@ -5,7 +5,7 @@ from __future__ import annotations
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
-from pyvista_vdi.raycasting import multi_vdi, picking, placed, raycast
+from pyvista_vdi.raycasting import multi_vdi, picking, raycast
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 from pyvista_vdi.volume import render
 
@@ -81,7 +81,7 @@ def draw(prepared, camera, size, image, *, first_hit=None, **options):
 def render_vdis(vdis, camera, size, *, opaque_depth=None, device=None, **options):
     """The picture of several VDIs."""
     request = FrameRequest(camera, size, opaque_depth=opaque_depth, device=device)
-    return multi_vdi.render_vdis(placed.placed_vdis(vdis, camera, **options), request)
+    return multi_vdi.render_vdis(multi_vdi.placed_vdis(vdis, camera, **options), request)
 
 
 def owned_image(members, size, *, margin=0.0, opaque_depth=None, device=None):

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, padded
-from pyvista_vdi.device.declarations import SCALARS
+from pyvista_vdi.device.programs import SCALARS
 from pyvista_vdi.volume.kernels import CLASSIFIED, RAYS
 
 GROUP = 64

@@ -7,7 +7,7 @@ import pytest
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import Launch
-from pyvista_vdi.device.work_order import BLOCK_RAYS, GROUP
+from pyvista_vdi.device.constants import BLOCK_RAYS, GROUP
 from pyvista_vdi.model.standard_cases import filling_camera
 
 WINDOW = (53, 39)  # no multiple of a block's edge

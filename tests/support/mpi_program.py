@@ -24,7 +24,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.extensions.insitu import InSitu
 from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi
-from pyvista_vdi.model.grid import Grid
+from pyvista_vdi.model.volume import Grid
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of

@@ -9,7 +9,7 @@ import strategies
 
 from pyvista_vdi.reference.generate import medium_at, near_depth
 from pyvista_vdi.reference.ranges import ROUNDOFF
-from pyvista_vdi.reference.rays import pixel_ray
+from pyvista_vdi.reference.raycast import pixel_ray
 
 #: Roundings of a grid coordinate: six coefficients and five multiply-adds in the pixel's position
 #: and in depth, and depth's own four (entry, step number, step length, sum).

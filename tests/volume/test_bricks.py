@@ -12,7 +12,7 @@ from runtimes import fresh_runtime, let_lack
 
 from pyvista_vdi import Camera, Light, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.generation.estimate import estimate
+from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.quality.view_error import ViewErrorEstimator

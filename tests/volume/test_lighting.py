@@ -21,7 +21,7 @@ from pyvista_vdi import (
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.reference.generate import medium_at
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.variant import Variant
+from pyvista_vdi.volume.rays import Variant
 
 WINDOW = (7, 6)
 

@@ -11,7 +11,7 @@ from strategies import camera_around
 from pyvista_vdi import TransferFunction, Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.kernels import MACROCELL_DISTANCES
-from pyvista_vdi.volume.variant import Variant
+from pyvista_vdi.volume.rays import Variant
 
 MOST = 16
 

@@ -15,7 +15,7 @@ FILE = "march_functions.cl"
 def marched(call, runtime, volume, camera, window, transfer, step, group):
     """For every pixel of a small window the steps of its ray, their media and what is passed by."""
     medium = DeviceVolume(runtime, volume, transfer, sample_distance=step)
-    march, given = medium.forms(camera, window), medium.medium_arguments(camera)
+    march, given = medium.rays.forms(camera, window), medium.medium_arguments(camera)
     x, y = (i.ravel() for i in np.meshgrid(np.arange(window[0]), np.arange(window[1])))
     offsets = np.column_stack([x + 0.5 - window[0] / 2, y + 0.5 - window[1] / 2])
     n, capacity = len(offsets), int(volume.length / medium.sample_distance) + 4

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from pyvista_vdi.volume.variant import Variant
+from pyvista_vdi.volume.rays import Variant
 
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "sampling_functions.cl"

@@ -28,12 +28,11 @@ from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.model.volume import Grid, Volume
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import Ranges
-from pyvista_vdi.model.grid import Geometry, Grid
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.volume.grid_part import GridPart
+from pyvista_vdi.model.volume import Geometry, Grid
+from pyvista_vdi.volume.rays import GridPart
 
 #: Bytes of a block's own points, unless one chunk has more: large ones exchange less and small ones
 #: need less memory (docs/decisions/large.md).

@@ -34,12 +34,11 @@ from pyvista_vdi.extensions.large.generate import NOWHERE, balanced, vdi_of
 from pyvista_vdi.extensions.large.passes import Piece, Task, light_entering
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import three_wholes
-from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.model.volume import Grid, Volume
 
 #: Tag of the messages that bring neighbours' points; the place of the neighbour is added.
 _HALO_TAG = 7100

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.device.buffers import bytes_text
-from pyvista_vdi.device.constants import RUN_WORDS
-from pyvista_vdi.device.work_order import GROUP, block_items
+from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
+from pyvista_vdi.device.devices import bytes_text
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.extensions.large.blocks import Blocks, Ends, Halo, Indices, Values, ends_of
 from pyvista_vdi.extensions.large.kernels import (
@@ -28,8 +27,7 @@ from pyvista_vdi.extensions.large.kernels import (
     OPTICAL_DEPTHS_16,
 )
 from pyvista_vdi.generation.list_arrays import growing_lists
-from pyvista_vdi.generation.march import March
-from pyvista_vdi.generation.records import Records
+from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
@@ -40,10 +38,8 @@ from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.grid_part import GridPart
 from pyvista_vdi.volume.occlusion_grid import ambient_of_opacities
-from pyvista_vdi.volume.rays import GridRays, checked_sample_distance
-from pyvista_vdi.volume.variant import RayLaunch
+from pyvista_vdi.volume.rays import GridPart, GridRays, RayLaunch, checked_sample_distance
 
 Opacities = tuple[tuple[int, int, int], NDArray[np.float32]]
 
@@ -334,7 +330,7 @@ class _Marched:
     def optical_depths(self) -> NDArray[np.float32]:
         """Return those of the window's rays, (rows, columns)."""
         task, runtime, medium, window = self._task, self._runtime, self._medium, self._window
-        march = medium.forms(task.camera, task.size)
+        march = medium.rays.forms(task.camera, task.size)
         variant = replace(medium.variant, double_float=march.double_float)
         columns, rows = self._size
         voxel = min(medium.grid.spacing) / medium.sample_distance * (1 + 1e-9)

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError
 from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi, mpi, require_same, together
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.grid import Grid
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Grid
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.algorithm import whole_extent
 from pyvista_vdi.vtk_pipeline.filters.convert import (

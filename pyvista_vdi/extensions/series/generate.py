@@ -34,7 +34,7 @@ from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import bytes_of, warn_missed
-from pyvista_vdi.quality.generate_anywhere import generate_anywhere
+from pyvista_vdi.quality.probe import generate_anywhere
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -27,7 +27,7 @@ from pyvista_vdi.model.metrics import check_background
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.quality.view_error import eye_from_centre
-from pyvista_vdi.raycasting.blend import blended
+from pyvista_vdi.raycasting.multi_vdi import blended
 
 SUFFIX = ".cdb"
 _VECTORS = ("position", "focal_point", "view_up")

@@ -26,7 +26,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.tiles import REACH, seen_region
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.raycasting.blend import blended
+from pyvista_vdi.raycasting.multi_vdi import blended
 
 #: Lists and their lengths of a V_O that comes to help, over those of the others.
 FINER = 1.3

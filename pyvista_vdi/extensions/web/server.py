@@ -29,8 +29,8 @@ from pyvista_vdi.extensions.web.served_page import served_page
 from pyvista_vdi.extensions.web.session import Client
 from pyvista_vdi.extensions.web.source import Made, Source
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.drawing_options import checked_bound
 from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.model.render_options import checked_bound
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW

@@ -1,7 +1,5 @@
 """The run: its plan, and what each row of the results holds."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -60,26 +58,12 @@ _MOST_SAMPLES = 64
 class Plan:
     """What a run measures; numbers out of their range raise InvalidArgumentError.
 
-    Parameters
-    ----------
-    profile : str
-        Name of what the rest began as.
-    datasets : tuple of str
-        Names that :func:`pyvista_vdi.measure.paper.find_dataset` knows.
-    sizes, limits, angles : tuple
-        Windows, pixels; longest lists, the paper's N_S; degrees of ``Azimuth`` from V_O.
-    repeats, generations : int
-        Timed frames of each candidate at each view, and timed generations of each VDI.
-    interpolation : {"nearest", "linear"}
-        Of all volume renderers, and of generation.
-    preview : tuple of (str, (int, int), int, float), optional
-        Data set, window, N_S and angle of Table 2; ``None`` leaves it out.
-    queued : int
-        Frames that are also enqueued at once and left on the device; 0 for none.
-    vtk : bool
-        Whether VTK's mappers take part.
-    seed : int
-        Of the procedural volumes.
+    ``profile`` is the name of what the rest began as. ``datasets`` are names that
+    :func:`pyvista_vdi.measure.paper.find_dataset` knows; ``sizes`` windows, pixels; ``limits``
+    longest lists, the paper's N_S; ``angles`` degrees of ``Azimuth`` from V_O. There are so many
+    ``repeats`` of frames of each candidate at each view, and ``generations`` of each VDI.
+    ``preview`` is data set, window, N_S and angle of Table 2; None leaves it out. ``queued`` frames
+    are also enqueued at once and left on the device. ``seed`` is that of the procedural volumes.
     """
 
     profile: str

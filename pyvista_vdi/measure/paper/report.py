@@ -1,7 +1,5 @@
 """The results as Markdown, Table 1, what each VDI takes and Table 2, beside the paper's figures."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,11 +7,21 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from pyvista_vdi.measure import report
 from pyvista_vdi.measure.clock import Times, median, spread
 from pyvista_vdi.measure.harness import CANDIDATES
-from pyvista_vdi.measure.report import across, milliseconds, number, ratio, section, table
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import (
+    ABSENT,
+    METRICS,
+    Results,
+    across,
+    closing,
+    mebibytes,
+    milliseconds,
+    number,
+    ratio,
+    section,
+    table,
+)
 
 #: What a row is of; a VDI has no angle.
 _ROW = ("data set", "window", "N_S", "angle")
@@ -106,7 +114,7 @@ def describe(data: dict[str, Any]) -> str:
         *_table2(data),
         *_refused(data),
         *_datasets(data),
-        *report.closing(data),
+        *closing(data),
     ]
     return "\n".join(lines) + "\n"
 
@@ -120,10 +128,7 @@ def _explanation(plan: dict[str, Any]) -> Iterator[str]:
         "over `render_volume` without skipping; the paper's, over its own volume rendering "
         f"({paper_tables()['device']})."
     )
-    yield (
-        "SSIM, PSNR (dB) and worst pixel (in 1/255) are of the VDI's picture against "
-        f"{report.METRICS}"
-    )
+    yield (f"SSIM, PSNR (dB) and worst pixel (in 1/255) are of the VDI's picture against {METRICS}")
 
 
 def _table1(data: dict[str, Any]) -> Iterator[list[str]]:
@@ -184,8 +189,8 @@ def _vdis(data: dict[str, Any]) -> Iterator[list[str]]:
             f"{row['occupied_lists'] / row['lists']:.0%}",
             f"{row['mean_length']:.1f}",
             str(row["longest_list"]),
-            report.mebibytes(row["bytes_raw"]),
-            report.mebibytes(row["bytes_saved"]),
+            mebibytes(row["bytes_raw"]),
+            mebibytes(row["bytes_saved"]),
             number(median(row["generation_seconds"]), ".2f"),
             number(median(row["generation_seconds"], "device"), ".2f"),
             number(row["save_seconds"], ".2f"),
@@ -281,5 +286,5 @@ def _named(row: dict[str, Any]) -> Iterator[str]:
 def _with_spread(taken: Times | None) -> str:
     middle = None if taken is None else median(taken)
     if taken is None or not middle:
-        return report.ABSENT
+        return ABSENT
     return f"{milliseconds(middle)} ±{spread(taken['clock']):.0%}"

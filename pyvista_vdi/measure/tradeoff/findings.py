@@ -14,8 +14,6 @@ neighbour, until the last is far from the first. So a setting gives way only to 
 *The front* is what stays, found in the order of the sums.
 """
 
-from __future__ import annotations
-
 import math
 import statistics
 from collections.abc import Mapping, Sequence
@@ -60,16 +58,16 @@ class Figure:
             )
 
     @classmethod
-    def of_times(cls, repetitions: Sequence[float], tolerance: float) -> Figure:
+    def of_times(cls, repetitions: Sequence[float], tolerance: float) -> "Figure":
         """Return what repetitions of a positive figure say, as logarithms: ratios count."""
         logs = tuple(math.log(value) for value in repetitions)
         return cls(statistics.median(logs), tolerance, logs)
 
-    def is_worse(self, other: Figure) -> bool:
+    def is_worse(self, other: "Figure") -> bool:
         """Whether it is larger by more than what does not count."""
         return self.value > other.value + other.tolerance
 
-    def is_better(self, other: Figure) -> bool:
+    def is_better(self, other: "Figure") -> bool:
         """Whether it is smaller by more than that, and beyond the noise."""
         if not other.is_worse(self):
             return False

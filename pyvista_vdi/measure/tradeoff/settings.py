@@ -1,7 +1,5 @@
 """What a VDI's user can choose, as points of a sweep: one setting each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -109,7 +107,7 @@ class Setting:
         return {name: value for name, (value, default) in values.items() if value != default}
 
     @property
-    def generated(self) -> Setting:
+    def generated(self) -> "Setting":
         """The same without what can be chosen after generation: settings of one VDI share it."""
         return replace(self, precision="exact", skip_empty=True, preview=1.0)
 

@@ -26,11 +26,9 @@ from pyvista_vdi.measure.harness import (
     run,
     sizes_of,
 )
-from pyvista_vdi.measure.report import save_figure
-from pyvista_vdi.measure.results import Results
+from pyvista_vdi.measure.results import Results, save_figure
 from pyvista_vdi.measure.tradeoff.findings import Point, best, dominated, points_of
-from pyvista_vdi.measure.tradeoff.plot import draw
-from pyvista_vdi.measure.tradeoff.report import describe
+from pyvista_vdi.measure.tradeoff.report import describe, draw
 from pyvista_vdi.measure.tradeoff.settings import Setting, sweep
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import IN_PLACE, Classification
@@ -45,13 +43,9 @@ if TYPE_CHECKING:
 
 
 class Tradeoff:
-    """What :func:`measure_tradeoff` found.
+    """What :func:`measure_tradeoff` found: ``data``, as the JSON holds it, and its ``points``.
 
-    Parameters
-    ----------
-    data : dict
-        What the JSON holds, see ``docs/results_schema.json``; ``points``, an attribute, are the
-        settings that were measured.
+    ``docs/results_schema.json`` describes the JSON; the points are the settings that were measured.
     """
 
     def __init__(self, data: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ from pyvista_vdi.device import aligned_empty
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.blend import blended
+from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Image, Recent, same_depth
 

@@ -15,13 +15,13 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.cropping import checked_opacity_multiplier
-from pyvista_vdi.model.drawing_options import (
+from pyvista_vdi.model.render_options import (
     checked_bound,
     checked_draw,
     checked_policy,
     checked_rate,
+    checked_transmittance_cutoff,
 )
-from pyvista_vdi.model.render_options import checked_transmittance_cutoff
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.frame_state import checked_image_distance
 from pyvista_vdi.raycasting.picking import checked_opacity

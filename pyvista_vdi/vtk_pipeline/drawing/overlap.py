@@ -17,8 +17,7 @@ import numpy as np
 
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.quality.records import replace
-from pyvista_vdi.raycasting.multi_vdi import OwnedImage, owned_image
-from pyvista_vdi.raycasting.placed import PlacedVDI
+from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Image, Matrix, Recent, same_depth
 from pyvista_vdi.vtk_pipeline.interaction.window import now
