@@ -10,7 +10,7 @@ from pyvista.plotting.volume import Volume
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
-from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
+from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods, keep, let_go
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, weakly
 
@@ -83,8 +83,6 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 class PlotterVDIActor(VDIActorMethods, Volume):
     """What ``Plotter.add_vdi`` returns: a ``pyvista.Volume`` with :attr:`vdi`."""
 
-    _held_mapper: Any = None
-
     def __init__(self) -> None:
         super().__init__()
         self._become_vdi_actor()
@@ -106,8 +104,11 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         mapper : PlotterVDIMapper or None
             Of this actor alone.
         """
+        before = self.GetMapper()
         super().SetMapper(mapper)
-        self._held_mapper = mapper
+        let_go(thing=before)
+        if mapper is not None:
+            keep(mapper, self)
 
     def SetProperty(self, prop: Any) -> None:  # noqa: N802
         """Set the volume property, of which the VDI is made anew.

@@ -32,20 +32,30 @@ from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, weakly
 
-#: Drivers, with their mappers held weakly. VTK's garbage collector deletes a mapper under a lock;
-#: Python code that ran then, such as callbacks of weak references to what a driver holds, would
-#: let another thread take the interpreter and wait for that lock. So a driver outlives its mapper
-#: until ordinary code, or Python's garbage collector, finds it here.
-_drivers: dict[int, tuple[Callable[[], Any], Driver]] = {}
+#: What VTK objects need as long as they live, with these held weakly, until ordinary code or
+#: Python's garbage collector finds here that they are gone. Their attributes may not hold it:
+#: VTK's garbage collector deletes a mapper under a lock, and Python code that ran then, such as
+#: callbacks of weak references to what a driver holds, would let another thread take the
+#: interpreter and wait for that lock. And attributes that outlive their object let VTK end the
+#: process (vtkPythonUtil::FindObject lets go of them in the midst of a table that this changes).
+_kept: dict[int, tuple[Callable[[], Any], Any]] = {}
 
 
-def _let_go_of_drivers(*_: Any) -> None:
-    for key, (mapper, _driver) in list(_drivers.items()):
-        if mapper() is None:
-            _drivers.pop(key, None)
+def keep(thing: Any, owner: Any) -> None:
+    """Keep a thing until a VTK object is gone."""
+    let_go()
+    _kept[id(thing)] = weakly(owner), thing
 
 
-gc.callbacks.append(_let_go_of_drivers)
+def let_go(*_: Any, thing: Any = None) -> None:
+    """Let go of what is kept for objects that are gone, and of one thing."""
+    _kept.pop(id(thing), None)
+    for key, (owner, _thing) in list(_kept.items()):
+        if owner() is None:
+            _kept.pop(key, None)
+
+
+gc.callbacks.append(let_go)
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
 COARSEST = 4.0
@@ -72,8 +82,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
         self._driver = Driver()
-        _let_go_of_drivers()
-        _drivers[id(self._driver)] = weakly(self), self._driver
+        keep(self._driver, self)
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)

@@ -26,7 +26,7 @@ _BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressE
 #: Priorities of observers before and after the style's, which is 0.
 _BEFORE, _AFTER = 1.0, -1.0
 
-#: By the windows' addresses; without callbacks, as ``drawing.mapper._drivers`` explains.
+#: By the windows' addresses; without callbacks, as ``drawing.mapper._kept`` explains.
 _windows: dict[str, weakref.ref[Window]] = {}
 
 
