@@ -106,7 +106,7 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         """
         before = self.GetMapper()
         super().SetMapper(mapper)
-        let_go(thing=before)
+        let_go(thing=before, owner=self)  # a copy's may be another's, still
         if mapper is not None:
             keep(mapper, self)
 

@@ -219,7 +219,7 @@ def test_names_need_the_plot_extra(volume, camera, monkeypatch):
     ("given", "message"),
     [
         (np.zeros((4, 4, 4)), r"got a NumPy array of shape \(4, 4, 4\).*pyvista_vdi.Volume\(array"),
-        ("knee.nrrd", "expected a pyvista.ImageData.*got the path 'knee.nrrd'"),
+        ("knee.nrrd", "knee.nrrd does not exist: check the volume's path"),
         (None, "got NoneType"),
     ],
 )

@@ -104,6 +104,7 @@ WRONG = {
     "--sample-distance": NOT_ABOVE_0,
     "--scalars": ("nothing", "''"),
     "--seed": NO_COUNT,
+    "--series": (),  # any text: what a file lacks is said when it is read
     "--size": ("x", "''", "12", "0x3", "-1x3", "12xnan", "99999x3", "3x2x1"),
     "--sizes": ("x", "''", "12", "0x3"),
     "--spacing": (*NO_XYZ, "1 1 0", "1 1 -1"),

@@ -152,7 +152,7 @@ def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch)
     """
     operation, files = OPERATIONS[operation], broken.split()
     expected = operation(runtime)
-    expand = programs.sources.expand
+    expand = programs.expand
 
     def spoiled(path):
         return expand(path) + ("int broken = missing_name;\n" if str(path) in files else "")
@@ -163,7 +163,7 @@ def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch)
     fresh = get_runtime(cl.Context([device]))
     before = state_of(fresh)
     with monkeypatch.context() as patched:
-        patched.setattr(programs.sources, "expand", spoiled)
+        patched.setattr(programs, "expand", spoiled)
         with pytest.raises(
             KernelBuildError, match=f"({'|'.join(files)}) does not compile on"
         ) as caught:

@@ -64,7 +64,9 @@ def test_a_volume_that_cannot_be_read_is_said(tmp_path, capsys, monkeypatch, def
     assert cli.main(command.split()) == 0  # the others would have been measured
     said = capsys.readouterr().err
     assert "left out: empty (InvalidVolumeError: the folder empty holds no slices" in said
-    assert "left out: no (InvalidVolumeError: no.nrrd cannot be read as NRRD: it is empty" in said
+    assert (
+        "left out: no (InvalidVolumeError: no.nrrd cannot be read as a volume: it is empty" in said
+    )
 
 
 def test_the_engine_alone_can_run_it(verb, default_runtime, tmp_path):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import zipfile
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -20,28 +22,37 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     """Return the array of an .npy file, or those of three axes in an .npz file."""
     if file.suffix.lower() == ".raw":
         return [_raw(file)]
-    with file.open("rb") as stream:
-        if stream.read(2) != b"PK":  # no .npz
-            # In place: a header's claims are held against the file's size, objects are refused
-            array = np.lib.format.open_memmap(file, mode="r")
-            return [VolumeInFile(array, _axes(array.shape, array.dtype))]
-    found = []
+    if not zipfile.is_zipfile(file):  # no .npz
+        with file.open("rb") as stream:
+            return [_array_in(lambda: file.open("rb"), stream)]
     with zipfile.ZipFile(file) as archive:
+        found = []
         for member in archive.namelist():
-            name = member.removesuffix(".npy")
             with archive.open(member) as packed:
-                version = np.lib.format.read_magic(packed)
-                read = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
-                shape, _, dtype = read(packed)
-            if len(shape) > 2:
+                name = member.removesuffix(".npy")
+                found.append(_array_in(partial(_opened, file, member), packed, name))
+    return [volume for volume in found if volume is not None]
 
-                def read_one(name: str = name) -> Any:
-                    with np.load(file, allow_pickle=False) as again:
-                        return again[name]
 
-                lazy = Lazy(shape, dtype, read_one)
-                found.append(VolumeInFile(lazy, _axes(shape, dtype), name=name))
-    return found
+def _opened(file: Path, member: str) -> IO[bytes]:
+    return zipfile.ZipFile(file).open(member)
+
+
+def _array_in(
+    opened: Callable[[], IO[bytes]], stream: IO[bytes], name: str = ""
+) -> VolumeInFile | None:
+    """Return an array by its header; ``None`` for one of an .npz file that is no volume."""
+    version = np.lib.format.read_magic(stream)
+    read = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
+    shape, _, dtype = read(stream)
+    if name and len(shape) < 3:
+        return None
+
+    def values() -> Any:
+        with opened() as again:
+            return np.lib.format.read_array(again)  # which refuses objects
+
+    return VolumeInFile(Lazy(shape, dtype, values), _axes(shape, dtype), name=name)
 
 
 def _axes(shape: tuple[int, ...], dtype: np.dtype[Any]) -> str:
@@ -71,4 +82,6 @@ def _raw(file: Path) -> VolumeInFile:
         raise InvalidVolumeError(
             f"{file} has {size} bytes; {nx} x {ny} x {nz} of {found[4].lower()} are {expected}"
         )
-    return VolumeInFile(np.memmap(file, dtype, "r", shape=(nz, ny, nx)))
+    # Read, not mapped: a file that shrinks under a map kills the process
+    values = partial(np.fromfile, file, dtype)
+    return VolumeInFile(Lazy((nz, ny, nx), dtype, lambda: values().reshape(nz, ny, nx)))

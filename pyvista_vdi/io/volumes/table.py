@@ -220,8 +220,8 @@ def format_of(file: Path) -> VolumeFormat:
     named = [f for f in every if name.endswith(f.suffixes)]
     for each in (*named, *every):
         if each.begins(head):
-            if each.name == "HDF5" and named and named[0].name in ("MINC", "NetCDF", "Imaris"):
-                return named[0]  # which are HDF5 inside
+            if each.name == "HDF5" and named and named[0].suffixes != each.suffixes:
+                return named[0]  # MINC, NetCDF, Imaris and VTKHDF are HDF5 inside
             return each
     for suffix, remedy in REFUSED.items():
         if name.endswith(suffix):

@@ -47,11 +47,12 @@ def keep(thing: Any, owner: Any) -> None:
     _kept[id(thing)] = weakly(owner), thing
 
 
-def let_go(*_: Any, thing: Any = None) -> None:
-    """Let go of what is kept for objects that are gone, and of one thing."""
-    _kept.pop(id(thing), None)
-    for key, (owner, _thing) in list(_kept.items()):
-        if owner() is None:
+def let_go(*_: Any, thing: Any = None, owner: Any = None) -> None:
+    """Let go of what is kept for objects that are gone, and of a thing kept for this one."""
+    if id(thing) in _kept and _kept[id(thing)][0]() is owner:
+        _kept.pop(id(thing))
+    while gone := [key for key, (held, _) in list(_kept.items()) if held() is None]:
+        for key in gone:  # a mapper, and then what is kept for it
             _kept.pop(key, None)
 
 
