@@ -562,8 +562,8 @@ def test_a_record_is_replaced_as_by_dataclasses():
     state = FrameState(number=1)
     assert replaced(state, number=2, by_vdi=False) == replace(state, number=2, by_vdi=False)
     assert state == FrameState(number=1)
-    with pytest.raises(TypeError, match="numbr"):
-        replaced(state, numbr=2)
+    with pytest.raises(TypeError, match="none_such"):
+        replaced(state, none_such=2)
 
 
 @pytest.mark.parametrize("name", [*PURE, "render_mode"])

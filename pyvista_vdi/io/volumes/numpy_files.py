@@ -24,7 +24,8 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         return [_raw(file)]
     if not zipfile.is_zipfile(file):  # no .npz
         with file.open("rb") as stream:
-            return [_array_in(lambda: file.open("rb"), stream)]
+            only = _array_in(lambda: file.open("rb"), stream)
+        return [] if only is None else [only]
     with zipfile.ZipFile(file) as archive:
         found = []
         for member in archive.namelist():

@@ -122,7 +122,7 @@ class Box(Algorithm):
             self.image.SetSpacing([_EDGE] * 3)
 
     def end(self) -> None:
-        """Have the bounds again, or none."""
+        """Take the bounds again, or none."""
         if self._far is not None:
             (origin, spacing), self._far = self._far, None
             self.image.SetOrigin(origin)

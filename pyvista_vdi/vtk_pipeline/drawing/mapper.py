@@ -48,7 +48,7 @@ def keep(thing: Any, owner: Any) -> None:
 
 
 def let_go(*_: Any, thing: Any = None, owner: Any = None) -> None:
-    """Let go of what is kept for objects that are gone, and of a thing kept for this one."""
+    """Release what is kept for objects that are gone, and a thing kept for this one."""
     if id(thing) in _kept and _kept[id(thing)][0]() is owner:
         _kept.pop(id(thing))
     while gone := [key for key, (held, _) in list(_kept.items()) if held() is None]:
