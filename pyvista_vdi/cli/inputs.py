@@ -19,6 +19,7 @@ from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, sto
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.io.stores import StoredVolume, is_store
 from pyvista_vdi.io.volumes import list_volumes
+from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
@@ -93,16 +94,7 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
 def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
     """Return a volume with the scalars, the spacing and the origin asked for."""
     taken = as_volume(volume, options.scalars, options.preference or "point")
-    if options.spacing is None and options.origin is None:
-        return taken
-    return Volume(
-        taken.array,
-        taken.spacing if options.spacing is None else options.spacing,
-        taken.origin if options.origin is None else options.origin,
-        taken.direction,
-        name=taken.name,
-        blanked=taken.blanked,
-    )
+    return placed(taken, options.spacing, options.origin)
 
 
 @contextmanager

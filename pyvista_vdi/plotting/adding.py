@@ -132,8 +132,8 @@ def added(
     plotter: Any, volume: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
-    volume = prepared(plotter, volume, asked.array.scalars, asked.resample, asked.mask)
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
+    volume = prepared(plotter, volume, asked.array.scalars, asked.resample, asked.mask)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     made = isinstance(first, VDI) or is_vdi_image(first)

@@ -105,12 +105,14 @@ def resampled(grid: Any, resample: str | Sequence[int]) -> pv.ImageData:
         at = seen["vtkValidPointMask"].astype(bool)
         off = np.abs(seen[name][at].astype(float) - grid.point_data[name][at].astype(float))
         if off.size:
-            text = (
-                "%s resampled to %s points: at its own points %r differs by %.3g at most, %.3g on "
+            _log.info(
+                "%s resampled to %s points: at its own %r differs by %.3g at most, %.3g on average",
+                type(grid).__name__,
+                " x ".join(map(str, numbers)),
+                name,
+                off.max(),
+                off.mean(),
             )
-            text += "the mean"
-            size_of = " x ".join(map(str, numbers))
-            _log.info(text, type(grid).__name__, size_of, name, off.max(), off.mean())
     return found
 
 

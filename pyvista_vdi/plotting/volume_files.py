@@ -6,12 +6,13 @@ import contextlib
 import itertools
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
+from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, with_article
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
@@ -52,6 +53,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         raise InvalidVolumeError(
             f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
         )
+    cube = _head_of_cube(file) if name.endswith(".cube") else None
     data = _read(file)
     while (
         isinstance(data, pv.MultiBlock) and len(blocks := [b for b in data if b is not None]) == 1
@@ -75,8 +77,12 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         )
     if data.n_points == 0 or not data.array_names:
         raise InvalidVolumeError(f"{file} holds no scalars that PyVista could read")
-    if name.endswith(".cube"):
-        _place_cube(file, data)
+    if cube is not None:
+        # Of Gaussian, which VTK's reader leaves at the origin: Bohr in angstrom
+        steps = cube[1:, 1:4]
+        data.spacing = np.linalg.norm(steps, axis=1) * _BOHR
+        data.direction_matrix = (steps / np.linalg.norm(steps, axis=1)[:, None]).T
+        data.origin = cube[0, 1:4] * _BOHR
     active = data.active_scalars_info
     found = []
     for kind, arrays in (("point", data.point_data), ("cell", data.cell_data)):
@@ -102,20 +108,45 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     return found
 
 
-def _place_cube(file: Path, data: pv.ImageData) -> None:
-    """Place a grid of Gaussian's, which VTK's reader leaves at the origin: Bohr in angstrom."""
-    with file.open() as stream:
-        lines = list(itertools.islice(stream, 6))
-    rows = [[float(n) for n in line.split()] for line in lines[2:]]
-    steps = np.array([row[1:4] for row in rows[1:]])
-    data.spacing = np.linalg.norm(steps, axis=1) * _BOHR
-    data.direction_matrix = (steps / np.linalg.norm(steps, axis=1)[:, None]).T
-    data.origin = np.array(rows[0][1:4]) * _BOHR
+def _head_of_cube(file: Path) -> NDArray[np.float64]:
+    """Return the counts and vectors of lines 3 to 6, (4, 4): VTK ends the process on wrong ones.
+
+    It does on atoms of no element, too, and these lines must be there for what the counts say.
+    """
+    why, size = "its lines 3 to 6 must each be a whole number and three others", file.stat().st_size
+    with file.open(errors="replace") as stream:
+        rows = _numbers(itertools.islice(stream, 2, 6), 4)
+        if rows.shape == (4, 4):
+            n_atoms, points = abs(rows[0, 0]), rows[1:, 0]
+            why = (
+                f"its head says {n_atoms:g} atoms and {' x '.join(f'{n:g}' for n in points)} points"
+            )
+            # A line of an atom has ten bytes at least, a value two
+            if (points >= 1).all() and 10 * n_atoms + 2 * points.prod() <= size:
+                atoms = _numbers(itertools.islice(stream, int(n_atoms)), 5)
+                if len(atoms) == n_atoms and (abs(atoms[:, :1] - 59) <= 59).all():
+                    return rows
+    raise InvalidVolumeError(
+        f"{file} cannot be read as a volume: {why}, and it has {size} bytes: is it whole?"
+    )
+
+
+def _numbers(lines: Iterable[str], count: int) -> NDArray[np.float64]:
+    """Return lines of numbers, the first of each a whole one; no lines where they are not that."""
+    try:
+        rows = np.array([[float(n) for n in line.split()[:count]] for line in lines]).reshape(
+            -1, count
+        )
+    except ValueError:
+        return np.empty((0, count))
+    right = np.isfinite(rows).all() and not (rows[:, 0] % 1).any()
+    return rows if right else np.empty((0, count))
 
 
 def _read(file: Path) -> Any:
     """Read by PyVista; what VTK would print is raised."""
-    with _messages() as messages:
+    failure: Exception | None = None
+    with vtk.caught_messages() as window, pv.vtk_verbosity("off"):
         try:
             try:
                 reader = pv.get_reader(file, force_ext=_suffix_of(file))
@@ -126,13 +157,16 @@ def _read(file: Path) -> Any:
         except VDIError:
             raise
         except Exception as error:  # each format has readers, and exceptions, of its own
-            first = (str(error) or type(error).__name__).splitlines()[0]
-            if file.suffix in (".xdmf", ".xmf") and isinstance(error, TypeError):
-                first = 'it says no time: write <Time Value="0"/> into its Grid'
-            raise InvalidVolumeError(
-                f"{file} cannot be read as a volume ({messages[0] if messages else first}): it is "
-                "of a format that is not known here, or damaged: convert it to NRRD, NIfTI or VTI"
-            ) from error
+            failure = error
+    messages = _errors_in(window.GetOutput())
+    if failure is not None:
+        first = (str(failure) or type(failure).__name__).splitlines()[0]
+        if file.suffix in (".xdmf", ".xmf") and isinstance(failure, TypeError):
+            first = 'it says no time: write <Time Value="0"/> into its Grid'
+        raise InvalidVolumeError(
+            f"{file} cannot be read as a volume ({messages[0] if messages else first}): it is "
+            "of a format that is not known here, or damaged: convert it to NRRD, NIfTI or VTI"
+        ) from failure
     if messages:
         raise InvalidVolumeError(
             f"{file} cannot be read as a volume: {messages[0]}: is it whole? Write it anew"
@@ -150,24 +184,11 @@ def _suffix_of(file: Path) -> str | None:
     return _SUFFIXES.get(said[1].decode()) if said else None
 
 
-@contextlib.contextmanager
-def _messages() -> Iterator[list[str]]:
-    """Collect VTK's errors, which it would write to the terminal."""
-    before, window = vtk.vtkOutputWindow.GetInstance(), vtk.vtkStringOutputWindow()
-    messages: list[str] = []
-    vtk.vtkOutputWindow.SetInstance(window)
-    try:
-        with pv.vtk_verbosity("off"):
-            yield messages
-    finally:
-        vtk.vtkOutputWindow.SetInstance(before)
-        said = re.findall(
-            r"(?s)(?:ERROR|(?i:warning)): In [^\n]*\n(.*?)(?=\n\n|\Z)", window.GetOutput()
-        )
-        for one in said:  # a warning that says Error is one
-            text = " ".join(one.split())
-            if "rror" in text or "ERROR" in window.GetOutput():
-                messages.append(text.split("): ", 1)[-1])
+def _errors_in(written: str) -> list[str]:
+    """Return the errors that VTK wrote; a warning that says Error is one."""
+    said = re.findall(r"(?s)(?:ERROR|(?i:warning)): In [^\n]*\n(.*?)(?=\n\n|\Z)", written)
+    texts = [" ".join(one.split()) for one in said]
+    return [t.split("): ", 1)[-1] for t in texts if "rror" in t or "ERROR" in written]
 
 
 def steps_of(path: str | os.PathLike[str]) -> tuple[Sequence[Any], tuple[float, ...]]:

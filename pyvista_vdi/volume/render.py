@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, get_runtime
+from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime
 from pyvista_vdi.device.constants import block_items
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model import ray_forms as rays
@@ -50,6 +50,15 @@ class ClippedRays:
         self.variant = replace(
             medium.variant, double_float=march.double_float, cropped=bool(cropped.forms)
         )
+
+    def uploaded(
+        self, runtime: Runtime, stack: ExitStack
+    ) -> tuple[DeviceBuffer, DeviceBuffer | None]:
+        """Return forms and ends on a device, as long as the stack is open."""
+        forms = stack.enter_context(runtime.upload(self.forms, "rays"))
+        if self.ends is None:
+            return forms, None
+        return forms, stack.enter_context(runtime.upload(self.ends, "opaque depth"))
 
 
 def raycast_volume(
@@ -123,10 +132,7 @@ def draw_medium(
     bricks = medium.bricks
     with ExitStack() as stack:
         keep = stack.enter_context
-        forms = keep(runtime.upload(clipped.forms, "rays"))
-        ends = None
-        if clipped.ends is not None:
-            ends = keep(runtime.upload(clipped.ends, "opaque depth"))
+        forms, ends = clipped.uploaded(runtime, stack)
         medium_arguments = medium.medium_arguments(lit_from or camera)
         draw = partial(
             RayLaunch,
@@ -193,10 +199,7 @@ def project_volume(
     span = high - low or 1.0
     with ExitStack() as stack:
         keep = stack.enter_context
-        forms = keep(runtime.upload(clipped.forms, "rays"))
-        ends = None
-        if clipped.ends is not None:
-            ends = keep(runtime.upload(clipped.ends, "opaque depth"))
+        forms, ends = clipped.uploaded(runtime, stack)
         image = keep(runtime.result((height, width, 4), name="image"))
         launch = RayLaunch(
             runtime,

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -119,6 +121,9 @@ def _pyvista_has_no_choice() -> bool:
 #: The package of the build that this process uses: "vtkmodules" or "cvista".
 BACKEND = _chosen()
 
+#: Of VTK's output window, while what is written to it is caught.
+_window_lock = threading.RLock()
+
 #: Debian's packages of the libraries that VTK's wheels link to and do not bring.
 _PACKAGES = {
     "libGL.so.1": "libgl1",
@@ -153,6 +158,19 @@ def weakly(thing: Any) -> Callable[[], Any]:
     held = (globals().get("vtkWeakReference") or __getattr__("vtkWeakReference"))()
     held.Set(thing)
     return held.Get  # type: ignore[no-any-return]
+
+
+@contextmanager
+def caught_messages() -> Iterator[Any]:
+    """Catch what VTK writes to its output window, which is the process's: one thread at a time."""
+    with _window_lock:
+        window = globals().get("vtkOutputWindow") or __getattr__("vtkOutputWindow")
+        before, messages = window.GetInstance(), __getattr__("vtkStringOutputWindow")()
+        window.SetInstance(messages)
+        try:
+            yield messages
+        finally:
+            window.SetInstance(before)
 
 
 def explain_import_error(error: ImportError) -> MissingDependencyError:

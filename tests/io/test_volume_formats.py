@@ -5,8 +5,10 @@ And what is truncated, damaged, missing or foreign: right, or a sentence, and no
 
 from __future__ import annotations
 
+import logging
 import sys
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -106,6 +108,22 @@ def test_cut_off_or_changed_is_right_or_a_sentence(name, tmp_path, capfd):
         tried(right.path, right.options)
     printed = capfd.readouterr()
     assert (printed.out, printed.err) == ("", "")
+
+
+def test_reading_in_threads_leaves_what_others_log_alone(tmp_path, caplog):
+    """What libraries log is heard in the thread that reads; handlers are as before."""
+    path = made("tiff_ome_channels", tmp_path).path
+    loggers = [logging.getLogger(name) for name in (None, "tifffile")]
+    before = [(each.handlers[:], each.filters[:], each.propagate) for each in loggers]
+    with ThreadPoolExecutor(4) as pool:
+        read = [pool.submit(pvdi.read_volume, path, channel=0) for _ in range(24)]
+        while not all(each.done() for each in read):
+            loggers[1].warning("by another thread")
+            logging.getLogger("of the program").warning("by the program")
+    assert len({each.result().array.tobytes() for each in read}) == 1
+    assert [(each.handlers, each.filters, each.propagate) for each in loggers] == before
+    said = [record.getMessage() for record in caplog.records]
+    assert said.count("by another thread") == said.count("by the program") > 0
 
 
 def test_what_holds_several_is_asked_for_by_name(tmp_path):

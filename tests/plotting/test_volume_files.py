@@ -26,6 +26,7 @@ from scan_files import (
     write_nifti,
 )
 from strategies import random_vdi
+from volume_kinds import KINDS
 from vtk_builds import vtk_or_skip
 
 import pyvista_vdi as pvdi
@@ -487,3 +488,24 @@ def test_an_orientation_without_extent_is_refused(tmp_path):
     path = write_nifti(tmp_path / "a.nii", scan(), SPACING, sform=np.zeros((4, 4)))
     with pytest.raises(InvalidVolumeError, match="states an orientation that cannot be inverted"):
         read(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "now", "message"),
+    [
+        (2, "b1 0 0 0", "lines 3 to 6 must each"),
+        (2, "999999 0 0 0", "its head says 999999 atoms"),
+        (3, "99999 1 0 0", "and it has"),
+        (4, "4 0 nan 0", "lines 3 to 6 must each"),
+        (5, "0 0 0 1", "and it has"),
+        (5, "", "lines 3 to 6 must each"),
+        (6, "166 0 0 0 0", "its head says 1 atoms"),
+    ],
+)
+def test_heads_of_cubes_that_end_vtks_process_are_refused(line, now, message, tmp_path):
+    path = KINDS["cube"](tmp_path).path
+    lines = path.read_text().splitlines()
+    lines[line] = now
+    path.write_text("\n".join(lines))
+    with pytest.raises(InvalidVolumeError, match=message):
+        pvdi.read_volume(path)

@@ -121,7 +121,7 @@ def volume_of(
         for name, value in (("channel", channel), ("time", time)):
             if value is not None:
                 raise InvalidArgumentError(f"{file} has no {name}s: leave {name}= out")
-        return _placed(found.taken(), spacing, origin)
+        return placed(found.taken(), spacing, origin)
     # Index what is not along x, y and z
     chosen = {"t": _chosen(file, "time", found.along("t"), time, ())}
     if found.along("c") > 1 or "s" not in found.axes or channel is None:
@@ -143,8 +143,7 @@ def volume_of(
         )
     index = tuple(slice(None) if a in kept else chosen.get(a, 0) for a in found.axes)
     count = np.prod([found.along(a) for a in kept], dtype=object)
-    if not isinstance(found.array, np.memmap):
-        require_free_memory(count * found.dtype.itemsize, f"the volume in {file}", "take less")
+    require_free_memory(count * found.dtype.itemsize, f"the volume in {file}", "take less")
     values = found.array[index]
     if isinstance(values, np.ndarray):
         order = [kept.index(a) for a in ("z", "y", "x", "s") if a in kept]
@@ -164,7 +163,7 @@ def volume_of(
     name = names[at] if len(names) > at else found.name or "values"
     volume = Volume(values, lengths, found.to_world[:3, 3], steps / lengths, name=name)
     volume.unit = found.unit
-    return _placed(volume, spacing, origin)
+    return placed(volume, spacing, origin)
 
 
 def _chosen(
@@ -188,13 +187,13 @@ def _chosen(
     return int(asked)
 
 
-def _placed(
+def placed(
     volume: Volume, spacing: Sequence[float] | None, origin: Sequence[float] | None
 ) -> Volume:
     """Return a volume with another spacing or origin, where one is given."""
     if spacing is None and origin is None:
         return volume
-    placed = Volume(
+    other = Volume(
         volume.array,
         volume.spacing if spacing is None else spacing,
         volume.origin if origin is None else origin,
@@ -202,8 +201,8 @@ def _placed(
         name=volume.name,
         blanked=volume.blanked,
     )
-    placed.unit = volume.unit
-    return placed
+    other.unit = volume.unit
+    return other
 
 
 def _grey(array: NDArray[Any], file: Path) -> NDArray[Any]:

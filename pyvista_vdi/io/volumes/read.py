@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -22,7 +23,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.io.stores import is_store, open_store
 from pyvista_vdi.io.time_steps import listed_steps, lists_steps
 from pyvista_vdi.io.volumes import pictures, table
-from pyvista_vdi.io.volumes.in_file import VolumeInFile, volume_of
+from pyvista_vdi.io.volumes.in_file import VolumeInFile, placed, volume_of
 from pyvista_vdi.io.volumes.table import VolumeFormat
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.model.whole_file import as_path
@@ -107,8 +108,7 @@ def read_volume(
             channel=0 if channel is None else channel,
             time=0 if time is None else time,
         )
-        placed = spacing is None and origin is None
-        return store if placed else _moved(store, spacing, origin)
+        return placed(store, spacing, origin)
     if (own := _own_reader(file)) is not None:
         return own
     kind = _format(file)
@@ -173,18 +173,6 @@ def needs_pyvista(file: Path) -> bool:
     except (OSError, ValueError):
         name = file.name.lower()
         return not any(name.endswith(each.suffixes) for each in table.FORMATS)
-
-
-def _moved(
-    volume: Volume, spacing: Sequence[float] | None, origin: Sequence[float] | None
-) -> Volume:
-    return Volume(
-        volume.array,
-        volume.spacing if spacing is None else spacing,
-        volume.origin if origin is None else origin,
-        volume.direction,
-        name=volume.name,
-    )
 
 
 def _own_reader(file: Path) -> Volume | None:
@@ -284,13 +272,18 @@ def _one(
 def _listening(file: Path, kind: VolumeFormat) -> Iterator[None]:
     """Turn what a library raises and logs into errors and warnings of ours."""
     said: list[logging.LogRecord] = []
-    ear = logging.Handler(logging.WARNING)
-    ear.emit = said.append  # type: ignore[method-assign, assignment]
-    known = logging.root.manager.loggerDict
-    loggers = [logging.root, *(logging.getLogger(name) for name in _LOGGERS if name in known)]
-    before = [(each.handlers, each.propagate) for each in loggers]
+    mine = threading.get_ident()
+
+    def passes(record: logging.LogRecord) -> bool:
+        if record.thread != mine or record.levelno < logging.WARNING:
+            return True
+        said.append(record)
+        return False
+
+    # A filter of this thread's records: handlers are the process's, and its other threads' as well
+    loggers = [logging.root, *map(logging.getLogger, _LOGGERS)]
     for each in loggers:
-        each.handlers, each.propagate = [ear], False
+        each.addFilter(passes)
     try:
         yield
     except VDIError as error:
@@ -307,8 +300,8 @@ def _listening(file: Path, kind: VolumeFormat) -> Iterator[None]:
             "convert it to NRRD, NIfTI or VTI"
         ) from error
     finally:
-        for each, (handlers, propagate) in zip(loggers, before, strict=True):
-            each.handlers, each.propagate = handlers, propagate
+        for each in loggers:
+            each.removeFilter(passes)
     for record in said:
         if record.levelno >= logging.ERROR:
             raise InvalidVolumeError(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -51,7 +49,7 @@ def write(
     writer.WriteToOutputStringOn()  # VTK does not say why a disk does not take a file
     target = Path(os.path.realpath(path))
     with whole_file(target) as stream:
-        with _messages() as messages:
+        with vtk.caught_messages() as messages:
             written = writer.Write() and not writer.GetErrorCode()
         if not written:
             raise VDIFileError(f"{target} could not be written: {_first_line(messages)}")
@@ -126,7 +124,7 @@ def _image(path: Any) -> Any:
     reader = vtk.vtkXMLImageDataReader()
     reader.ReadFromInputStringOn()
     reader.SetInputString(content)
-    with _messages() as messages:
+    with vtk.caught_messages() as messages:
         reader.Update()
     if messages.GetOutput() or reader.GetErrorCode():
         raise VDIFileError(f"{file} is damaged: {_first_line(messages)}")
@@ -141,17 +139,6 @@ def _codec(file: Path) -> str:
         if f"vtk{vtks}DataCompressor".encode() in head:
             return name
     return "none"
-
-
-@contextmanager
-def _messages() -> Iterator[Any]:
-    """Catch what VTK writes to its output window."""
-    before, messages = vtk.vtkOutputWindow.GetInstance(), vtk.vtkStringOutputWindow()
-    vtk.vtkOutputWindow.SetInstance(messages)
-    try:
-        yield messages
-    finally:
-        vtk.vtkOutputWindow.SetInstance(before)
 
 
 def _first_line(messages: Any) -> str:
