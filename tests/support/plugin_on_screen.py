@@ -6,6 +6,7 @@ timers. It prints what failed and ends with status 1, or prints "all well".
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import threading
@@ -16,11 +17,13 @@ from itertools import pairwise
 
 import numpy as np
 import pyvista as pv
+from PIL import ImageGrab
 from plugin_scenes import LOOKS, soft_ball
 from skimage.io import imread
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor
 from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtk_to_numpy, vtkUnsignedCharArray
 
 LONG = 250.0
@@ -290,7 +293,43 @@ def a_series_plays_by_itself_and_goes_on_after_a_turn():
     plotter.close()
 
 
+def the_screen_shows_every_pixel_and_depth_is_read():
+    """The X server has what VTK drew, which is what it draws with nothing left out."""
+    plotter, actor = scene(regenerate="never")
+    plotter.add_mesh(pv.Sphere(radius=0.4, center=(0, 1.3, 0.9)), color="w", reset_camera=False)
+    plotter.show(interactive_update=True, auto_close=False)
+    window = plotter.render_window
+    left, top = window.GetPosition()
+    width, height = window.GetSize()
+    hand = Hand(plotter)
+    hand.press(100, 100)
+    narrow, shown = Scissor.narrow, {}
+    for scissor in (narrow, lambda *_: None):
+        Scissor.narrow = scissor
+        actor.mapper.driver.release()
+        window.Render()
+        assert actor.status.mode == "preview", actor.status
+        assert window.GetFrameBlitMode() == window.BlitToHardware
+        shown[scissor] = pixels(plotter)
+    Scissor.narrow = narrow
+    np.testing.assert_array_equal(*shown.values())
+    for mode in ("preview", "full"):
+        assert actor.status.mode == mode, actor.status
+        drawn = pixels(plotter).reshape(height, width, 3)[::-1]
+        window.WaitForCompletion()
+        on_screen = np.asarray(ImageGrab.grab(xdisplay=os.environ["DISPLAY"])).astype(int)
+        on_screen = on_screen[top : top + height, left : left + width, :3]
+        np.testing.assert_array_equal(on_screen, drawn)
+        assert np.ptp(drawn) > 100
+        depth = plotter.get_image_depth(fill_value=np.nan)
+        assert np.isfinite(depth).any()
+        assert np.isnan(depth).any()
+        hand.release(100, 100)
+    plotter.close()
+
+
 CASES = (
+    the_screen_shows_every_pixel_and_depth_is_read,
     a_series_plays_by_itself_and_goes_on_after_a_turn,
     every_change_is_shown,
     a_movie_has_every_step,

@@ -30,6 +30,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, consumers, view
 from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Images
 from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, touch
+from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor, shown_box
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
@@ -60,6 +61,7 @@ class Driver(Deciding):
         self._watched = Met()
         self._view: View | None = None  # of the last frame
         self._texture, self._no_depth = ImageTexture(), NoDepth()
+        self._scissor = Scissor()
         self._selection = Selection()
         self._images, self._last = Images(), NOTHING
         self._counted = self._generation = 0  # the VDI that was shown last, and how many were
@@ -156,13 +158,17 @@ class Driver(Deciding):
         if window.GetInteractor() is not None:
             of_window.listen(window.GetInteractor(), Grabbing)
         unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
-        place_image(actor, unit, *viewport(renderer))
+        origin, size = viewport(renderer)
+        place_image(actor, unit, origin, size)
+        if drawn.smooth:
+            self._scissor.narrow(window, shown_box(drawn.image, origin, size))
         self._no_depth.show(window, mapper)
         self.texts.write(renderer, self.status)
         self.follow(window)
 
     def end(self) -> None:
-        """Release the texture unit."""
+        """Release the texture unit, and draw everywhere again."""
+        self._scissor.end()
         if self._astray:
             self.box.Modified()  # it has its bounds again
         self._texture.let_go()

@@ -74,6 +74,7 @@ class Window:
         self._watched = Met()
         self._known: list[Callable[[], Any]] = []
         self._given_up: int | None = None  # the window's multisampling, in a frame without it
+        self._blit: Any = None  # how the window shows its frames, in one that goes another way
         self._started: float | None = None
         self._previewed = False
         self._picture_wanted = False
@@ -224,6 +225,11 @@ class Window:
         if samples and self.pace.dear_samples and self._may_go_without(window, drivers):
             self._given_up, samples = samples, 0
             window.SetMultiSamples(0)
+        # From 9.7 on VTK draws the whole window once more to give the screen a depth buffer, which
+        # nothing reads: window.GetZbufferData reads that of VTK's own framebuffer
+        if _draws_depth_to_screen(window):
+            self._blit = window.GetFrameBlitMode()
+            window.SetFrameBlitModeToBlitToCurrent()
         self.pace = self.pace.began(samples)
 
     def _may_go_without(self, window: Any, drivers: list[Any]) -> bool:
@@ -248,6 +254,9 @@ class Window:
         given_up, self._given_up = self._given_up, None
         if given_up is not None and not window.GetMultiSamples():  # it is as it was left here
             window.SetMultiSamples(given_up)
+        blit, self._blit = self._blit, None
+        if blit is not None and window.GetFrameBlitMode() == window.BlitToCurrent:
+            window.SetFrameBlitMode(blit)
         self._foreground.close()
         self.of_frame.clear()
         started, self._started = self._started, None
@@ -273,3 +282,14 @@ class Window:
             window.Render()
         finally:
             self._picture_wanted = False
+
+
+def _draws_depth_to_screen(window: Any) -> bool:
+    """Whether a window of X11 copies its depth to the screen with each frame, as from VTK 9.7."""
+    return (
+        window.GetClassName() == "vtkXOpenGLRenderWindow"
+        and hasattr(window, "BlitToCurrentWithDepth")
+        and bool(window.GetShowWindow())
+        and window.GetFrameBlitMode() == window.BlitToHardware
+        and not window.GetStereoRender()  # whose two buffers that copy alone fills
+    )
