@@ -28,9 +28,9 @@ def shown_box(image: NDArray[np.float32], origin: tuple[int, int], size: tuple[i
     (int, int, int, int)
         Left, bottom, width and height in framebuffer pixels; zeros where nothing is shown.
     """
-    there = image.any(axis=2)
+    there: NDArray[Any] = np.asarray(image.any(axis=2))
     box = []
-    edges = there.any(axis=0), there.any(axis=1)[::-1]
+    edges = np.any(there, axis=0), np.any(there[::-1], axis=1)
     for at_pixels, pixels, start in zip(edges, size, origin, strict=True):
         (at,) = np.nonzero(at_pixels)
         if len(at) == 0:
