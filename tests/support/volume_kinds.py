@@ -695,6 +695,21 @@ def dicom_segments(folder):
     return Kind(path, expected, unit="mm", options={"channel": "spleen"})
 
 
+@kind
+def dicom_segments_of_bits(folder):
+    """As most are written: eight voxels a byte, the frames without gaps."""
+    pydicom = pytest.importorskip("pydicom")
+    right = dicom_segments(folder)
+    data = pydicom.dcmread(right.path)
+    frames = np.frombuffer(data.PixelData, np.uint8)[: int(data.NumberOfFrames) * 42]
+    packed = np.packbits(frames, bitorder="little").tobytes()
+    data.PixelData = packed + bytes(len(packed) % 2)
+    data.BitsAllocated, data.BitsStored, data.HighBit = 1, 1, 0
+    data["PixelData"].VR = "OB"
+    data.save_as(right.path, enforce_file_format=True)
+    return right
+
+
 # NumPy, HDF5, NetCDF, zarr
 
 
@@ -1074,6 +1089,28 @@ def vtm_of_one(folder):
     return Kind(folder / "a.vtm")
 
 
+def _xdmf(time):
+    def make(folder):
+        pytest.importorskip("pyvista")
+        z_first = [" ".join(map(str, numbers[::-1])) for numbers in (ORIGIN, SPACING)]
+        places = "".join(f'<DataItem Format="XML" Dimensions="3">{n}</DataItem>' for n in z_first)
+        values = " ".join(map(str, scan().ravel()))
+        (folder / "a.xdmf").write_text(
+            '<?xml version="1.0" ?><Xdmf Version="2.0"><Domain><Grid Name="g" GridType="Uniform">'
+            f'{time}<Topology TopologyType="3DCoRectMesh" Dimensions="5 6 7"/>'
+            f'<Geometry GeometryType="ORIGIN_DXDYDZ">{places}</Geometry>'
+            '<Attribute Name="T" AttributeType="Scalar" Center="Node"><DataItem Format="XML" '
+            f'Dimensions="5 6 7" NumberType="Int">{values}</DataItem></Attribute>'
+            "</Grid></Domain></Xdmf>"
+        )
+        return Kind(folder / "a.xdmf")
+
+    return make
+
+
+KINDS["xdmf"], KINDS["xdmf_without_time"] = _xdmf('<Time Value="0"/>'), _xdmf("")
+
+
 @kind
 def cube(folder):
     """Gaussian's: text, z fastest, in Bohr, an atom before the values."""
@@ -1093,20 +1130,54 @@ ITK = [
     "nifti_gz",
     "nifti_scaled",
     "nifti_pair",
+    "nifti_time",
+    "nifti_rgba",
+    "analyze",
+    "minc_2",
     "nrrd",
     "nrrd_gzip",
+    "nrrd_text",
     "nrrd_detached",
     "nrrd_list",
     "nrrd_pattern",
+    "nrrd_axis_mins_of_cells",
+    "nrrd_rgba",
+    "nrrd_channels",
     "meta_image",
     "meta_image_detached",
     "meta_image_compressed",
+    "meta_image_list",
+    "meta_image_pattern",
     "meta_image_long",
     "meta_image_big_endian",
+    "meta_image_times",
+    "meta_image_channels",
+    "meta_image_with_a_header_before_its_data",
     "dicom",
     "dicom_rle",
     "dicom_deflated",
+    "mrc",
+    "vtk",
+    "vtk_text",
 ]
+
+#: What it reads as pages, the top row first, that have no place: which of them. Others it reads
+#: otherwise: a slope of NaN, LUTs, bits, halves, tiles and levels of TIFF, DICOM of several frames,
+#: signed bytes and other orders of axes in MRC.
+ITK_PAGES = dict.fromkeys(
+    [
+        "tiff",
+        "tiff_imagej",
+        "tiff_ome",
+        "tiff_big_deflated",
+        "tiff_lzw",
+        "tiff_with_a_thumbnail",
+        "png_slices",
+    ],
+    slice(None),
+)
+ITK_PAGES |= {"tiff_ome_channels": slice(5, 10), "tiff_times": slice(5, 10)}
+ITK_PAGES |= {"tiff_channels": slice(1, None, 2)}
 
 #: What they need beside the package and its tests.
 NEEDS = {
