@@ -10,6 +10,7 @@ import subprocess
 import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIError,
 )
+from pyvista_vdi.io.volumes import table
 
 
 def made(name, folder):
@@ -57,6 +59,33 @@ def test_values_place_and_unit(name, tmp_path):
         assert np.allclose(value, right.values[z, y, x], rtol=1e-6, equal_nan=True)
     listed = pvdi.list_volumes(right.path)
     assert volume.dimensions in [each.dimensions for each in listed]
+
+
+def kinds_by_format(folder):
+    """The rows of the page's table: what these tests read of each format."""
+    found = {}
+    for name, make in KINDS.items():
+        (folder / name).mkdir()
+        path = make(folder / name).path
+        if path.is_dir():
+            format_ = "zarr" if ".zarr" in path.name else "folders of slices"
+        else:
+            format_ = table.format_of(path).name
+        found.setdefault(format_, []).append(name.replace("_", " "))
+    return [f"| {format_} | {', '.join(names)} |" for format_, names in found.items()]
+
+
+def test_the_page_lists_what_is_tried(tmp_path):
+    for library in (*NEEDS, "h5py", "pydicom", "pyvista", "imagecodecs", "scipy", "tifffile"):
+        pytest.importorskip(library)
+    pytest.importorskip("zarr", minversion="3")
+    page = Path(__file__).parents[2] / "docs" / "files.md"
+    rows = [
+        "| format | kinds of files that the tests make |",
+        "|---|---|",
+        *kinds_by_format(tmp_path),
+    ]
+    assert "\n".join(rows) in page.read_text(encoding="utf-8")
 
 
 def itk_image(right):

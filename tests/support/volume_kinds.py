@@ -92,7 +92,7 @@ def nifti_nan_slope(folder):
 @kind
 def nifti_time(folder):
     path = write_nifti(folder / "a.nii", scan(), SPACING, sform=affine(), nt=3)
-    return Kind(path, unit="mm", options={"time": 2})
+    return Kind(path, unit="mm", options={"time": 2}, flipped=True)
 
 
 @kind
@@ -126,7 +126,7 @@ def nifti_rgba(folder):
     struct.pack_into("<2h", whole, 70, 2304, 32)
     colors = np.random.default_rng(2).integers(0, 255, (*SHAPE, 4), np.uint8)
     (folder / "a.nii").write_bytes(bytes(whole[:352]) + colors.tobytes())
-    return Kind(folder / "a.nii", colors, unit="mm")
+    return Kind(folder / "a.nii", colors, unit="mm", flipped=True)
 
 
 @kind

@@ -11,15 +11,13 @@ from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.io.axes import first_and_step, one_unit, to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
 
-#: What axes are called, by the letters of ours; standard names and units come first.
+#: What axes are called, in standard names or by their dimensions, by the letters of ours.
 _NAMES = {
-    "x": "x lon longitude xc i west_east easting",
-    "y": "y lat latitude yc j south_north northing",
+    "x": "x lon longitude projection_x_coordinate xc i west_east easting",
+    "y": "y lat latitude projection_y_coordinate yc j south_north northing",
     "z": "z lev level depth height altitude plev pressure k bottom_top",
     "t": "t time",
 }
-_STANDARD = {"longitude": "x", "latitude": "y", "projection_x_coordinate": "x"}
-_STANDARD |= {"projection_y_coordinate": "y", "depth": "z", "height": "z", "time": "t"}
 
 
 def volumes_in(file: Path) -> list[VolumeInFile]:
@@ -78,6 +76,5 @@ def _letter(data: Any, dim: str) -> str:
     for part, letter in (("since", "t"), ("degree_e", "x"), ("degree_n", "y")):
         if part in units:
             return letter
-    if (standard := str(said.get("standard_name", ""))) in _STANDARD:
-        return _STANDARD[standard]
-    return next((a for a, names in _NAMES.items() if dim.lower() in names.split()), "?")
+    names = (str(said.get("standard_name", "")), dim.lower())
+    return next((a for name in names for a in "xyzt" if name in _NAMES[a].split()), "?")

@@ -50,14 +50,11 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
             values[:] = nrrd.read_data({**part, "data file": name}, filename=str(file))
         return array
 
-    units = header.get("space units") or [
-        header.get("units", [""] * len(sizes))[i] for i in domains
-    ]
-    units = {str(u) for u in units}
-    array = Lazy(sizes[::-1], dtype, read)
+    of_all = header.get("units", [""] * len(sizes))
+    units = {str(u) for u in header.get("space units") or [of_all[i] for i in domains]}
+    unit, name = units.pop() if len(units) == 1 else "", str(header.get("content", ""))
     place = _to_world(header, domains, sizes)
-    unit = units.pop() if len(units) == 1 else ""
-    return [VolumeInFile(array, axes[::-1], place, str(header.get("content", "")), unit)]
+    return [VolumeInFile(Lazy(sizes[::-1], dtype, read), axes[::-1], place, name, unit)]
 
 
 def _header(file: Path) -> tuple[list[str], list[str]]:
@@ -77,22 +74,18 @@ def _axes(header: Any, sizes: list[int]) -> str:
     """Return the axes' letters, the fastest first."""
     kinds = [str(kind).lower() for kind in header.get("kinds", ["???"] * len(sizes))]
     steps = header.get("space directions")
+    of_space = [kind in _DOMAINS for kind in kinds]
     if steps is not None:
         of_space = [s is not None and bool(np.isfinite(s).all()) for s in steps]
     elif len(sizes) == 3 and not {*kinds} & {*_KINDS}:
         of_space = [True] * 3
-    else:
-        of_space = [kind in _DOMAINS for kind in kinds]
     if sum(of_space) != 3:
         raise InvalidVolumeError(
             f"a volume is a three-dimensional array; got shape {tuple(sizes[::-1])}, and "
             f"kinds ({', '.join(kinds)}) that do not say which are of space: write domain there"
         )
-    letters = iter("xyz")
-    return "".join(
-        next(letters) if space else _KINDS.get(kind, "c")
-        for space, kind in zip(of_space, kinds, strict=True)
-    )
+    letters, named = iter("xyz"), zip(of_space, kinds, strict=True)
+    return "".join(next(letters) if space else _KINDS.get(kind, "c") for space, kind in named)
 
 
 def _to_world(header: Any, domains: list[int], sizes: list[int]) -> NDArray[np.float64]:
