@@ -337,9 +337,9 @@ def _open_hdf5(path: str, inner: str) -> Store:
     except (OSError, ValueError) as error:
         raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
     try:
-        found = arrays_in(file)
-        meant = {} if inner else {name: found[name] for name in meant_of_nexus(file)}
-        return array_store(path, _only(path, inner, meant or found), "HDF5")
+        meant = {name: file[name] for name in meant_of_nexus(file)}
+        found = meant if meant and not inner else {**arrays_in(file), **meant}
+        return array_store(path, _only(path, inner, found), "HDF5")
     except BaseException as error:
         file.close()  # whoever keeps the error would keep it from being written
         if isinstance(error, _BROKEN) and not isinstance(error, VDIError):

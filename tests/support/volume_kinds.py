@@ -770,11 +770,11 @@ def hdf5_ilastik(folder):
     return Kind(folder / "a.h5", to_world=np.eye(4), options={"channel": 1})
 
 
-def _nexus(file, group, values):
+def _nexus(file, group, values, link=None):
     data = file.create_group(group)
     data.attrs["NX_class"], data.attrs["signal"] = "NXdata", "counts"
     data.attrs["axes"] = ["slow", "rows", "columns"]
-    data["counts"] = values
+    data["counts"] = values if link is None else link
     for k, name in enumerate(data.attrs["axes"]):
         data[name] = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
         data[name].attrs["units"] = "um"
@@ -791,6 +791,18 @@ def nexus(folder):
         _nexus(file, "entry/raw", scan() + 9)
         _nexus(file, "entry/reconstruction", scan())
         entry["instrument/detector/data"] = scan() + 8
+    return Kind(folder / "a.nxs", unit="um")
+
+
+@kind
+def nexus_link(folder):
+    """The signal is a link to what lies elsewhere, as beamlines write it."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.nxs", "w") as file:
+        file["entry/instrument/detector/frames"] = scan()
+        file["entry/other"] = scan() + 9
+        link = h5py.SoftLink("/entry/instrument/detector/frames")
+        _nexus(file, "entry/data", None, link)
     return Kind(folder / "a.nxs", unit="um")
 
 

@@ -22,7 +22,8 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         if "DataSet" in data and "DataSetInfo/Image" in data:
             return _imaris(file, data)
         meant = meant_of_nexus(data)
-        return [_described(file, name, each, meant) for name, each in arrays_in(data).items()]
+        found = {**arrays_in(data), **{name: data[name] for name in meant}}
+        return [_described(file, name, each, meant) for name, each in found.items()]
 
 
 def _described(file: Path, name: str, array: Any, meant: list[str]) -> VolumeInFile:
