@@ -73,7 +73,7 @@ def meant_of_nexus(file: Any) -> list[str]:
             return
         signals = [key for key, each in node.items() if "signal" in each.attrs]  # of old NeXus
         signal = _text(node.attrs.get("signal", (*signals, "")[0]))
-        one = node.get(signal) if signal else None  # a link, more often than not
+        one: Any = node.get(signal) if signal else None  # a link, more often than not
         if getattr(one, "ndim", 0) > 2 and one.dtype.kind in "biuf":
             found.append(f"{name}/{signal}".strip("/"))
 

@@ -464,7 +464,10 @@ def _open_zarr(path: str, inner: str) -> Store:
         raise UnsupportedError(f"{path} is a plate of many images: open one, such as {path}::A/1/0")
     if "multiscales" not in described:
         before = f"{inner}/" if inner else ""
-        arrays = {before + name: array for name, array in node.arrays() if array.ndim > 2}
+        try:
+            arrays = {before + name: array for name, array in node.arrays() if array.ndim > 2}
+        except _BROKEN as error:
+            raise InvalidVolumeError(f"{path} cannot be read as zarr: {error}") from error
         return array_store(path, _only(path, "", arrays), "zarr")
     try:
         return _multiscale(path, node, described, "ome" in attributes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import os
 import pickle
 import re
@@ -13,6 +14,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pyvista as pv
@@ -183,6 +185,17 @@ def _read_apart(file: Path) -> Any:
 
     PyVista's reader wants times, which XDMF need not have.
     """
+    for grid in _grids_of_xdmf(file):
+        topology = grid.find("Topology")
+        said = "" if topology is None else topology.get("Dimensions", "")
+        points = [int(n) for n in said.split()] if re.fullmatch(r"(\s*\d+){3}\s*", said) else []
+        of_grid = {math.prod(points), math.prod(n - 1 for n in points)} - {0}
+        for item in grid.findall("Attribute/DataItem[@Dimensions]") if points else ():
+            count = math.prod(int(n) for n in item.get("Dimensions", "").split())
+            if not any(count % n == 0 for n in of_grid):  # VTK leaves the rest as it finds it
+                raise InvalidVolumeError(
+                    f"{file} cannot be read as XDMF: it has {count} values for {said} points"
+                )
     code = (
         "import pickle, sys, pyvista\n"
         "from pyvista_vdi.vtk_pipeline import vtk\n"
@@ -196,11 +209,20 @@ def _read_apart(file: Path) -> Any:
         found = Path(folder, "found")
         command = [sys.executable, "-c", code, str(file.resolve()), str(found)]
         done = subprocess.run(command, capture_output=True, text=True, errors="replace")
-        said = re.search(r"ERR|rror", done.stderr)
-        if done.returncode or said:
-            why = " ".join(done.stderr.split())[-200:] or f"its reader ended by {done.returncode}"
+        if done.returncode or re.search(r"ERR|rror", done.stderr):
+            messages = [*_errors_in(done.stderr), f"its reader ended by {done.returncode}"]
+            why = messages[0][:200]
             raise InvalidVolumeError(f"{file} cannot be read as XDMF ({why}): is it whole?")
         return pickle.loads(found.read_bytes())
+
+
+def _grids_of_xdmf(file: Path) -> Iterable[Any]:
+    try:
+        return ET.parse(file).iter("Grid")
+    except ET.ParseError as error:
+        raise InvalidVolumeError(
+            f"{file} cannot be read as XDMF ({error}): is it whole?"
+        ) from error
 
 
 def _suffix_of(file: Path) -> str | None:
