@@ -20,7 +20,9 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     MissingDependencyError,
     UnsupportedError,
+    VDIError,
 )
+from pyvista_vdi.io.coordinates import attributes_of, meant_of_nexus
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunk_ranges import ZARR_FILES
 from pyvista_vdi.model.chunked import closed, opened
@@ -178,6 +180,7 @@ class StoredVolume(Volume):
             chunked_array(chosen.array, index),
             grid.spacing,
             grid.origin,
+            grid.direction,
             name=store.channels[number] if number < len(store.channels) else "values",
         )
         self.store, self.level, self.why = store, level, why
@@ -334,9 +337,13 @@ def _open_hdf5(path: str, inner: str) -> Store:
     except (OSError, ValueError) as error:
         raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
     try:
-        return array_store(path, _only(path, inner, arrays_in(file)), "HDF5")
-    except BaseException:
+        meant = {name: file[name] for name in meant_of_nexus(file)}
+        found = meant if meant and not inner else {**arrays_in(file), **meant}
+        return array_store(path, _only(path, inner, found), "HDF5")
+    except BaseException as error:
         file.close()  # whoever keeps the error would keep it from being written
+        if isinstance(error, _BROKEN) and not isinstance(error, VDIError):
+            raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
         raise
 
 
@@ -345,7 +352,13 @@ def arrays_in(file: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
 
     def visit(name: str, node: Any) -> None:
-        if hasattr(node, "shape") and node.ndim > 2:
+        # "#" begins what MATLAB keeps for itself
+        if (
+            hasattr(node, "shape")
+            and node.ndim > 2
+            and node.dtype.kind in "biuf"
+            and name[0] != "#"
+        ):
             found[name] = node
 
     file.visititems(visit)
@@ -370,8 +383,8 @@ def array_store(path: str, named: tuple[str, Any], kind: str) -> Store:
     name, array = named
     axes, are_named = _axis_names(array)
     _check_axes(f"{path}::{name}", axes)
-    attributes = dict(array.attrs)
-    unit, spacing = "", attributes.get("spacing")
+    attributes = attributes_of(array, axes)
+    unit, spacing = attributes.get("unit of length", ""), attributes.get("spacing")
     if "element_size_um" in attributes:
         unit, spacing = "micrometer", attributes["element_size_um"]
     try:
@@ -416,7 +429,8 @@ def _grid(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Grid
     along = [np.asarray(n, dtype=np.float64).ravel()[-3:][::-1].tolist() for n in numbers]
     (x, y, z), (at_x, at_y, at_z) = along
     nz, ny, nx = shape
-    return Grid((nx, ny, nz), (x, y, z), (at_x, at_y, at_z), np.eye(3))
+    turn = np.diag(np.sign([x, y, z]))  # coordinates may fall
+    return Grid((nx, ny, nz), (abs(x), abs(y), abs(z)), (at_x, at_y, at_z), turn)
 
 
 def _open_zarr(path: str, inner: str) -> Store:
@@ -450,7 +464,10 @@ def _open_zarr(path: str, inner: str) -> Store:
         raise UnsupportedError(f"{path} is a plate of many images: open one, such as {path}::A/1/0")
     if "multiscales" not in described:
         before = f"{inner}/" if inner else ""
-        arrays = {before + name: array for name, array in node.arrays() if array.ndim > 2}
+        try:
+            arrays = {before + name: array for name, array in node.arrays() if array.ndim > 2}
+        except _BROKEN as error:
+            raise InvalidVolumeError(f"{path} cannot be read as zarr: {error}") from error
         return array_store(path, _only(path, "", arrays), "zarr")
     try:
         return _multiscale(path, node, described, "ome" in attributes)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
+from pyvista_vdi.model.packed_values import packing_of
 
 
 class Geometry:
@@ -272,10 +273,13 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     """Return an array that is read chunk by chunk, as a volume holds it; nothing is read yet.
 
     ``index`` says what is taken of an array of more dimensions, as of a :class:`ChunkedArray`.
+    Values that its attributes pack (``scale_factor``, ``add_offset``, ``_FillValue``) are unpacked.
     """
     if isinstance(array, ChunkedArray):
         return array
-    kind = np.dtype(array.dtype).newbyteorder("=").name
+    packing: Any = packing_of(array)
+    stored = array.dtype if packing is None else packing.dtype
+    kind = np.dtype(stored).newbyteorder("=").name
     long = kind in ("int64", "uint64")
     kind = "float64" if long else _WIDENED.get(kind, kind)
     if kind not in VOXEL_TYPES:
@@ -283,7 +287,7 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     found = ChunkedArray(
         array,
         index=index,
-        checked=_from_long_integers if long else None,
+        checked=_from_long_integers if long else packing,
         dtype=kind,
     )
     _check_planes(found.shape)

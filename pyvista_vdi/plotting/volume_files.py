@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import os
+import pickle
 import re
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pyvista as pv
@@ -39,6 +45,8 @@ _SUFFIXES = {
     "PRectilinearGrid": ".pvtr",
 }
 
+_XDMF = (".xdmf", ".xmf")
+
 #: Angstrom.
 _BOHR = 0.529177249
 
@@ -54,7 +62,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
             f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
         )
     cube = _head_of_cube(file) if name.endswith(".cube") else None
-    data = _read(file)
+    data = _read_apart(file) if name.endswith(_XDMF) else _read(file)
     while (
         isinstance(data, pv.MultiBlock) and len(blocks := [b for b in data if b is not None]) == 1
     ):
@@ -161,8 +169,6 @@ def _read(file: Path) -> Any:
     messages = _errors_in(window.GetOutput())
     if failure is not None:
         first = (str(failure) or type(failure).__name__).splitlines()[0]
-        if file.suffix in (".xdmf", ".xmf") and isinstance(failure, TypeError):
-            first = 'it says no time: write <Time Value="0"/> into its Grid'
         raise InvalidVolumeError(
             f"{file} cannot be read as a volume ({messages[0] if messages else first}): it is "
             "of a format that is not known here, or damaged: convert it to NRRD, NIfTI or VTI"
@@ -172,6 +178,51 @@ def _read(file: Path) -> Any:
             f"{file} cannot be read as a volume: {messages[0]}: is it whole? Write it anew"
         )
     return data
+
+
+def _read_apart(file: Path) -> Any:
+    """Read XDMF in a process of its own, which VTK ends on some that are damaged.
+
+    PyVista's reader wants times, which XDMF need not have.
+    """
+    for grid in _grids_of_xdmf(file):
+        topology = grid.find("Topology")
+        said = "" if topology is None else topology.get("Dimensions", "")
+        points = [int(n) for n in said.split()] if re.fullmatch(r"(\s*\d+){3}\s*", said) else []
+        of_grid = {math.prod(points), math.prod(n - 1 for n in points)} - {0}
+        for item in grid.findall("Attribute/DataItem[@Dimensions]") if points else ():
+            count = math.prod(int(n) for n in item.get("Dimensions", "").split())
+            if not any(count % n == 0 for n in of_grid):  # VTK leaves the rest as it finds it
+                raise InvalidVolumeError(
+                    f"{file} cannot be read as XDMF: it has {count} values for {said} points"
+                )
+    code = (
+        "import pickle, sys, pyvista\n"
+        "from pyvista_vdi.vtk_pipeline import vtk\n"
+        "reader = vtk.vtkXdmfReader()\n"
+        "reader.SetFileName(sys.argv[1])\n"
+        "reader.Update()\n"
+        "with open(sys.argv[2], 'wb') as found:\n"
+        "    pickle.dump(pyvista.wrap(reader.GetOutputDataObject(0)), found)\n"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        found = Path(folder, "found")
+        command = [sys.executable, "-c", code, str(file.resolve()), str(found)]
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace")
+        if done.returncode or re.search(r"ERR|rror", done.stderr):
+            messages = [*_errors_in(done.stderr), f"its reader ended by {done.returncode}"]
+            why = messages[0][:200]
+            raise InvalidVolumeError(f"{file} cannot be read as XDMF ({why}): is it whole?")
+        return pickle.loads(found.read_bytes())
+
+
+def _grids_of_xdmf(file: Path) -> Iterable[Any]:
+    try:
+        return ET.parse(file).iter("Grid")
+    except ET.ParseError as error:
+        raise InvalidVolumeError(
+            f"{file} cannot be read as XDMF ({error}): is it whole?"
+        ) from error
 
 
 def _suffix_of(file: Path) -> str | None:

@@ -59,6 +59,7 @@ _NAMES = {
         "vtkNIFTIImageWriter vtkNrrdReader vtkPNGWriter"
     ),
     "vtkIOXML": "vtkXMLImageDataReader vtkXMLImageDataWriter",
+    "vtkIOXdmf2": "vtkXdmfReader",
     "vtkImagingCore": (
         "vtkExtractVOI vtkImageCast vtkImageChangeInformation vtkImageConstantPad "
         "vtkImageFlip vtkImageMagnify vtkImageMirrorPad vtkImagePermute vtkImageResample "

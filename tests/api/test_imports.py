@@ -71,7 +71,8 @@ LEVELS = (
 LEVELS_WITHIN = {
     "io": (
         ("progress",),
-        ("png", "time_steps", "vdi_file"),
+        ("png", "time_steps", "vdi_file", "axes"),
+        ("coordinates",),
         ("stores",),
         ("volumes",),
         ("files",),

@@ -92,7 +92,7 @@ def nifti_nan_slope(folder):
 @kind
 def nifti_time(folder):
     path = write_nifti(folder / "a.nii", scan(), SPACING, sform=affine(), nt=3)
-    return Kind(path, unit="mm", options={"time": 2})
+    return Kind(path, unit="mm", options={"time": 2}, flipped=True)
 
 
 @kind
@@ -126,7 +126,7 @@ def nifti_rgba(folder):
     struct.pack_into("<2h", whole, 70, 2304, 32)
     colors = np.random.default_rng(2).integers(0, 255, (*SHAPE, 4), np.uint8)
     (folder / "a.nii").write_bytes(bytes(whole[:352]) + colors.tobytes())
-    return Kind(folder / "a.nii", colors, unit="mm")
+    return Kind(folder / "a.nii", colors, unit="mm", flipped=True)
 
 
 @kind
@@ -219,6 +219,80 @@ def afni(folder):
     (folder / "a+orig.HEAD").write_text(head)
     (folder / "a+orig.BRIK").write_bytes(scan().astype("<i2").tobytes())
     return Kind(folder / "a+orig.HEAD", unit="mm")
+
+
+@kind
+def afni_gz(folder):
+    afni(folder)
+    packed = gzip.compress((folder / "a+orig.BRIK").read_bytes())
+    (folder / "a+orig.BRIK").unlink()
+    (folder / "a+orig.BRIK.gz").write_bytes(packed)
+    return Kind(folder / "a+orig.HEAD", unit="mm")
+
+
+def _par_rec(folder, dynamics=1, slope=2.0, intercept=-5.0):
+    """Philips': places are of the middle, in (front-back, foot-head, right-left)."""
+    nz, ny, nx = SHAPE
+    sx, sy, sz = SPACING
+    centre = -np.array([ORIGIN[1], 0, ORIGIN[0]]) + (sy * (ny - 1) / 2, 0, sx * (nx - 1) / 2)
+    centre[1] = ORIGIN[2] + sz * (nz - 1) / 2
+    numbers = " ".join(f"{n:.6f}" for n in centre)
+    lines = [
+        "# === DATA DESCRIPTION FILE ======",
+        "# CLINICAL TRYOUT             Research image export tool     V4.2",
+        "# === GENERAL INFORMATION ========",
+        *(
+            f".    {name}   :   {value}"
+            for name, value in (
+                ("Patient name", "a"),
+                ("Max. number of slices/locations", nz),
+                ("Max. number of dynamics", dynamics),
+                ("Max. number of echoes", 1),
+                ("Max. number of diffusion values", 1),
+                ("Max. number of gradient orients", 1),
+                ("Max. number of cardiac phases", 1),
+                ("Max. number of mixes", 1),
+                ("Number of label types   <0=no ASL>", 0),
+                ("Repetition time [ms]", 10.0),
+                ("Scan resolution  (x, y)", f"{nx} {ny}"),
+                ("FOV (ap,fh,rl) [mm]", f"{sy * ny} {sz * nz} {sx * nx}"),
+                ("Angulation midslice(ap,fh,rl)[degr]", "0 0 0"),
+                ("Off Centre midslice(ap,fh,rl) [mm]", numbers),
+                ("Dynamic scan      <0=no 1=yes> ?", int(dynamics > 1)),
+                ("Diffusion         <0=no 1=yes> ?", 0),
+                ("Phase encoding velocity [cm/sec]", "0 0 0"),
+            )
+        ),
+        "# === IMAGE INFORMATION ==========",
+    ]
+    for time in range(dynamics):
+        for z in range(nz):
+            lines.append(
+                f"{z + 1} 1 {time + 1} 1 0 2 {time * nz + z} 16 100 {nx} {ny} {intercept} {slope} 1"
+                f" 100 200 0 0 0 {numbers} {sz} 0 0 1 0 2 {sx} {sy} 5 0 0 0 1 90 0 0 0 1 0 1 1 0 0"
+                " 0 0 0 1"
+            )
+    (folder / "a.PAR").write_text("\n".join([*lines, "# === END OF DATA DESCRIPTION FILE ==="]))
+    stored = np.concatenate([scan() + 9 * (dynamics - 1 - time) for time in range(dynamics)])
+    (folder / "a.REC").write_bytes(stored.astype("<i2").tobytes())
+    # Columns run to the left, rows to the back: both against NIfTI's frame
+    place = affine(ORIGIN, (0, 0, 0)) @ np.eye(4)
+    place[:3, :3], place[:3, 3] = np.diag(SPACING * (-1, -1, 1)), 0
+    corner = np.array([-centre[2], -centre[0], centre[1]])
+    place[:3, 3] = corner - place[:3, :3] @ ((np.array(SHAPE[::-1]) - 1) / 2)
+    return place
+
+
+@kind
+def par_rec(folder):
+    place = _par_rec(folder)
+    return Kind(folder / "a.PAR", scan() * 2 - 5, place, unit="mm")
+
+
+@kind
+def par_rec_times(folder):
+    place = _par_rec(folder, dynamics=2)
+    return Kind(folder / "a.REC", scan() * 2 - 5, place, unit="mm", options={"time": 1})
 
 
 # NRRD
@@ -621,6 +695,21 @@ def dicom_segments(folder):
     return Kind(path, expected, unit="mm", options={"channel": "spleen"})
 
 
+@kind
+def dicom_segments_of_bits(folder):
+    """As most are written: eight voxels a byte, the frames without gaps."""
+    pydicom = pytest.importorskip("pydicom")
+    right = dicom_segments(folder)
+    data = pydicom.dcmread(right.path)
+    frames = np.frombuffer(data.PixelData, np.uint8)[: int(data.NumberOfFrames) * 42]
+    packed = np.packbits(frames, bitorder="little").tobytes()
+    data.PixelData = packed + bytes(len(packed) % 2)
+    data.BitsAllocated, data.BitsStored, data.HighBit = 1, 1, 0
+    data["PixelData"].VR = "OB"
+    data.save_as(right.path, enforce_file_format=True)
+    return right
+
+
 # NumPy, HDF5, NetCDF, zarr
 
 
@@ -654,12 +743,136 @@ def hdf5(folder):
 
 
 @kind
+def hdf5_checked(folder):
+    """With checksums of the chunks and, by the newest format, of the metadata."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.h5", "w", libver="latest") as file:
+        file.create_dataset("v", data=scan(), chunks=SHAPE, fletcher32=True)
+    return Kind(folder / "a.h5", to_world=np.eye(4))
+
+
+@kind
+def zarr_checked(folder):
+    zarr = pytest.importorskip("zarr", minversion="3")
+    codecs = [zarr.codecs.ZstdCodec(checksum=True), zarr.codecs.Crc32cCodec()]
+    zarr.create_array(
+        str(folder / "a.zarr"), data=scan(), chunks=SHAPE, compressors=codecs, zarr_format=3
+    )
+    return Kind(folder / "a.zarr", to_world=np.eye(4))
+
+
+@kind
 def hdf5_ilastik(folder):
     h5py = pytest.importorskip("h5py")
     with h5py.File(folder / "a.h5", "w") as file:
         data = file.create_dataset("exported_data", data=np.stack([scan() + 9, scan()], axis=-1))
         data.attrs["axistags"] = json.dumps({"axes": [{"key": key} for key in "zyxc"]})
     return Kind(folder / "a.h5", to_world=np.eye(4), options={"channel": 1})
+
+
+def _nexus(file, group, values, link=None):
+    data = file.create_group(group)
+    data.attrs["NX_class"], data.attrs["signal"] = "NXdata", "counts"
+    data.attrs["axes"] = ["slow", "rows", "columns"]
+    data["counts"] = values if link is None else link
+    for k, name in enumerate(data.attrs["axes"]):
+        data[name] = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
+        data[name].attrs["units"] = "um"
+
+
+@kind
+def nexus(folder):
+    """What the file says is its default, among others."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.nxs", "w") as file:
+        entry = file.create_group("entry")
+        file.attrs["default"], entry.attrs["default"] = "entry", "reconstruction"
+        entry.attrs["NX_class"] = "NXentry"
+        _nexus(file, "entry/raw", scan() + 9)
+        _nexus(file, "entry/reconstruction", scan())
+        entry["instrument/detector/data"] = scan() + 8
+    return Kind(folder / "a.nxs", unit="um")
+
+
+@kind
+def nexus_link(folder):
+    """The signal is a link to what lies elsewhere, as beamlines write it."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.nxs", "w") as file:
+        file["entry/instrument/detector/frames"] = scan()
+        file["entry/other"] = scan() + 9
+        link = h5py.SoftLink("/entry/instrument/detector/frames")
+        _nexus(file, "entry/data", None, link)
+    return Kind(folder / "a.nxs", unit="um")
+
+
+@kind
+def nexus_old(folder):
+    """Before 2014: the data say that they are the signal, and their axes."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.h5", "w") as file:
+        group = file.create_group("entry1/data")
+        group.attrs["NX_class"] = b"NXdata"
+        group["counts"] = scan()
+        group["counts"].attrs["signal"], group["counts"].attrs["axes"] = 1, b"slow:rows:columns"
+        for k, name in enumerate(("slow", "rows", "columns")):
+            group[name] = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
+        file["entry1/other"] = scan() + 9
+    return Kind(folder / "a.h5")
+
+
+@kind
+def matlab_7_3(folder):
+    """HDF5 behind 512 bytes of text; the first index of MATLAB's is the last one here."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.mat", "w", userblock_size=512) as file:
+        file["v"] = scan(np.float64)
+        file["v"].attrs["MATLAB_class"] = np.bytes_("double")
+        file["name"] = np.array([[97]], np.uint16)
+        file["#refs#/a"] = scan() + 9  # of a cell array
+        cells = file.create_dataset("cells", (2, 2, 2), h5py.ref_dtype)
+        cells[0, 0, 0] = file["#refs#/a"].ref
+    text = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, HDF5 schema 1.00 .".ljust(124)
+    with (folder / "a.mat").open("r+b") as stream:
+        stream.write(text + b"\x00\x02IM")
+    (folder / "a.mat").rename(folder / "results")
+    return Kind(folder / "results", scan(np.float64), np.eye(4))
+
+
+_PACKED = {"scale_factor": 0.5, "add_offset": 100.0, "_FillValue": 7}
+
+
+def _unpacked():
+    values = scan() * 0.5 + 100
+    return np.where(scan() == 7, np.nan, values)
+
+
+@kind
+def hdf5_packed(folder):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.h5", "w") as file:
+        file["T"] = scan()
+        file["T"].attrs.update(_PACKED)
+        for k, name in enumerate(("lev", "lat", "lon")):
+            file[name] = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
+            file[name].make_scale(name)
+            file["T"].dims[k].attach_scale(file[name])
+    return Kind(folder / "a.h5", _unpacked())
+
+
+@kind
+def zarr_packed(folder):
+    """As xarray writes it, latitudes falling."""
+    zarr = pytest.importorskip("zarr", minversion="3")
+    group = zarr.open_group(str(folder / "a.zarr"), mode="w", zarr_format=2)
+    array = group.create_array("T", data=scan(), chunks=(2, 4, 4), fill_value=7)
+    array.attrs.update(_ARRAY_DIMENSIONS=["lev", "lat", "lon"], scale_factor=0.5, add_offset=100.0)
+    world = affine(SPACING * (1, -1, 1))
+    for k, name in enumerate(("lev", "lat", "lon")):
+        step = world[2 - k, 2 - k]
+        along = group.create_array(name, data=ORIGIN[2 - k] + step * np.arange(SHAPE[k]))
+        along.attrs.update(_ARRAY_DIMENSIONS=[name], units="degrees")
+    return Kind(folder / "a.zarr", _unpacked(), world, "degrees")
 
 
 @kind
@@ -768,6 +981,41 @@ def fits_scaled(folder):
     return Kind(path, scan() * 0.5 + 100, unit="m")
 
 
+@kind
+def fits_checked(folder):
+    """CHECKSUM and DATASUM: sums of 32-bit words in which a carry comes round."""
+    path = _fits(folder, scan(np.float32), -32)
+    whole = path.read_bytes()
+    head, data = whole[:2880], whole[2880:]
+
+    def total(content):
+        number = sum(struct.unpack(f">{len(content) // 4}I", content))
+        while number >> 32:
+            number = (number & 0xFFFFFFFF) + (number >> 32)
+        return number
+
+    def card(name, value):
+        return f"{name:<8}= '{value}'".ljust(80).encode()
+
+    text = head.rstrip()[:-3] + card("DATASUM", total(data))
+    filled = (text + card("CHECKSUM", "0" * 16) + b"END").ljust(2880)
+    rest = 0xFFFFFFFF - total(filled + data)
+    # Each byte of what is missing as four letters, no punctuation, the last letter first
+    columns = []
+    for i in range(4):
+        byte = rest >> (24 - 8 * i) & 255
+        letters = [byte // 4 + (byte % 4 if k == 0 else 0) + 48 for k in range(4)]
+        while any(58 <= n <= 64 or 91 <= n <= 96 for n in letters):
+            for k in (0, 2):
+                if any(58 <= n <= 64 or 91 <= n <= 96 for n in letters[k : k + 2]):
+                    letters[k], letters[k + 1] = letters[k] + 1, letters[k + 1] - 1
+        columns.append(letters)
+    code = "".join(chr(columns[i][k]) for k in range(4) for i in range(4))
+    code = code[-1] + code[:-1]
+    path.write_bytes((text + card("CHECKSUM", code) + b"END").ljust(2880) + data)
+    return Kind(path, unit="m")
+
+
 def _mrc(folder, array, mode, name="a.mrc", order=(1, 2, 3)):
     header = bytearray(1024)
     struct.pack_into("<4i", header, 0, *array.shape[::-1], mode)
@@ -853,6 +1101,28 @@ def vtm_of_one(folder):
     return Kind(folder / "a.vtm")
 
 
+def _xdmf(time):
+    def make(folder):
+        pytest.importorskip("pyvista")
+        z_first = [" ".join(map(str, numbers[::-1])) for numbers in (ORIGIN, SPACING)]
+        places = "".join(f'<DataItem Format="XML" Dimensions="3">{n}</DataItem>' for n in z_first)
+        values = " ".join(map(str, scan().ravel()))
+        (folder / "a.xdmf").write_text(
+            '<?xml version="1.0" ?><Xdmf Version="2.0"><Domain><Grid Name="g" GridType="Uniform">'
+            f'{time}<Topology TopologyType="3DCoRectMesh" Dimensions="5 6 7"/>'
+            f'<Geometry GeometryType="ORIGIN_DXDYDZ">{places}</Geometry>'
+            '<Attribute Name="T" AttributeType="Scalar" Center="Node"><DataItem Format="XML" '
+            f'Dimensions="5 6 7" NumberType="Int">{values}</DataItem></Attribute>'
+            "</Grid></Domain></Xdmf>"
+        )
+        return Kind(folder / "a.xdmf")
+
+    return make
+
+
+KINDS["xdmf"], KINDS["xdmf_without_time"] = _xdmf('<Time Value="0"/>'), _xdmf("")
+
+
 @kind
 def cube(folder):
     """Gaussian's: text, z fastest, in Bohr, an atom before the values."""
@@ -872,24 +1142,58 @@ ITK = [
     "nifti_gz",
     "nifti_scaled",
     "nifti_pair",
+    "nifti_time",
+    "nifti_rgba",
+    "analyze",
+    "minc_2",
     "nrrd",
     "nrrd_gzip",
+    "nrrd_text",
     "nrrd_detached",
     "nrrd_list",
     "nrrd_pattern",
+    "nrrd_axis_mins_of_cells",
+    "nrrd_rgba",
+    "nrrd_channels",
     "meta_image",
     "meta_image_detached",
     "meta_image_compressed",
+    "meta_image_list",
+    "meta_image_pattern",
     "meta_image_long",
     "meta_image_big_endian",
+    "meta_image_times",
+    "meta_image_channels",
+    "meta_image_with_a_header_before_its_data",
     "dicom",
     "dicom_rle",
     "dicom_deflated",
+    "mrc",
+    "vtk",
+    "vtk_text",
 ]
+
+#: What it reads as pages, the top row first, that have no place: which of them. Others it reads
+#: otherwise: a slope of NaN, LUTs, bits, halves, tiles and levels of TIFF, DICOM of several frames,
+#: signed bytes and other orders of axes in MRC.
+ITK_PAGES = dict.fromkeys(
+    [
+        "tiff",
+        "tiff_imagej",
+        "tiff_ome",
+        "tiff_big_deflated",
+        "tiff_lzw",
+        "tiff_with_a_thumbnail",
+        "png_slices",
+    ],
+    slice(None),
+)
+ITK_PAGES |= {"tiff_ome_channels": slice(5, 10), "tiff_times": slice(5, 10)}
+ITK_PAGES |= {"tiff_channels": slice(1, None, 2)}
 
 #: What they need beside the package and its tests.
 NEEDS = {
-    "nibabel": "nifti analyze mgh mgz minc afni",
+    "nibabel": "nifti analyze mgh mgz minc afni par_rec",
     "astropy": "fits",
     "mrcfile": "mrc ccp4",
     "xarray": "netcdf",

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi.io.axes import one_unit, to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
 
 
@@ -30,20 +32,17 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
 
             def read(number: int = number) -> Any:
                 with fits.open(file, memmap=False) as again:
-                    data = again[number].data
+                    hdu = again[number]
+                    if 0 in (hdu.verify_checksum(), hdu.verify_datasum()):
+                        raise InvalidVolumeError("its CHECKSUM is another: a byte was changed")
+                    data = hdu.data
                 return data.astype(data.dtype.newbyteorder("="))
 
-            extra = len(hdu.shape) - 3
             axes = "".join(_letter(header, i + 1) for i in range(3, len(hdu.shape)))[::-1] + "zyx"
-            units = {str(header.get(f"CUNIT{i}", "")).strip() for i in (1, 2, 3)}
-            unit = (
-                units.pop()
-                if len(units) == 1
-                else ", ".join(str(header.get(f"CUNIT{i}", "")).strip() or "1" for i in (1, 2, 3))
-            )
+            unit = one_unit([str(header.get(f"CUNIT{i}", "")).strip() for i in (1, 2, 3)])
             name = hdu.name or f"HDU {number}"
             array = Lazy(hdu.shape, stored, read)
-            found.append(VolumeInFile(array, axes, _to_world(header, extra), name, unit))
+            found.append(VolumeInFile(array, axes, _to_world(header), name, unit))
     return found
 
 
@@ -51,21 +50,20 @@ def _letter(header: Any, axis: int) -> str:
     return "t" if str(header.get(f"CTYPE{axis}", "")).upper().startswith("TIME") else "c"
 
 
-def _to_world(header: Any, extra: int) -> Any:
+def _to_world(header: Any) -> Any:
     """Return the linear part of the world coordinates, in the file's units."""
     from astropy.wcs import WCS
 
-    wcs = WCS(header, naxis=3)
-    place = np.eye(4)
     # WCS gives SI units: keep what the header says
-    step = [float(header.get(f"CDELT{i}", 1.0) or 1.0) for i in (1, 2, 3)]
-    if wcs.wcs.has_cd():
-        matrix = [[header.get(f"CD{i}_{j}", 0.0) for j in (1, 2, 3)] for i in (1, 2, 3)]
-        place[:3, :3] = matrix
-    else:
-        turn = [[header.get(f"PC{i}_{j}", float(i == j)) for j in (1, 2, 3)] for i in (1, 2, 3)]
-        place[:3, :3] = np.diag(step) @ np.array(turn)
-    first = np.array([1.0 - float(header.get(f"CRPIX{i}", 1.0)) for i in (1, 2, 3)])
-    value = np.array([float(header.get(f"CRVAL{i}", 0.0)) for i in (1, 2, 3)])
-    place[:3, 3] = value + place[:3, :3] @ first
-    return place
+    def numbers(name: str, default: float) -> Any:
+        return np.array([float(header.get(f"{name}{i}", default)) for i in (1, 2, 3)])
+
+    cd = WCS(header, naxis=3).wcs.has_cd()
+    name, pairs = "CD" if cd else "PC", [[(i, j) for j in (1, 2, 3)] for i in (1, 2, 3)]
+    steps = np.array(
+        [[header.get(f"{name}{i}_{j}", 0.0 if cd else float(i == j)) for i, j in p] for p in pairs]
+    )
+    if not cd:
+        delta = numbers("CDELT", 1.0)
+        steps = np.where(delta == 0, 1.0, delta)[:, None] * steps
+    return to_world(steps, numbers("CRVAL", 0.0) + steps @ (1 - numbers("CRPIX", 1.0)))

@@ -1,4 +1,4 @@
-"""HDF5: which arrays there are, and Imaris's channels, times and extents, by h5py."""
+"""HDF5: which arrays there are, of NeXus which is meant, and Imaris's levels, by h5py."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.io.axes import to_world
+from pyvista_vdi.io.coordinates import meant_of_nexus
 from pyvista_vdi.io.stores import array_store, arrays_in
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
+from pyvista_vdi.model.packed_values import packing_of
 
 
 def volumes_in(file: Path) -> list[VolumeInFile]:
@@ -18,10 +21,12 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     with h5py.File(file, "r") as data:
         if "DataSet" in data and "DataSetInfo/Image" in data:
             return _imaris(file, data)
-        return [_described(file, name, array) for name, array in arrays_in(data).items()]
+        meant = meant_of_nexus(data)
+        found = {**arrays_in(data), **{name: data[name] for name in meant}}
+        return [_described(file, name, each, meant) for name, each in found.items()]
 
 
-def _described(file: Path, name: str, array: Any) -> VolumeInFile:
+def _described(file: Path, name: str, array: Any, meant: list[str]) -> VolumeInFile:
     import h5py
 
     store = array_store(str(file), (name, array), "HDF5")
@@ -31,8 +36,10 @@ def _described(file: Path, name: str, array: Any) -> VolumeInFile:
         with h5py.File(file, "r") as again:
             return again[name][index]
 
-    lazy = Lazy(array.shape, array.dtype, read, in_parts=True)
-    return VolumeInFile(lazy, axes, store.levels[0].grid.index_to_model, name, store.unit)
+    packing = packing_of(array)
+    lazy = Lazy(array.shape, packing.dtype if packing else array.dtype, read, in_parts=True)
+    place = store.levels[0].grid.index_to_model
+    return VolumeInFile(lazy, axes, place, name, store.unit, meant=name in meant)
 
 
 def _imaris(file: Path, data: Any) -> list[VolumeInFile]:
@@ -51,8 +58,7 @@ def _imaris(file: Path, data: Any) -> list[VolumeInFile]:
         first = channels["Channel 0"]
         size = [int(b"".join(np.atleast_1d(first.attrs[f"ImageSize{a}"]).tolist())) for a in "ZYX"]
         step = (high - low) / size[::-1]
-        place = np.diag([*step, 1.0])
-        place[:3, 3] = low + step / 2
+        place = to_world(step, low + step / 2)
 
         def read(index: Any, level: int = level, size: list[int] = size) -> Any:
             t, c = index[:2]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
 
 #: A cell that the header does not give is of voxels of size 1.
@@ -35,8 +36,6 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     step = np.array([c / n if c > 0 and n > 0 else 1.0 for c, n in zip(cell, counts, strict=True)])
     if not origin.any():  # CCP4's maps have whole voxels in place of an origin
         origin = np.array([int(first[a]) for a in "xyz"]) * step
-    place = np.diag([*step, 1.0])
-    place[:3, 3] = origin
     if several and counts[2] > 0 and shape[0] % counts[2] == 0:
         shape, axes = (shape[0] // counts[2], counts[2], *shape[1:]), "t" + axes
 
@@ -44,4 +43,4 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         with mrcfile.open(file) as mrc:
             return np.array(mrc.data).reshape(shape)
 
-    return [VolumeInFile(Lazy(shape, dtype, read), axes, place, unit=_ANGSTROM)]
+    return [VolumeInFile(Lazy(shape, dtype, read), axes, to_world(step, origin), unit=_ANGSTROM)]

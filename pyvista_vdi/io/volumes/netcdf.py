@@ -8,30 +8,16 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.io.axes import first_and_step, one_unit, to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
 
-#: What axes are called, by the letters of ours; standard names and units come first.
+#: What axes are called, in standard names or by their dimensions, by the letters of ours.
 _NAMES = {
-    "x": ("x", "lon", "longitude", "xc", "i", "west_east", "easting"),
-    "y": ("y", "lat", "latitude", "yc", "j", "south_north", "northing"),
-    "z": (
-        "z",
-        "lev",
-        "level",
-        "depth",
-        "height",
-        "altitude",
-        "plev",
-        "pressure",
-        "k",
-        "bottom_top",
-    ),
-    "t": ("t", "time"),
+    "x": "x lon longitude projection_x_coordinate xc i west_east easting",
+    "y": "y lat latitude projection_y_coordinate yc j south_north northing",
+    "z": "z lev level depth height altitude plev pressure k bottom_top",
+    "t": "t time",
 }
-_STANDARD = {"longitude": "x", "latitude": "y", "projection_x_coordinate": "x"}
-_STANDARD |= {"projection_y_coordinate": "y", "depth": "z", "height": "z", "time": "t"}
-#: By how much of a step coordinates may differ from equal ones.
-_EVEN = 1e-4
 
 
 def volumes_in(file: Path) -> list[VolumeInFile]:
@@ -58,31 +44,25 @@ def _volume(file: Path, data: Any, name: str, variable: Any, options: Any) -> Vo
     for i, letter in zip(rest[::-1], missing[::-1], strict=False):  # the last three are z, y, x
         letters[i] = letter
     axes = "".join("c" if letter == "?" else letter for letter in letters)
-    place, units, uneven = np.eye(4), [], ""
+    along = {a: data.coords.get(variable.dims[axes.index(a)]) for a in "xyz" if a in axes}
+    places, units, uneven = [(0.0, 1.0)] * 3, [""] * 3, None
     for k, axis in enumerate("xyz"):
-        dim = variable.dims[axes.index(axis)] if axis in axes else ""
-        coordinate = data.coords.get(dim)
-        units.append(str(coordinate.attrs.get("units", "")) if coordinate is not None else "")
-        if coordinate is None or coordinate.size < 2:
-            continue
-        places = np.asarray(coordinate.values, dtype=np.float64)
-        step = (places[-1] - places[0]) / (len(places) - 1)
-        place[k, k], place[k, 3] = step, places[0]
-        if not np.abs(np.diff(places) - step).max() <= _EVEN * abs(step):
-            uneven = str(dim)
-    unit = units[0] if len({*units}) == 1 else ", ".join(u or "1" for u in units)
+        if (one := along.get(axis)) is not None:
+            units[k] = str(one.attrs.get("units", ""))
+            try:
+                places[k] = first_and_step(one.values, f"{name!r} lies along {one.name!r}")
+            except UnsupportedError as error:
+                uneven = error
 
     def read(index: Any) -> Any:
-        if uneven:
-            raise UnsupportedError(
-                f"{file} has {name!r} at unequal distances along {uneven!r}: interpolate it, for "
-                f"instance by xarray's data.interp({uneven}=...)"
-            )
+        if uneven is not None:
+            raise uneven
         with xr.open_dataset(file, **options) as again:
             return np.asarray(again[name][index].values)
 
+    origin, step = zip(*places, strict=True)
     array = Lazy(variable.shape, variable.dtype, read, in_parts=True)
-    return VolumeInFile(array, axes, place, name, unit)
+    return VolumeInFile(array, axes, to_world(step, origin), name, one_unit(units))
 
 
 def _letter(data: Any, dim: str) -> str:
@@ -92,12 +72,9 @@ def _letter(data: Any, dim: str) -> str:
     axis = str(said.get("axis", "")).lower()
     if axis and axis in "xyzt":
         return axis
-    units = str(said.get("units", "")).lower()
-    if "since" in units:
-        return "t"
-    for start, letter in (("degrees_e", "x"), ("degree_e", "x"), ("degrees_n", "y")):
-        if units.startswith(start):
+    units = str(said.get("units", "")).lower().replace("degrees", "degree")
+    for part, letter in (("since", "t"), ("degree_e", "x"), ("degree_n", "y")):
+        if part in units:
             return letter
-    if (standard := str(said.get("standard_name", ""))) in _STANDARD:
-        return _STANDARD[standard]
-    return next((a for a, names in _NAMES.items() if dim.lower() in names), "?")
+    names = (str(said.get("standard_name", "")), dim.lower())
+    return next((a for name in names for a in "xyzt" if name in _NAMES[a].split()), "?")

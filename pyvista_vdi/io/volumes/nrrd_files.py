@@ -1,8 +1,8 @@
-"""NRRD, by pynrrd; the lists and patterns of files that it does not know, here."""
+"""NRRD, by pynrrd, which knows no lists and patterns of files: ``pieces.py`` does."""
 
 from __future__ import annotations
 
-import re
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError
+from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
+from pyvista_vdi.io.volumes.pieces import names_of
 from pyvista_vdi.model.host_memory import aligned_empty
 
 #: Letters of what lies along an axis that is no domain; others are channels.
@@ -27,66 +29,44 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     sizes = [int(n) for n in header["sizes"]]
     axes = _axes(header, sizes)
     domains = [i for i, a in enumerate(axes) if a in "xyz"]
-    dtype = np.dtype(nrrd.reader._determine_datatype(header))
-    total = int(np.prod(sizes, dtype=object))
+    dtype = np.dtype(nrrd.reader._determine_datatype(header)).newbyteorder("=")
     if min(sizes) < 1:
         raise InvalidVolumeError(f"its sizes are {sizes}")
 
     def read() -> NDArray[Any]:
         # Where a CPU device reads it without a copy of its own
-        aligned = aligned_empty(tuple(sizes[::-1]), dtype.newbyteorder("="))
-        aligned[...] = stored()
-        return aligned
-
-    def stored() -> NDArray[Any]:
+        array = aligned_empty(tuple(sizes[::-1]), dtype)
         if not pieces:
             with file.open("rb") as stream:
                 whole = nrrd.read_header(stream)
-                return nrrd.read_data(whole, stream, str(file), index_order="C")
-        names = [name for name in pieces if (file.parent / name).is_file()]
-        if len(names) < len(pieces) or total % len(pieces):
-            missing = sorted({*pieces} - {*names})[:1]
+                array[...] = nrrd.read_data(whole, stream, str(file), index_order="C")
+            return array
+        missing = [name for name in pieces if not (file.parent / name).is_file()][:1]
+        if missing or array.size % len(pieces):
             raise InvalidVolumeError(f"of its {len(pieces)} files of data, {missing} are not there")
-        flat = []
-        for name in pieces:
-            part = {**header, "dimension": 1, "sizes": np.array([total // len(pieces)])}
-            part["data file"] = name
-            flat.append(nrrd.read_data(part, filename=str(file)))
-        return np.concatenate(flat).reshape(sizes[::-1])
+        parts = array.reshape(len(pieces), -1)
+        part = {**header, "dimension": 1, "sizes": np.array(parts.shape[1:])}
+        for values, name in zip(parts, pieces, strict=True):
+            values[:] = nrrd.read_data({**part, "data file": name}, filename=str(file))
+        return array
 
-    units = header.get("space units") or [
-        header.get("units", [""] * len(sizes))[i] for i in domains
-    ]
-    units = {str(u) for u in units}
-    array = Lazy(sizes[::-1], dtype.newbyteorder("="), read)
+    of_all = header.get("units", [""] * len(sizes))
+    units = {str(u) for u in header.get("space units") or [of_all[i] for i in domains]}
+    unit, name = units.pop() if len(units) == 1 else "", str(header.get("content", ""))
     place = _to_world(header, domains, sizes)
-    unit = units.pop() if len(units) == 1 else ""
-    return [VolumeInFile(array, axes[::-1], place, str(header.get("content", "")), unit)]
+    return [VolumeInFile(Lazy(sizes[::-1], dtype, read), axes[::-1], place, name, unit)]
 
 
 def _header(file: Path) -> tuple[list[str], list[str]]:
-    """Return the header's lines, and the names of its files of data where these are several."""
-    lines, pieces = [], []
+    """Return the header's lines, and the names of its files of data: none where it holds them."""
     with file.open("rb") as stream:
-        for raw in stream:
-            line = raw.decode("latin-1").rstrip("\r\n")
-            if not line:
-                break
-            lines.append(line)
+        of_header = itertools.takewhile(lambda line: line.strip(b"\r\n"), stream)
+        lines = [line.decode("latin-1").rstrip("\r\n") for line in of_header]
     for i, line in enumerate(lines):
-        key, _, value = line.partition(":")
-        if key.strip().lower() not in ("data file", "datafile"):
-            continue
-        words = value.split()
-        if words[:1] == ["LIST"]:
-            pieces = [name.strip() for name in lines[i + 1 :]]
-            return [*lines[:i], "data file: pieces"], pieces
-        if re.search(r"%\d*d", value) and len(words) >= 4:
-            first, last, step = (int(n) for n in words[1:4])
-            numbers = range(first, last + (1 if step > 0 else -1), step)
-            return [*lines[:i], *lines[i + 1 :], "data file: pieces"], [
-                words[0] % n for n in numbers
-            ]
+        key, _, said = line.partition(":")
+        if key.strip().lower() in ("data file", "datafile"):
+            after = [] if said.split()[:1] == ["LIST"] else lines[i + 1 :]
+            return [*lines[:i], *after, "data file: pieces"], names_of(said, lines[i + 1 :])
     return lines, []
 
 
@@ -94,47 +74,34 @@ def _axes(header: Any, sizes: list[int]) -> str:
     """Return the axes' letters, the fastest first."""
     kinds = [str(kind).lower() for kind in header.get("kinds", ["???"] * len(sizes))]
     steps = header.get("space directions")
+    of_space = [kind in _DOMAINS for kind in kinds]
     if steps is not None:
         of_space = [s is not None and bool(np.isfinite(s).all()) for s in steps]
     elif len(sizes) == 3 and not {*kinds} & {*_KINDS}:
         of_space = [True] * 3
-    else:
-        of_space = [kind in _DOMAINS for kind in kinds]
     if sum(of_space) != 3:
         raise InvalidVolumeError(
             f"a volume is a three-dimensional array; got shape {tuple(sizes[::-1])}, and "
             f"kinds ({', '.join(kinds)}) that do not say which are of space: write domain there"
         )
-    letters = iter("xyz")
-    return "".join(
-        next(letters) if space else _KINDS.get(kind, "c")
-        for space, kind in zip(of_space, kinds, strict=True)
-    )
+    letters, named = iter("xyz"), zip(of_space, kinds, strict=True)
+    return "".join(next(letters) if space else _KINDS.get(kind, "c") for space, kind in named)
 
 
 def _to_world(header: Any, domains: list[int], sizes: list[int]) -> NDArray[np.float64]:
     """Return where points lie: by directions, or by spacings and axis mins, of cells' centres."""
-    place = np.eye(4)
     if (steps := header.get("space directions")) is not None:
-        place[:3, :3] = np.asarray([steps[i] for i in domains], dtype=np.float64).T
-        place[:3, 3] = header.get("space origin", np.zeros(3))
-        return place
+        along = np.asarray([steps[i] for i in domains], dtype=np.float64).T
+        return to_world(along, header.get("space origin", np.zeros(3)))
     centers = header.get("centers", header.get("centerings", ["none"] * len(sizes)))
     centers = centers.split() if isinstance(centers, str) else centers
-    for axis, i in enumerate(domains):
-        n = sizes[i]
-        low, high, step = (
-            float(header[name][i]) if name in header else np.nan
-            for name in ("axis mins", "axis maxs", "spacings")
-        )
-        cell = centers[i] == "cell"
-        if not np.isfinite(step):
-            step = (high - low) / (n if cell else max(1, n - 1))
-        step = step if np.isfinite(step) else 1.0
-        place[axis, axis] = step
-        place[axis, 3] = (low if np.isfinite(low) else 0.0) + (
-            step / 2 if cell and np.isfinite(low) else 0.0
-        )
-    if "space origin" in header:
-        place[:3, 3] = header["space origin"]
-    return place
+    low, high, step = (
+        np.array([float(header[name][i]) if name in header else np.nan for i in domains])
+        for name in ("axis mins", "axis maxs", "spacings")
+    )
+    cell = np.array([centers[i] == "cell" for i in domains])
+    count = np.array([sizes[i] for i in domains])
+    step = np.where(np.isfinite(step), step, (high - low) / np.maximum(1, count - ~cell))
+    step = np.where(np.isfinite(step), step, 1.0)
+    first = np.where(np.isfinite(low), low + cell * step / 2, 0.0)
+    return to_world(step, header.get("space origin", first))

@@ -1,8 +1,7 @@
-"""Arrays of NumPy, .npy and .npz, and raw files whose names say what they hold."""
+"""Arrays of NumPy, .npy and .npz."""
 
 from __future__ import annotations
 
-import re
 import zipfile
 from collections.abc import Callable
 from functools import partial
@@ -13,15 +12,10 @@ import numpy as np
 
 from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
-from pyvista_vdi.model.volume import VOXEL_TYPES
-
-_NAMED = re.compile(r"_(\d+)x(\d+)x(\d+)_([a-z]+\d+)\.raw$", re.IGNORECASE)
 
 
 def volumes_in(file: Path) -> list[VolumeInFile]:
     """Return the array of an .npy file, or those of three axes in an .npz file."""
-    if file.suffix.lower() == ".raw":
-        return [_raw(file)]
     if not zipfile.is_zipfile(file):  # no .npz
         with file.open("rb") as stream:
             only = _array_in(lambda: file.open("rb"), stream)
@@ -66,23 +60,3 @@ def _axes(shape: tuple[int, ...], dtype: np.dtype[Any]) -> str:
         f"it holds an array of shape {shape}, which does not say what its axes are: a volume has "
         "three, (z, y, x): save one of them"
     )
-
-
-def _raw(file: Path) -> VolumeInFile:
-    """Return bare scalars, little-endian, x fastest."""
-    found = _NAMED.search(file.name)
-    if found is None or found[4].lower() not in VOXEL_TYPES:
-        raise InvalidVolumeError(
-            f"{file} does not say what it holds: name raw files like "
-            f"kingsnake_1024x1024x795_uint8.raw, with a type of {', '.join(VOXEL_TYPES)}"
-        )
-    nx, ny, nz = (int(found[i]) for i in (1, 2, 3))
-    dtype = np.dtype(found[4].lower()).newbyteorder("<")
-    expected, size = nx * ny * nz * dtype.itemsize, file.stat().st_size
-    if size != expected or not size:
-        raise InvalidVolumeError(
-            f"{file} has {size} bytes; {nx} x {ny} x {nz} of {found[4].lower()} are {expected}"
-        )
-    # Read, not mapped: a file that shrinks under a map kills the process
-    values = partial(np.fromfile, file, dtype)
-    return VolumeInFile(Lazy((nz, ny, nx), dtype, lambda: values().reshape(nz, ny, nx)))

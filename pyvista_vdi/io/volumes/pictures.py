@@ -1,4 +1,4 @@
-"""Folders of TIFF or PNG pictures, one slice each, and pictures of several frames, by Pillow."""
+"""Folders of TIFF or PNG pictures, one slice each, by tifffile and scikit-image."""
 
 from __future__ import annotations
 
@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidVolumeError, warn_external
 from pyvista_vdi.io.time_steps import natural_key
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
+from pyvista_vdi.io.volumes.table import head_of
 
 #: What pictures of slices are called, kind by kind.
 _KINDS = ((".tif", ".tiff"), (".png",))
-
-#: Where a DICOM file says that it is one.
-_DICOM_AT, _DICOM = 128, b"DICM"
 
 
 def slices_in(folder: Path) -> list[Path]:
@@ -25,7 +23,9 @@ def slices_in(folder: Path) -> list[Path]:
     files = [path for path in folder.iterdir() if path.is_file() and path.name[0] != "."]
     kinds = [[f for f in files if f.suffix.lower() in kind] for kind in _KINDS]
     pictures = [file for kind in kinds for file in kind]
-    if not pictures or any(_is_dicom(file) for file in set(files) - set(pictures)):
+    if not pictures or any(
+        head_of(file)[128:132] == b"DICM" for file in set(files) - set(pictures)
+    ):
         return []
     if all(kinds):
         raise InvalidVolumeError(
@@ -40,8 +40,6 @@ def volumes_in(path: Path) -> list[VolumeInFile]:
 
     Grey values keep their type; RGBA of 8 bits is taken as colours with opacity. Spacing is 1.
     """
-    if not path.is_dir():
-        return _frames(path)
     files = slices_in(path)
     if len(files) < 2:
         raise InvalidVolumeError(f"the folder {path} holds one slice: a volume needs two")
@@ -69,29 +67,6 @@ def volumes_in(path: Path) -> list[VolumeInFile]:
         return array
 
     return [VolumeInFile(Lazy(shape, first.dtype, read), "zyxs"[: len(shape)])]
-
-
-def _frames(file: Path) -> list[VolumeInFile]:
-    """Return the frames of a GIF, PNG or WebP picture."""
-    from PIL import Image, ImageSequence
-
-    with Image.open(file) as picture:
-        count = getattr(picture, "n_frames", 1)
-        if count < 2:
-            raise InvalidVolumeError(
-                f"{file} holds one picture: give the folder that holds all slices of the volume"
-            )
-        frames = [np.asarray(frame.convert("RGBA")) for frame in ImageSequence.Iterator(picture)]
-    array = np.stack(frames)[:, ::-1]
-    return [VolumeInFile(array, "zyxs")]
-
-
-def _is_dicom(file: Path) -> bool:
-    try:
-        with file.open("rb") as stream:
-            return stream.read(_DICOM_AT + len(_DICOM))[_DICOM_AT:] == _DICOM
-    except OSError:
-        return False
 
 
 def _read(file: Path) -> NDArray[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -281,7 +282,9 @@ def _listening(file: Path, kind: VolumeFormat) -> Iterator[None]:
         return False
 
     # A filter of this thread's records: handlers are the process's, and its other threads' as well
-    loggers = [logging.root, *map(logging.getLogger, _LOGGERS)]
+    # astropy cannot be imported where another made its logger
+    names = [name for name in _LOGGERS if name.partition(".")[0] in sys.modules]
+    loggers = [logging.root, *map(logging.getLogger, names)]
     for each in loggers:
         each.addFilter(passes)
     try:

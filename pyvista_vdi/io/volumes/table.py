@@ -157,11 +157,11 @@ FORMATS = (
         ),
         "NumPy",
     ),
-    VolumeFormat("raw", (".raw",), "numpy_files", _never, "NumPy"),
+    VolumeFormat("raw", (".raw",), "raw", _never, "NumPy"),
     VolumeFormat(
         "pictures of several frames",
         (".gif", ".png", ".webp"),
-        "pictures",
+        "frames",
         _starts(b"GIF8", b"\x89PNG", b"RIFF"),
         "Pillow",
     ),

@@ -1,0 +1,48 @@
+"""Where points lie: maps to the world, and coordinates along axes, for every format alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.errors import UnsupportedError
+
+#: By how much of a step coordinates may differ from equal ones.
+_EVEN = 1e-4
+
+
+def to_world(steps: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[np.float64]:
+    """Return the map from point index (x, y, z) to the world, (4, 4).
+
+    ``steps``: from point to point, three lengths or, in three columns, vectors. ``origin``: where
+    the first point lies.
+    """
+    place, along = np.eye(4), np.asarray(steps, dtype=np.float64)
+    place[:3, :3] = np.diag(along) if along.ndim == 1 else along
+    place[:3, 3] = origin
+    return place
+
+
+def first_and_step(coordinates: Any, what: str) -> tuple[float, float]:
+    """Return the first of an axis' coordinates and the step between them.
+
+    Raises UnsupportedError where they are not equally far apart.
+    """
+    places = np.asarray(coordinates, dtype=np.float64)
+    if len(places) < 2:
+        return float(places[0]) if len(places) else 0.0, 1.0
+    step = (places[-1] - places[0]) / (len(places) - 1)
+    if not np.abs(np.diff(places) - step).max() <= _EVEN * abs(step):
+        raise UnsupportedError(
+            f"{what} at unequal distances ({places[0]:g}, {places[1]:g} ... {places[-1]:g}): "
+            "interpolate it, for instance by xarray's data.interp"
+        )
+    return float(places[0]), float(step)
+
+
+def one_unit(units: Sequence[str]) -> str:
+    """Return the unit of lengths along x, y and z: of each, where they differ."""
+    return units[0] if len({*units}) == 1 else ", ".join(unit or "1" for unit in units)
