@@ -11,7 +11,13 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import QUALITIES, GenerationOptions, QualityTarget, declared
+from pyvista_vdi.model.options import (
+    QUALITIES,
+    Deferral,
+    GenerationOptions,
+    QualityTarget,
+    declared,
+)
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -24,7 +30,7 @@ Options = argparse._ActionsContainer
 
 #: The options of the public functions: defaults, choices and texts are theirs.
 _DECLARED = declared(
-    Classification, DrawingOptions, GenerationOptions, QualityTarget, RenderOptions
+    Classification, Deferral, DrawingOptions, GenerationOptions, QualityTarget, RenderOptions
 )
 
 #: What the step along a ray is where none is given.
@@ -347,6 +353,16 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     if tables:
         text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
         option(group, "--transfer-function", text, "FILE")
+
+
+def deferral(parser: argparse.ArgumentParser) -> None:
+    """Add what is kept of the scalars, where they are classified afterwards."""
+    group = parser.add_argument_group(
+        "classified afterwards", "Values are kept: convert, render and view then take the look."
+    )
+    known(group, "classification", default=..., choices=_DECLARED["classification"].choices)
+    known(group, "value_range", ("LOW", "HIGH"), parse_number, nargs=2)
+    known(group, "importance", "A,B,...", parse_numbers)
 
 
 def occlusion(parser: argparse.ArgumentParser) -> None:

@@ -23,6 +23,7 @@ from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import declared
@@ -293,7 +294,17 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
-def say_vdi(options: argparse.Namespace, vdi: VDI, more: str = "") -> None:
+def with_look(options: argparse.Namespace, found: Any, file: str) -> Any:
+    """Return what was read, classified as the options ask where it keeps values; others refuse."""
+    if isinstance(found, DeferredVDI):
+        look = classification(options)
+        return found.classified(**look) if look else found
+    why = f"{printable(file)} has its look: "
+    refuse(options, ("tf", "transfer_function", *CLASSIFICATION), "VDIs that keep values", why)
+    return found
+
+
+def say_vdi(options: argparse.Namespace, vdi: VDI | DeferredVDI, more: str = "") -> None:
     """Print what was written to ``--output``."""
     width, height = vdi.window_size
     print(
