@@ -337,6 +337,24 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     group = parser.add_argument_group(
         "classification", "Names, defaults and meaning are those of PyVista's add_volume."
     )
+    _look(group)
+    switch(group, "--shade", _DECLARED["shade"].what, default=None)
+    array(group)
+    known(group, "interpolation", choices=_DECLARED["interpolation"].choices)
+    for name in ("ambient", "diffuse", "specular", "specular_power"):
+        known(group, name, "X", parse_number)
+    if tables:
+        _table(group)
+
+
+def look_of_values(parser: argparse.ArgumentParser) -> None:
+    """Add how values look that were kept to be classified afterwards."""
+    group = parser.add_argument_group("classification", "Of VDIs that keep values.")
+    _look(group)
+    _table(group)
+
+
+def _look(group: Options) -> None:
     standard = "a standard transfer function; --cmap and --opacity change parts of it"
     option(group, "--tf", standard, choices=tuple(TRANSFER_FUNCTIONS))
     known(group, "cmap", "NAME")
@@ -344,15 +362,13 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     known(group, "clim", ("LOW", "HIGH"), parse_number, nargs=2)
     known(group, "n_colors", "N", parse_whole)
     known(group, "opacity_unit_distance", "LENGTH", parse_number)
-    for name in ("flip_scalars", "log_scale", "shade"):
+    for name in ("flip_scalars", "log_scale"):
         switch(group, f"--{name.replace('_', '-')}", _DECLARED[name].what, default=None)
-    array(group)
-    known(group, "interpolation", choices=_DECLARED["interpolation"].choices)
-    for name in ("ambient", "diffuse", "specular", "specular_power"):
-        known(group, name, "X", parse_number)
-    if tables:
-        text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
-        option(group, "--transfer-function", text, "FILE")
+
+
+def _table(group: Options) -> None:
+    text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
+    option(group, "--transfer-function", text, "FILE")
 
 
 def deferral(parser: argparse.ArgumentParser) -> None:

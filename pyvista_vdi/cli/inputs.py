@@ -162,7 +162,7 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments that say how the volume looks; which array it is, the volume says."""
     given = dict(TRANSFER_FUNCTIONS[options.tf]) if options.tf else {}
     for name in CLASSIFICATION:
-        if getattr(options, name) is not None:
+        if getattr(options, name, None) is not None:
             given[name] = getattr(options, name)
     path = getattr(options, "transfer_function", None)
     if path is not None:
@@ -299,8 +299,14 @@ def with_look(options: argparse.Namespace, found: Any, file: str) -> Any:
     if isinstance(found, DeferredVDI):
         look = classification(options)
         return found.classified(**look) if look else found
-    why = f"{printable(file)} has its look: "
-    refuse(options, ("tf", "transfer_function", *CLASSIFICATION), "VDIs that keep values", why)
+    for name in ("tf", "transfer_function", *CLASSIFICATION):
+        value = getattr(options, name, None)
+        if value is not None:
+            text = " ".join(map(str, value)) if isinstance(value, list | tuple) else value
+            raise UnsupportedError(
+                f"{printable(file)} has its look, and --{name.replace('_', '-')} {text} is for "
+                "VDIs that keep values: leave it out"
+            )
     return found
 
 

@@ -70,8 +70,7 @@ def generate_deferred(
             "ambient occlusion follows from opacities, which a deferred VDI does not have: leave "
             "ambient_occlusion out, or classification='deferred'"
         )
-    least, largest = volume.finite_range()
-    asked = (least, largest) if deferral.value_range is None else deferral.value_range
+    asked = volume.finite_range() if deferral.value_range is None else deferral.value_range
     low, high = as_range(asked)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidArgumentError(
@@ -96,7 +95,8 @@ def generate_deferred(
     metadata: dict[str, Any] = dict(made.metadata)
     for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
         metadata.pop(name)
-    metadata["volume"] = {**metadata["volume"], "scalar_range": [least, largest]}
+    if volume.chunks is None or volume.chunks.ranges() is not None:  # else nothing is read for it
+        metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
     return DeferredVDI(
         made.camera,
         made.window_size,

@@ -324,8 +324,8 @@ class Deferral(Options):
         for name in ("value_range", "importance"):
             if getattr(self, name) is not None and self.classification != "deferred":
                 raise InvalidArgumentError(
-                    f"{name} says what is kept to be classified afterwards: give "
-                    f"classification='deferred' as well, or leave {name} out"
+                    f"{name}={getattr(self, name)!r} says what is kept to be classified "
+                    f"afterwards: give classification='deferred' as well, or leave {name} out"
                 )
 
 
