@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.generation.classified_values import classify_on_device
 from pyvista_vdi.model.classification import Classification, refuse_unknown
-from pyvista_vdi.model.deferred import DeferredVDI, classify
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.vdi import VDI
 
@@ -20,8 +21,8 @@ _SAID_BEFORE = ("scalars", "preference", "interpolation")
 
 def classified(deferred: DeferredVDI, look: Mapping[str, Any]) -> VDI:
     """Return what :meth:`DeferredVDI.classified` does."""
-    refuse_unknown(look, "classified", tuple(declared(Classification)))
-    asked = Classification(**look)
+    refuse_unknown(look, "classified", (*declared(Classification), "device"))
+    asked = Classification(**{name: value for name, value in look.items() if name != "device"})
     asked.require_composite()
     for name in _SAID_BEFORE:
         if name in asked.given:
@@ -32,4 +33,4 @@ def classified(deferred: DeferredVDI, look: Mapping[str, Any]) -> VDI:
     # The range of the values stands for those of the volume
     values: Any = SimpleNamespace(array=np.array(deferred.value_range), rgba=False)
     table = asked.transfer_function_of(values)
-    return classify(deferred, table)
+    return classify_on_device(deferred, table, look.get("device"))

@@ -122,7 +122,7 @@ def render(
     """
     view = Camera.from_any(camera)
     if isinstance(vdi, DeferredVDI) and look:
-        vdi = vdi.classified(**look)
+        vdi = vdi.classified(**look, device=device)
     else:
         refuse_keywords(look, render)
     how = (clipping_planes, cropping, opacity_multiplier, skip_empty)

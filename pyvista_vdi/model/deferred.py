@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     import os
 
 Floats = NDArray[np.float64]
+#: Straight colours and optical depths of supersegments.
+Media = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 #: Cells of the tables that a transfer function is integrated in, over the range of values: a window
 #: of a fiftieth of it has 327.
@@ -230,6 +233,12 @@ class DeferredVDI:
         """Share of the length that holds values of the range, float32 (n,)."""
         return self._lists.color[:, 2]
 
+    @cached_property
+    def steps(self) -> NDArray[np.float32]:
+        """Steps of the march through what each supersegment holds, float32 (n,)."""
+        length = lengths_of(self._lists) / self.sample_distance
+        return (length * self.share).astype(np.float32)
+
     @property
     def values(self) -> Floats:
         """The means as scalars of the volume, float64 (n,)."""
@@ -319,7 +328,8 @@ class DeferredVDI:
             Those of :func:`pyvista_vdi.generate`, with its names and defaults: ``cmap``,
             ``opacity``, ``clim`` (the range of values by default), ``n_colors``,
             ``flip_scalars``, ``log_scale``, ``opacity_unit_distance``; or ``volume_property`` or
-            ``transfer_function`` in place of them.
+            ``transfer_function`` in place of them. And ``device``, where it is computed: by
+            default as for :func:`pyvista_vdi.render`, and on the host where there is none.
 
         Returns
         -------
@@ -407,13 +417,17 @@ def lengths_of(lists: VDI) -> Floats:
     return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
 
 
-def classify(deferred: DeferredVDI, transfer_function: TransferFunction) -> VDI:
+def classify(
+    deferred: DeferredVDI,
+    transfer_function: TransferFunction,
+    media: Callable[[DeferredVDI, Floats], Media] | None = None,
+) -> VDI:
     """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
     values from mean - sqrt(3) spread to mean + sqrt(3) spread, within the range: those of values
-    that are spread evenly. Integrals over values come from a table that is made once. Errors and
-    warnings: :meth:`DeferredVDI.classified`.
+    that are spread evenly. ``media``: does what :func:`media_of_values` does, which is the default.
+    Errors and warnings: :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
         ("shading", transfer_function.shading),
@@ -426,39 +440,31 @@ def classify(deferred: DeferredVDI, transfer_function: TransferFunction) -> VDI:
             )
     _warn_outside(deferred, transfer_function)
 
-    # Integrals of a step's opacity, and of the colour times it, up to each cell's lower end
+    # A step's opacity, and the colour times it, in cells of the range of values
     low, high = deferred.value_range
-    step = deferred.sample_distance
     unit = transfer_function.unit_distance or deferred.unit_distance
     values = low + (np.arange(CELLS) + 0.5) / CELLS * (high - low)
     color, opacity = looked_up(transfer_function, values)
     with np.errstate(divide="ignore"):
-        of_step = -np.expm1(np.log1p(-opacity) * step / unit)
-    integrals = np.zeros((CELLS + 1, 4))
-    np.cumsum(of_step[:, np.newaxis] * color, axis=0, out=integrals[1:, :3])
-    np.cumsum(of_step, out=integrals[1:, 3])
-
-    # Their means over each supersegment's values
-    lists = deferred.lists
-    mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
-    reach = np.maximum(np.sqrt(3) * spread, 0.5 / CELLS)  # at least a cell
-    first, last = (np.clip(mean + sign * reach, 0, 1) * CELLS for sign in (-1, 1))
-    means = _integral(integrals, last) - _integral(integrals, first)
-    means /= (last - first)[:, np.newaxis]
-    of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
-    steps = lengths_of(lists) * deferred.share / step
-    optical_depth = (-np.log1p(-of_step) * steps).astype(np.float32)
+        of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
+    of_cells = np.column_stack([of_step[:, np.newaxis] * color, of_step])
+    straight, optical_depth = (media or media_of_values)(deferred, of_cells)
 
     # What is transparent is left out
-    rows = np.flatnonzero(optical_depth > 0)
-    offsets = np.searchsorted(rows, lists.offsets.astype(np.int64)).astype(np.uint64)
+    lists = deferred.lists
+    rows: Any = np.flatnonzero(optical_depth > 0)
+    offsets = lists.offsets
+    if len(rows) == len(optical_depth):
+        rows = slice(None)
+    else:
+        offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
     return VDI(
         lists.camera,
         lists.window_size,
         offsets,
         lists.front[rows],
         lists.back[rows],
-        np.clip(means[rows, :3] / means[rows, 3:], 0, 1),
+        straight[rows],
         optical_depth[rows],
         lists.bounds,
         depth_origin=lists.depth_origin,
@@ -469,6 +475,24 @@ def classify(deferred: DeferredVDI, transfer_function: TransferFunction) -> VDI:
             "deferred": deferred.about,
         },
     )
+
+
+def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
+    """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
+
+    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, (CELLS, 4).
+    """
+    integrals = np.zeros((CELLS + 1, 4))
+    np.cumsum(of_cells, axis=0, out=integrals[1:])
+    mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
+    reach = np.maximum(np.sqrt(3) * spread, 0.5 / CELLS)  # at least a cell
+    first, last = (np.clip(mean + sign * reach, 0, 1) * CELLS for sign in (-1, 1))
+    means = _integral(integrals, last) - _integral(integrals, first)
+    means /= (last - first)[:, np.newaxis]
+    of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
+    optical_depth = (-np.log1p(-of_step) * deferred.steps).astype(np.float32)
+    straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
+    return np.clip(straight, 0, 1).astype(np.float32), optical_depth
 
 
 def _integral(integrals: Floats, place: Floats) -> Floats:

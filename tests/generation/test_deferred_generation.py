@@ -7,7 +7,9 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.generation.classified_values import classify_on_device
 from pyvista_vdi.generation.deferred import generate_deferred
+from pyvista_vdi.model.deferred import classify, lengths_of
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
 
 EDGES = NX, NY, NZ = 7, 6, 33
@@ -128,6 +130,25 @@ def test_blocks_of_one_value_are_classified_as_the_volume_is(runtime):
     picture = pvdi.render(deferred.classified(transfer_function=looks), camera, device=runtime)
     # To the cell of the table that a value is averaged over
     assert np.abs(picture - wanted)[1:-1, 1:-1].max() < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_device_classifies_as_float64_does(runtime, seed):
+    rng = np.random.default_rng(seed)
+    array = rng.random(EDGES[::-1]).astype(np.float32)
+    deferred = kept(runtime, array, (0, 1), max_supersegments=[60, 6, 3, 1][seed])
+    opacities = np.where(rng.random(40) < 0.3, 0, rng.random(40) ** [8, 3, 1, 0][seed])
+    looks = pvdi.TransferFunction(rng.random((40, 3)), opacities, (0, 1))
+    found, wanted = classify_on_device(deferred, looks, runtime), classify(deferred, looks)
+    # What next to nothing is seen of may be nothing on the device, whose table has steps of 2^-40
+    some, those = found.optical_depth > 1e-6, wanted.optical_depth > 1e-6
+    assert np.array_equal(found.front[some], wanted.front[those])
+    assert found.color[some] == pytest.approx(wanted.color[those], abs=5e-5)
+    # Of an opacity of a step of nearly 1 float32 holds less; what is behind it is not seen
+    dense = 8 * lengths_of(wanted)[those] / deferred.sample_distance
+    tau, exact = found.optical_depth[some], wanted.optical_depth[those]
+    assert tau[exact <= dense] == pytest.approx(exact[exact <= dense], rel=2e-4)
+    assert (tau[exact > dense] >= 0.9 * dense[exact > dense]).all()
 
 
 def test_generate_returns_one_and_bakes_by_default(runtime):

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.generation.classified_values import classify_on_device
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI, classify
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
@@ -286,7 +287,8 @@ class DeferredInput(Input):
         """Return the VDI that the property makes of the values now."""
         stamp = self.stamp()
         if self._vdi is None or self._made_at != stamp:
-            self._vdi = classify(self.deferred, transfer_function_from_property(self.prop))
+            look = transfer_function_from_property(self.prop)
+            self._vdi = classify_on_device(self.deferred, look)
             self._made_at = stamp
         return self._vdi
 
