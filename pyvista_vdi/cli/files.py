@@ -71,7 +71,7 @@ def convert(options: argparse.Namespace) -> int:
     given = {name: value for name, value in foreign.items() if value is not None}
     with measuring("converting") as bar:
         vdi = read(options.file, progress=part(bar, 0.0, 0.5, "reading"), **given)
-        vdi = with_look(options, vdi, options.file)
+        vdi = with_look(options, vdi, options.file, colors=target.suffix != ".vdi")
         vdi.save(target, progress=part(bar, 0.5, 1.0, "writing"), **file_arguments)
     say_vdi(options, vdi)
     return 0

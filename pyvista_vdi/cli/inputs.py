@@ -294,10 +294,18 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
-def with_look(options: argparse.Namespace, found: Any, file: str) -> Any:
-    """Return what was read, classified as the options ask where it keeps values; others refuse."""
+def with_look(options: argparse.Namespace, found: Any, file: str, *, colors: bool = True) -> Any:
+    """Return what was read, classified as the options ask where it keeps values.
+
+    Where it does not, a look is refused, and where ``colors`` are needed the lack of one.
+    """
     if isinstance(found, DeferredVDI):
         look = classification(options)
+        if colors and not look:
+            raise UnsupportedError(
+                f"{printable(file)} keeps values, which have no colours yet: give --cmap, "
+                "--opacity, --tf or --transfer-function"
+            )
         return found.classified(**look) if look else found
     for name in ("tf", "transfer_function", *CLASSIFICATION):
         value = getattr(options, name, None)

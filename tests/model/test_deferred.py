@@ -233,6 +233,8 @@ def test_convert_classifies_and_info_says_which_kind(tmp_path, capsys):
     assert main(["convert", str(tmp_path / "seen.vdi"), "--cmap", "bone", "-o", "x.vdi"]) != 0
     assert "has its look" in capsys.readouterr().err
     assert main(["convert", str(path), "-o", str(tmp_path / "none.exr")]) != 0
-    assert "classified(cmap" in capsys.readouterr().err
+    assert "keeps values, which have no colours yet: give --cmap" in capsys.readouterr().err
+    assert main(["render", str(path), "-o", str(tmp_path / "none.png")]) != 0
+    assert "give --cmap" in capsys.readouterr().err
     with zipfile.ZipFile(path) as archive:
         assert json.loads(archive.read("vdi.json"))["format"] == "pyvista-vdi-deferred"
