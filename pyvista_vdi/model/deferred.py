@@ -288,8 +288,8 @@ class DeferredVDI:
     def with_precision(self, precision: str) -> DeferredVDI:
         """Return it with supersegments of fewer bytes: ``"exact"``, ``"8-byte"``.
 
-        In 8 bytes depths have 14 bits of the list's extent, the mean 16 bits of the range of
-        values, the spread 8 significant bits and the share 8 bits. There are no 16-byte ones:
+        In 8 bytes depths have 14 bits of the list's extent, the mean 3825 steps over the range of
+        values, the spread 4 significant bits and the share 8 bits. There are no 16-byte ones:
         UnsupportedError.
         """
         if precision == self.precision:
@@ -300,10 +300,13 @@ class DeferredVDI:
             )
         lists = self._lists
         mean = self.mean.astype(np.float64)
-        low = np.zeros_like(mean)
+        low, spread = np.zeros_like(mean), lists.optical_depth
         if precision == "8-byte":
-            whole = np.round(mean * 65025)  # 255 * 255
-            mean, low = whole // 255 / 255, whole % 255 / 255
+            # Fewer codes than there is room for, which compress better: 255 * 15, and 4 bits
+            whole = np.round(mean * 3825)
+            mean, low = whole // 15 / 255, whole % 15 / 15
+            fraction, exponent = np.frexp(spread)
+            spread = np.ldexp(np.round(fraction * 16) / 16, exponent)
         color = np.stack([mean, low, self.share], axis=1)
         plain = VDI(
             lists.camera,
@@ -312,7 +315,7 @@ class DeferredVDI:
             lists.front,
             lists.back,
             color,
-            lists.optical_depth,
+            spread,
             lists.bounds,
             depth_origin=lists.depth_origin,
             metadata=lists.metadata,
