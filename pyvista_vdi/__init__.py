@@ -18,6 +18,7 @@ from pyvista_vdi.plotting import registration
 _HOMES = {
     "AmbientOcclusion": "model.ambient_occlusion",
     "Camera": "model.camera",
+    "DeferredVDI": "model.deferred",
     "Cropping": "model.cropping",
     "Estimate": "generation.slices",
     "Light": "model.lighting",
@@ -73,6 +74,7 @@ registry.core = registry.Extension(
         "": "pyvista_vdi.plotting.imports:volumes_in",
     },
     methods={
+        "DeferredVDI.classified": "pyvista_vdi.api.deferred:classified",
         "TransferFunction.from_arguments": (
             "pyvista_vdi.plotting.classify:transfer_function_from_arguments"
         ),

@@ -26,6 +26,7 @@ from pyvista_vdi.io.volumes import read_volume as read_volume
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion as AmbientOcclusion
 from pyvista_vdi.model.camera import Camera as Camera
 from pyvista_vdi.model.cropping import Cropping as Cropping
+from pyvista_vdi.model.deferred import DeferredVDI as DeferredVDI
 from pyvista_vdi.model.lighting import Light as Light
 from pyvista_vdi.model.lighting import Lights as Lights
 from pyvista_vdi.model.lighting import Shading as Shading

@@ -13,6 +13,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.classification import BLENDINGS, Classification, refuse_keywords
 from pyvista_vdi.model.collection import VDICollection
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, as_volume
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -44,7 +45,7 @@ Shown: TypeAlias = VDILike | VDICollection
 
 
 def render(
-    vdi: Shown | Sequence[Shown],
+    vdi: Shown | DeferredVDI | Sequence[Shown],
     camera: CameraLike,
     window_size: WindowSize | None = None,
     *,
@@ -57,6 +58,7 @@ def render(
     preview_samples: int | None = None,
     transmittance_cutoff: float | None = None,
     device: DeviceLike | None = None,
+    **look: Any,
 ) -> NDArray[np.float32]:
     """Raycast a VDI, or several in one scene, from a new view.
 
@@ -67,6 +69,8 @@ def render(
         A :class:`VDISet` shows what was made nearest to the view, by itself blended with what is
         about as near.
         Several are merged by depth along each ray; their order does not matter, to the last bit.
+        A :class:`DeferredVDI` takes the words of :meth:`DeferredVDI.classified` (``cmap``,
+        ``opacity``, ``clim`` ...) as well.
     camera : pyvista.Camera or vtkCamera or Camera
         The new view V_N. Its model transform places the VDI's model frame in the world.
     window_size : (int, int), optional
@@ -117,7 +121,11 @@ def render(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
-    look = (clipping_planes, cropping, opacity_multiplier, skip_empty)
+    if isinstance(vdi, DeferredVDI) and look:
+        vdi = vdi.classified(**look, device=device)
+    else:
+        refuse_keywords(look, render)
+    how = (clipping_planes, cropping, opacity_multiplier, skip_empty)
     if isinstance(vdi, list | tuple) or model_transforms is not None:
         if preview_samples is not None:
             raise InvalidArgumentError(
@@ -131,10 +139,10 @@ def render(
 
         several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
         seen = _seen_in_scene(several, view, model_transforms)
-        placed = placed_vdis(seen, view, model_transforms, *look)
+        placed = placed_vdis(seen, view, model_transforms, *how)
         size: Any = common_window_size(placed) if window_size is None else window_size
         return render_vdis(placed, FrameRequest(view, size, RenderOptions(), opaque_depth, device))
-    options = RenderOptions.checked(*look, preview_samples, transmittance_cutoff)
+    options = RenderOptions.checked(*how, preview_samples, transmittance_cutoff)
     shown: Any = vdi if _is_of_views(vdi) else as_vdi(vdi)
     size = shown.picture_size if window_size is None else window_size
     request = FrameRequest(view, size, options, opaque_depth, device)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from numpy.typing import ArrayLike
+
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.classification import Classification, refuse_keywords
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, QualityTarget
+from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest, QualityTarget
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
     CameraLike,
@@ -71,6 +74,9 @@ def generate(
     interpolation: str = "nearest",
     volume_property: VTKObject | None = None,
     transfer_function: TransferFunction | None = None,
+    classification: str = "baked",
+    value_range: RangeLike | None = None,
+    importance: ArrayLike | None = None,
     **unknown: NoReturn,
 ) -> VDI:
     """Generate a VDI: cut every pixel's ray through a classified volume into supersegments.
@@ -149,10 +155,20 @@ def generate(
         In place of the others, as it is.
     transfer_function : TransferFunction, optional
         In place of the others; it needs no PyVista.
+    classification : {"baked", "deferred"}
+        When scalars are classified: as the VDI is made, or by whoever shows it. A deferred one
+        keeps values in place of colours, is a :class:`DeferredVDI`, and ``classified(cmap=...,
+        opacity=...)`` makes a VDI of it, without the volume: docs/deferred.md. Of the look it takes
+        ``interpolation`` only.
+    value_range : (float, float), optional
+        Least and largest scalar to keep, where deferred; all by default. What is outside is empty.
+    importance : array_like of float, optional
+        How much errors count over the range, where deferred: points (scalar, weight), or weights
+        at equal distances over ``value_range``; 1 by default. Scalars of weight 0 are empty.
 
     Returns
     -------
-    VDI
+    VDI or DeferredVDI
         The supersegments of every list, with the view and what made them.
 
     Raises
@@ -192,15 +208,23 @@ def generate(
         *(interpolation, volume_property, transfer_function),
     )
     look.require_composite()
+    deferral = Deferral.checked(classification, value_range, importance)
     target = QualityTarget.checked(quality, target_ssim, target_fps, max_bytes, target_angle)
     options = GenerationOptions.checked(
         *(sample_distance, lights, ambient_occlusion, memory_limit),
         *(max_supersegments, criterion, tolerance, view_cone, precision),
     )
     read = as_volume(volume, scalars, preference)
+    deferred = deferral.classification == "deferred"
+    if deferred:
+        look.require_no_look()
     request = GenerationRequest(
         volume=read,
-        transfer_function=look.transfer_function_of(read),
+        transfer_function=(
+            TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
+            if deferred
+            else look.transfer_function_of(read)
+        ),
         camera=camera,  # type: ignore[arg-type]  # which it checks
         window_size=window_size,  # type: ignore[arg-type]  # likewise
         options=options,
@@ -210,6 +234,17 @@ def generate(
     )
     from pyvista_vdi.quality.probe import generate_anywhere
 
+    if deferred:
+        if target:
+            raise UnsupportedError(
+                "quality, target_ssim, target_fps and max_bytes choose settings by a look, which "
+                "a deferred VDI does not have: give max_supersegments"
+            )
+        from pyvista_vdi.generation.deferred import generate_deferred
+
+        return generate_deferred(  # type: ignore[return-value]
+            request, deferral, lambda asked: generate_anywhere(asked, target, client)
+        )
     vdi = generate_anywhere(request, target, client)
     if target:
         from pyvista_vdi.quality.dial import warn_missed
@@ -327,7 +362,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> Any:
 
     Returns
     -------
-    VDI or VDISeries or VDISet
+    VDI or DeferredVDI or VDISeries or VDISet
         The same to the last bit if this package wrote the file; what is lost with other programs'
         files is said in the documentation of files.
 

@@ -11,7 +11,13 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import QUALITIES, GenerationOptions, QualityTarget, declared
+from pyvista_vdi.model.options import (
+    QUALITIES,
+    Deferral,
+    GenerationOptions,
+    QualityTarget,
+    declared,
+)
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -24,7 +30,7 @@ Options = argparse._ActionsContainer
 
 #: The options of the public functions: defaults, choices and texts are theirs.
 _DECLARED = declared(
-    Classification, DrawingOptions, GenerationOptions, QualityTarget, RenderOptions
+    Classification, Deferral, DrawingOptions, GenerationOptions, QualityTarget, RenderOptions
 )
 
 #: What the step along a ray is where none is given.
@@ -331,6 +337,24 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     group = parser.add_argument_group(
         "classification", "Names, defaults and meaning are those of PyVista's add_volume."
     )
+    _look(group)
+    switch(group, "--shade", _DECLARED["shade"].what, default=None)
+    array(group)
+    known(group, "interpolation", choices=_DECLARED["interpolation"].choices)
+    for name in ("ambient", "diffuse", "specular", "specular_power"):
+        known(group, name, "X", parse_number)
+    if tables:
+        _table(group)
+
+
+def look_of_values(parser: argparse.ArgumentParser) -> None:
+    """Add how values look that were kept to be classified afterwards."""
+    group = parser.add_argument_group("classification", "Of VDIs that keep values.")
+    _look(group)
+    _table(group)
+
+
+def _look(group: Options) -> None:
     standard = "a standard transfer function; --cmap and --opacity change parts of it"
     option(group, "--tf", standard, choices=tuple(TRANSFER_FUNCTIONS))
     known(group, "cmap", "NAME")
@@ -338,15 +362,23 @@ def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> N
     known(group, "clim", ("LOW", "HIGH"), parse_number, nargs=2)
     known(group, "n_colors", "N", parse_whole)
     known(group, "opacity_unit_distance", "LENGTH", parse_number)
-    for name in ("flip_scalars", "log_scale", "shade"):
+    for name in ("flip_scalars", "log_scale"):
         switch(group, f"--{name.replace('_', '-')}", _DECLARED[name].what, default=None)
-    array(group)
-    known(group, "interpolation", choices=_DECLARED["interpolation"].choices)
-    for name in ("ambient", "diffuse", "specular", "specular_power"):
-        known(group, name, "X", parse_number)
-    if tables:
-        text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
-        option(group, "--transfer-function", text, "FILE")
+
+
+def _table(group: Options) -> None:
+    text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
+    option(group, "--transfer-function", text, "FILE")
+
+
+def deferral(parser: argparse.ArgumentParser) -> None:
+    """Add what is kept of the scalars, where they are classified afterwards."""
+    group = parser.add_argument_group(
+        "classified afterwards", "Values are kept: convert, render and view then take the look."
+    )
+    known(group, "classification", default=..., choices=_DECLARED["classification"].choices)
+    known(group, "value_range", ("LOW", "HIGH"), parse_number, nargs=2)
+    known(group, "importance", "A,B,...", parse_numbers)
 
 
 def occlusion(parser: argparse.ArgumentParser) -> None:

@@ -49,7 +49,14 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Read a VDI and write it in the format of another name."""
     from pyvista_vdi.api import read
-    from pyvista_vdi.cli.inputs import file_options, given_camera, measuring, part, say_vdi
+    from pyvista_vdi.cli.inputs import (
+        file_options,
+        given_camera,
+        measuring,
+        part,
+        say_vdi,
+        with_look,
+    )
     from pyvista_vdi.io import checked_target
 
     if (own := _own_verbs(options.file)) is not None:
@@ -64,6 +71,7 @@ def convert(options: argparse.Namespace) -> int:
     given = {name: value for name, value in foreign.items() if value is not None}
     with measuring("converting") as bar:
         vdi = read(options.file, progress=part(bar, 0.0, 0.5, "reading"), **given)
+        vdi = with_look(options, vdi, options.file, colors=target.suffix != ".vdi")
         vdi.save(target, progress=part(bar, 0.5, 1.0, "writing"), **file_arguments)
     say_vdi(options, vdi)
     return 0
@@ -158,6 +166,7 @@ def _text(about: FileInfo) -> str:
         "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}",
         "written by": f"{about.written_by}, format version {about.format_version}",
         "lists": f"{width} x {height}",
+        **({} if about.deferred is None else _of_values(about.deferred)),
         "supersegments": f"{about.n_supersegments}, "
         f"{about.n_supersegments / (width * height):.2f} per list",
         "precision": about.precision,
@@ -170,6 +179,12 @@ def _text(about: FileInfo) -> str:
         **{name: _short(value) for name, value in about.metadata.items()},
     }
     return table(rows)
+
+
+def _of_values(deferred: dict[str, Any]) -> dict[str, str]:
+    """Return what is known of lists that keep values."""
+    low, high = deferred["value_range"]
+    return {"kind": f"values from {low:g} to {high:g}, classified afterwards"}
 
 
 def _short(value: Any, longest: int = 100) -> str:

@@ -23,7 +23,7 @@ from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import QualityTarget, declared
+from pyvista_vdi.model.options import Deferral, QualityTarget, declared
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import describe
@@ -38,6 +38,10 @@ def generate(options: argparse.Namespace) -> int:
     target = QualityTarget(**asked)  # refused before the volume is read, too
     arguments = classification(options)
     looks = Classification.composited(arguments, "generate")  # refused before the volume is read
+    kept = {name: getattr(options, name) for name in declared(Deferral)}
+    deferred = Deferral(**kept).classification == "deferred"
+    if deferred:
+        looks.require_no_look()
     occlusion = ambient_occlusion(options)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
@@ -58,7 +62,7 @@ def generate(options: argparse.Namespace) -> int:
             criterion=options.criterion,
             ambient_occlusion=occlusion,
             memory_limit=options.memory_limit,
-            transfer_function=looks.transfer_function_of(volume),
+            transfer_function=None if deferred else looks.transfer_function_of(volume),
             device=options.device,
         )
         needed = f"{width} x {height} lists: up to {most.total / 2**20:.0f} MiB"
@@ -76,6 +80,7 @@ def generate(options: argparse.Namespace) -> int:
             view_cone=options.view_cone,
             precision=precision,
             **asked,
+            **kept,
             ambient_occlusion=occlusion,
             memory_limit=options.memory_limit,
             client=options.scheduler,

@@ -23,6 +23,7 @@ from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import declared
@@ -161,7 +162,7 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments that say how the volume looks; which array it is, the volume says."""
     given = dict(TRANSFER_FUNCTIONS[options.tf]) if options.tf else {}
     for name in CLASSIFICATION:
-        if getattr(options, name) is not None:
+        if getattr(options, name, None) is not None:
             given[name] = getattr(options, name)
     path = getattr(options, "transfer_function", None)
     if path is not None:
@@ -293,7 +294,31 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
-def say_vdi(options: argparse.Namespace, vdi: VDI, more: str = "") -> None:
+def with_look(options: argparse.Namespace, found: Any, file: str, *, colors: bool = True) -> Any:
+    """Return what was read, classified as the options ask where it keeps values.
+
+    Where it does not, a look is refused, and where ``colors`` are needed the lack of one.
+    """
+    if isinstance(found, DeferredVDI):
+        look = classification(options)
+        if colors and not look:
+            raise UnsupportedError(
+                f"{printable(file)} keeps values, which have no colours yet: give --cmap, "
+                "--opacity, --tf or --transfer-function"
+            )
+        return found.classified(**look) if look else found
+    for name in ("tf", "transfer_function", *CLASSIFICATION):
+        value = getattr(options, name, None)
+        if value is not None:
+            text = " ".join(map(str, value)) if isinstance(value, list | tuple) else value
+            raise UnsupportedError(
+                f"{printable(file)} has its look, and --{name.replace('_', '-')} {text} is for "
+                "VDIs that keep values: leave it out"
+            )
+    return found
+
+
+def say_vdi(options: argparse.Namespace, vdi: VDI | DeferredVDI, more: str = "") -> None:
     """Print what was written to ``--output``."""
     width, height = vdi.window_size
     print(

@@ -19,6 +19,7 @@ from pyvista_vdi.cli.inputs import (
     part,
     read_volume,
     refuse,
+    with_look,
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -45,7 +46,7 @@ def render(options: argparse.Namespace) -> int:
     with measuring("rendering") as bar:
         for k, file in enumerate(options.files):
             found = read(file, progress=part(bar, k * share, (k + 1) * share, "reading"))
-            vdis.append(_at(found, options.time))
+            vdis.append(with_look(options, _at(found, options.time), file))
         bar(0.5, "drawing")
         first = vdis[0]
         view = camera(options, first.camera)

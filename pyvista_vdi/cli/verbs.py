@@ -30,6 +30,7 @@ def _add_generate(parser: argparse.ArgumentParser) -> None:
         parser, f"the view that the volume fills, {ELEVATION:g} degrees above its middle"
     )
     declare.classification(parser)
+    declare.deferral(parser)
     declare.occlusion(parser)
     declare.limits(parser)
     declare.target(parser)
@@ -42,6 +43,7 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     declare.vdi_file(parser)
     declare.output(parser)
     declare.file_format(parser)
+    declare.look_of_values(parser)
     group = parser.add_argument_group("deep images of other programs")
     view = "the view that the image shows, where it does not say it: Camera.to_dict() as JSON"
     declare.option(group, "--camera-json", view, "FILE")
@@ -76,6 +78,7 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
     declare.known(parser, "transmittance_cutoff", "LIGHT", declare.parse_number, more)
     declare.time(parser)
     declare.camera(parser, "the VDI's generating view")
+    declare.look_of_values(parser)
     declare.device(parser)
 
 

@@ -30,9 +30,6 @@ from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays, RayLaunch, Variant
 
-#: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
-_INDISTINGUISHABLE = 1e-6
-
 
 class Records:
     """A ray per list, and the runs of like samples that are recorded along each of a slice's rays.
@@ -61,8 +58,7 @@ class Records:
         march = rays.forms(camera, size)
         self.planes, self.double_float = march.planes, march.double_float
         self.depth_origin = march.rays.reference_depth
-        # Differences stay below 1e18, whose square float32 still holds
-        self.finest = np.float32(max(min(options.tolerance, 1e18) ** 2, _INDISTINGUISHABLE))
+        self.finest = np.float32(options.finest_error)
         voxel = min(rays.grid.spacing)
         # Steps that a ray whose record has been full composites before it asks about homogeneity.
         # Measured: such a VDI's SSIM changes by less than .003 either way, and generation is up to

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.volumes.table import VOLUME_SUFFIXES
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
@@ -61,7 +62,7 @@ def opened(path: str | os.PathLike[str]) -> BinaryIO:
 
 
 def write(
-    vdi: VDI,
+    vdi: VDI | DeferredVDI,
     path: str | os.PathLike[str],
     *,
     progress: Progress | None = None,
@@ -74,8 +75,8 @@ def write(
 
     Parameters
     ----------
-    vdi : VDI
-        What to write.
+    vdi : VDI or DeferredVDI
+        What to write; the second in ``.vdi`` files only.
     path : path-like
         The target; its name ends in ``.vdi``, ``.exr``, ``.vti`` or ``.html``.
     progress : callable, optional
@@ -110,6 +111,11 @@ def write(
     read : reads it again.
     """
     target = checked_target(path)
+    if isinstance(vdi, DeferredVDI) and format_named(target) is not _own():
+        raise InvalidVDIError(
+            f"{target.suffix} files hold colours, and a DeferredVDI keeps values: write "
+            "vdi.classified(cmap=..., opacity=...), or a .vdi file, which keeps them"
+        )
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
     check_write_options(target, options)
@@ -141,7 +147,7 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
 
     Returns
     -------
-    VDI or VDISeries or VDISet
+    VDI or DeferredVDI or VDISeries or VDISet
         The same to the last bit as was written by :func:`write`.
 
     Raises

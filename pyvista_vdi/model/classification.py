@@ -164,6 +164,21 @@ class Classification(Look, ArrayChoice):
         made.require_composite()
         return made
 
+    def require_no_look(self) -> None:
+        """Refuse a look where values are kept to be classified afterwards."""
+        given = {*self.given} & {*Look.declared, *IN_PLACE} - {"interpolation"}
+        if "shade" in given:
+            raise UnsupportedError(
+                "shade=True needs the volume's gradients, which a deferred VDI does not keep: "
+                "leave shade out, or classification='deferred'"
+            )
+        if given:
+            names = ", ".join(sorted(given))
+            raise InvalidArgumentError(
+                f"classification='deferred' keeps values, whatever their look: give {names} to "
+                "classified() of what is returned"
+            )
+
     @property
     def in_place(self) -> bool:
         """Whether a transfer function or a property stands in place of ``add_volume``'s."""

@@ -13,6 +13,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     InvalidVolumeTypeError,
 )
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 
@@ -86,6 +87,10 @@ def as_vdi(vdi: Any) -> VDI:
     """Return a VDI, or its VTK form, as a :class:`VDI`; InvalidVDIError if it is neither."""
     if isinstance(vdi, VDI):
         return vdi
+    if isinstance(vdi, DeferredVDI):
+        raise InvalidVDIError(
+            "a DeferredVDI has no colours yet: pass vdi.classified(cmap=..., opacity=...)"
+        )
     if hasattr(vdi, "GetClassName"):
         return registry.method("VDI.from_image")(vdi)  # type: ignore[no-any-return]
     hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""

@@ -88,7 +88,7 @@ def coarser(vdi: VDI, step: int = 4) -> VDI:
     counts = np.where(np.outer(*inside[::-1]).ravel(), vdi.counts.reshape(-1)[taken], 0)
     offsets, rows = _rows_of(vdi, taken, counts)
     old = [(2 * p + 1) / n - 1 for p, n in zip((x, y), vdi.window_size, strict=True)]
-    stretch = _length_per_depth(camera, window, *new) / _length_per_depth(
+    stretch = length_per_depth(camera, window, *new) / length_per_depth(
         camera, vdi.window_size, *old
     )
     tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
@@ -146,7 +146,7 @@ def _of_rows(
     return VDI(view, window, offsets, optical_depth=optical_depth, **arrays)
 
 
-def _length_per_depth(
+def length_per_depth(
     camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""

@@ -46,6 +46,9 @@ QUALITIES: dict[str, float | None] = {
     "fast": 0.93,
 }
 
+#: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
+_INDISTINGUISHABLE = 1e-6
+
 _Record = TypeVar("_Record", bound="Options")
 
 
@@ -280,6 +283,50 @@ class GenerationOptions(MediumOptions):
     def hidden_weight(self) -> float:
         """Weight of what V_O cannot see at all when neighbours are merged, 0 to 1."""
         return float(1 - np.cos(np.radians(self.view_cone)))
+
+    @property
+    def finest_error(self) -> float:
+        """Merge error up to which neighbours are always merged."""
+        # Differences stay below 1e18, whose square float32 still holds
+        return max(min(self.tolerance, 1e18) ** 2, _INDISTINGUISHABLE)
+
+
+@record
+@dataclass(frozen=True)
+class Deferral(Options):
+    """When scalars are classified, and what is kept of them until then: docs/deferred.md.
+
+    Attributes
+    ----------
+    classification : {"baked", "deferred"}
+        When scalars are classified: as the VDI is made, or by whoever shows it.
+    value_range : (float, float), optional
+        Least and largest scalar to keep; all by default.
+    importance : array_like of float, optional
+        Weights over the range, or points (scalar, weight), by which errors count; 1 by default.
+
+    Raises
+    ------
+    InvalidArgumentError
+        If a range or an importance is given and nothing is deferred.
+    """
+
+    classification: str = option(
+        "baked",
+        "when scalars are classified: as the VDI is made, or by whoever shows it",
+        choices=("baked", "deferred"),
+    )
+    value_range: Any = option(None, "least and largest scalar to keep, where deferred")
+    importance: Any = option(None, "how much errors count over the range, where deferred")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("value_range", "importance"):
+            if getattr(self, name) is not None and self.classification != "deferred":
+                raise InvalidArgumentError(
+                    f"{name}={getattr(self, name)!r} says what is kept to be classified "
+                    f"afterwards: give classification='deferred' as well, or leave {name} out"
+                )
 
 
 @record

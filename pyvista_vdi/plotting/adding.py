@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import cycle
 from typing import Any, NamedTuple
 
@@ -13,20 +13,33 @@ import pyvista as pv
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.generation.deferred import generate_deferred
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.options import GenerationOptions, Options, QualityTarget, option, record
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.inputs import as_volume
+from pyvista_vdi.model.options import (
+    Deferral,
+    GenerationOptions,
+    GenerationRequest,
+    Options,
+    QualityTarget,
+    option,
+    record,
+)
 from pyvista_vdi.model.render_options import DrawingOptions
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.prepared import prepared
+from pyvista_vdi.plotting.prepared import framing_camera, prepared
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import refuse_settings
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, require_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
@@ -92,15 +105,20 @@ class Addition:
     coverage: str
     device: DeviceLike | None
     progress_bar: bool | Callable[[float], object] | None
+    deferral: Deferral = field(default_factory=Deferral)
 
     def __post_init__(self) -> None:
         if self.target:
             refuse_settings(self.target, self.options)
 
-    def refuse_with_a_vdi(self) -> None:
-        """Refuse what only a volume can honour, of the arguments that are not their defaults."""
+    def refuse_with_a_vdi(self, looks: Mapping[str, Any] | None = None) -> None:
+        """Refuse what only a volume can honour, of the arguments that are not their defaults.
+
+        ``looks``: those of the look that are not honoured; all by default.
+        """
         target = {"full_fps" if n == "target_fps" else n for n in self.target.given}
-        changed = {*self.array.given, *self.look.given, *self.options.given, *target}
+        given = self.look.given if looks is None else looks
+        changed = {*self.array.given, *given, *self.options.given, *target, *self.deferral.given}
         changed -= {"lights", "annotations"}
         changed |= {
             n for n in ("resolution", "resample", "mask", "camera") if getattr(self, n) is not None
@@ -120,7 +138,7 @@ class Addition:
 class _Shown(NamedTuple):
     """What an actor shows, its colours, and what its scalar bar says."""
 
-    thing: VDI | VDISource
+    thing: VDI | VDISource | DeferredInput
     table: Any
     scalar_range: tuple[float, float]
     title: str
@@ -136,14 +154,19 @@ def added(
     volume = prepared(plotter, volume, asked.array.scalars, asked.resample, asked.mask)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
+    if asked.deferral.given and not isinstance(first, VDI | DeferredVDI) and several is None:
+        first, asked = _deferred(first, asked, plotter)
     made = isinstance(first, VDI) or is_vdi_image(first)
-    shown = _vdi_shown(first, asked) if made else _volume_shown(first, asked, plotter)
+    if isinstance(first, DeferredVDI):
+        shown = _deferred_shown(first, asked)
+    else:
+        shown = _vdi_shown(first, asked) if made else _volume_shown(first, asked, plotter)
     actor = PlotterVDIActor()
     if shown.prop is not None:
         actor.prop = shown.prop
     mapper = _mapper(shown, asked, plotter._theme)
     thing = shown.thing if several is None else several
-    if isinstance(thing, VDI | VDICollection):
+    if isinstance(thing, VDI | VDICollection | DeferredInput):
         mapper.SetInputData(thing)
     else:
         mapper.SetInputConnection(thing.GetOutputPort())
@@ -214,6 +237,51 @@ def _vdi_shown(vdi: Any, asked: Addition) -> _Shown:
         table.annotations = annotations
     title = str(shown.metadata.get("scalars") or "Data")
     return _Shown(shown, table, table.scalar_range, title, bar=bar)
+
+
+def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, Addition]:
+    """Generate a deferred VDI for the plotter's view, and say what is left to be honoured."""
+    array, target = asked.array, asked.target
+    array.require_composite()
+    if target:
+        raise UnsupportedError(
+            f"{', '.join(target.given)} choose settings by a look, which a deferred VDI does not "
+            "have: give max_supersegments"
+        )
+    image, name = as_image(volume, array.scalars, asked.resolution)
+    read = as_volume(image, name, array.preference)
+    view = asked.camera or framing_camera(plotter, read.bounds)
+    looks = TransferFunction([[0] * 3], [0], (0, 1), interpolation=asked.look.interpolation)
+    request = GenerationRequest(
+        read,
+        looks,
+        view,  # type: ignore[arg-type]  # which it checks
+        tuple(plotter.window_size),
+        asked.options,
+        get_runtime(asked.device),
+        metadata={"scalars": read.name},
+    )
+    plain: dict[str, Any] = {
+        "array": ArrayChoice(),
+        "options": GenerationOptions(),
+        "deferral": Deferral(),
+    }
+    plain |= {"resolution": None, "resample": None, "mask": None, "camera": None}
+    look = replace(asked.look, interpolation="nearest")
+    return generate_deferred(request, asked.deferral), replace(asked, look=look, **plain)
+
+
+def _deferred_shown(deferred: DeferredVDI, asked: Addition) -> _Shown:
+    """Return values with the property that classifies them, as ``add_volume`` makes it."""
+    look, place = asked.look, asked.place
+    told = {n: v for n, v in look.given.items() if n in ("shade", "categories", "interpolation")}
+    asked.refuse_with_a_vdi(told)
+    table = look.lookup_table(np.array(deferred.value_range))
+    prop = look.volume_property(table, deferred.unit_distance)
+    shown = DeferredInput(deferred, prop)
+    shown.vdi()  # refuse now what cannot be classified
+    title = str(deferred.metadata.get("scalars") or "Data")
+    return _Shown(shown, table, table.scalar_range, title, prop, place.show_scalar_bar)
 
 
 def _volume_shown(volume: Any, asked: Addition, plotter: Any) -> _Shown:

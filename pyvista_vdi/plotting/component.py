@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import pyvista as pv
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.model.classification import ArrayChoice, refuse_keywords
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.options import GenerationOptions, QualityTarget
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.render_options import DrawingOptions, Policy
 from pyvista_vdi.model.types import (
     CameraLike,
@@ -39,7 +40,7 @@ from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet, weakly
 
 #: What is added: a volume, or what is made of one already.
-Volumes: TypeAlias = VolumeLike | VDILike | NDArray[Any] | VDICollection
+Volumes: TypeAlias = VolumeLike | VDILike | NDArray[Any] | VDICollection | DeferredVDI
 
 #: ``add_volume``'s aliases.
 _ALIASES = ("rng", "colormap", "backface_culling")
@@ -117,6 +118,9 @@ class AddVDI(Component):
         status: bool = False,
         device: DeviceLike | None = None,
         progress_bar: bool | Callable[[float], object] | None = None,
+        classification: str = "baked",
+        value_range: RangeLike | None = None,
+        importance: ArrayLike | None = None,
         **aliases: Any,
     ) -> PlotterVDIActor | list[Any]:
         """Add a volume that turns fluently: frames are raycast from its VDI where it serves.
@@ -140,7 +144,8 @@ class AddVDI(Component):
             VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
             view is drawn. With VDIs nothing is generated, and arguments that
-            only a volume can honour are refused.
+            only a volume can honour are refused. A :class:`DeferredVDI` takes a look (``cmap``,
+            ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
         scalars : str or numpy.ndarray, optional
             Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
         clim : float or (float, float), optional
@@ -260,6 +265,15 @@ class AddVDI(Component):
             By default a bar on a terminal, if generating takes over a second; ``True`` shows it
             elsewhere, too, ``False`` never; a callable gets the fraction done, and stops the work
             if it returns ``False``. Ctrl-C stops it as well.
+        classification : {"baked", "deferred"}
+            When scalars are classified: as the VDI is made, or by whoever shows it. Deferred, one
+            :class:`DeferredVDI` is made, for the plotter's view or ``camera``, and ``actor.prop``
+            and its lookup table classify it: what is changed there is seen in the next frame, and
+            nothing is generated again.
+        value_range : (float, float), optional
+            Least and largest scalar to keep, where deferred: as for :func:`pyvista_vdi.generate`.
+        importance : array_like of float, optional
+            How much errors count over the range, where deferred: as there.
         **aliases
             ``rng``, ``colormap`` and ``backface_culling``, as in ``add_volume``.
 
@@ -322,6 +336,7 @@ class AddVDI(Component):
             coverage=coverage,
             device=device,
             progress_bar=progress_bar,
+            deferral=Deferral.checked(classification, value_range, importance),
         )
         if isinstance(volume, vtkMultiBlockDataSet):
             return added_blocks(self._plotter, volume, asked, self._remember)

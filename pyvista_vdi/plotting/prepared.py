@@ -43,19 +43,23 @@ def prepared(plotter: Any, volume: Any, scalars: Any, resample: Any, mask: Any) 
 def _level_in_view(plotter: Any, volume: StoredVolume) -> Volume:
     """Load the level of a store that the plotter's view requires, and say which in the log."""
     if len(volume.store.levels) > 1 and volume.why != "asked for":
-        if plotter.renderer.camera.is_set:
-            camera = Camera.from_any(plotter.camera)
-        else:
-            framed = pv.Camera()
-            box = pv.Box(volume.bounds)
-            framed.position = np.add(box.center, np.multiply(box.length, (1.0, 1.0, 1.0)))
-            framed.focal_point = box.center
-            camera = Camera.from_any(framed)
+        camera = framing_camera(plotter, volume.bounds)
         volume = volume.at_level("auto", camera, plotter.window_size)
     remedy = "open a coarser level by pyvista_vdi.open_volume(path, level=...), or generate a VDI"
     require_free_memory(volume.array.nbytes, f"the volume in {volume.store.path}", remedy)
     _log.info("%s: %s", volume.store.path, volume.describe())
     return volume.load()
+
+
+def framing_camera(plotter: Any, bounds: Sequence[float]) -> Camera:
+    """Return the plotter's view, or about what it will be where nobody has set it."""
+    if plotter.renderer.camera.is_set:
+        return Camera.from_any(plotter.camera)
+    framed = pv.Camera()
+    box = pv.Box(bounds)
+    framed.position = np.add(box.center, np.multiply(box.length, (1.0, 1.0, 1.0)))
+    framed.focal_point = box.center
+    return Camera.from_any(framed)
 
 
 def resampled(grid: Any, resample: str | Sequence[int]) -> pv.ImageData:

@@ -58,6 +58,7 @@ WRONG = {
     "--background": ("x", "''", "0,0", "0,0,2", "0,0,nan", "#12"),
     "--camera-json": NO_JSON,
     "--check": (),  # depends on what is installed
+    "--classification": NO_CHOICE,
     "--clim": ("x 1", "0 nan", "inf 1", "2 1"),
     "--cmap": ("nothing", "''", "1", "nan"),
     "--compression": NO_CHOICE,
@@ -75,6 +76,7 @@ WRONG = {
     "--frames": NO_COUNT,
     "--generations": NO_COUNT,
     "--host": ("'no such host'", "999.1.1.1"),
+    "--importance": ("x", "''", "1,nan", "5"),
     "--interpolation": NO_CHOICE,
     "--key-every": NO_COUNT,
     "--lists": NOT_ABOVE_0,
@@ -124,6 +126,7 @@ WRONG = {
     "--transfer-function": NO_JSON,
     "--transmittance-cutoff": (*BELOW_0, "1"),
     "--turn": NO_NUMBER,
+    "--value-range": ("x 1", "0 nan", "inf 1", "2 1"),
     "--view-angle": (*NOT_ABOVE_0, "180"),
     "--view-cone": (*BELOW_0, "91"),
     "--view-up": (*NO_XYZ, "0 0 0"),

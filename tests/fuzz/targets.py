@@ -34,7 +34,7 @@ from stepped_vdis import frames_of
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import VDI, Camera, TransferFunction, Volume, cli, io
+from pyvista_vdi import VDI, Camera, DeferredVDI, TransferFunction, Volume, cli, io
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
 from pyvista_vdi.extensions.series import files as series_files
@@ -63,6 +63,9 @@ DEVICE_BYTES = 64 * 2**20
 
 #: A page's element with the VDI, in base64.
 _DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
+
+#: A look for what has none.
+DARKENING = TransferFunction([[1, 1, 1], [0, 0, 0]], [0, 1], (-1000, 3000))
 
 COMPRESSIONS = ("zstd", "lz4", "deflate", "none")
 
@@ -172,9 +175,29 @@ def _any_bytes(kind: str) -> Callable[[bytes], None]:
 
 
 @cache
-def _vdi_members(index: int, compression: str, precision: str) -> dict[str, bytes]:
+def base_deferred(index: int = 0) -> DeferredVDI:
+    """The same lists with values in place of colours."""
+    lists = base_vdi(index)
+    mean, spread, share = lists.color.T
+    return DeferredVDI(
+        *(lists.camera, lists.window_size, lists.offsets, lists.front, lists.back),
+        *(mean, spread / 2, share, lists.bounds),
+        value_range=(-1000, 3000),
+        unit_distance=1.5,
+        sample_distance=0.5,
+        importance=[(-1000, 0), (3000, 1)] if index % 2 else None,
+        depth_origin=lists.depth_origin,
+        metadata=lists.metadata,
+    )
+
+
+@cache
+def _vdi_members(
+    index: int, compression: str, precision: str, deferred: bool = False
+) -> dict[str, bytes]:
     options = {"compression": compression, "precision": precision}
-    path = base_vdi(index).save(work_folder() / "base.vdi", **options)
+    base = base_deferred(index) if deferred else base_vdi(index)
+    path = base.save(work_folder() / "base.vdi", **options)
     with zipfile.ZipFile(path) as archive:
         members = {info.filename: archive.read(info) for info in archive.infolist()}
     path.unlink()
@@ -185,7 +208,20 @@ def vdi_members(data: bytes) -> None:
     """A ``.vdi`` file whose members were changed, with checksums that fit."""
     choices = Choices(data)
     precision = choices.pick(("exact", "16-byte", "8-byte"))
-    members = dict(_vdi_members(choices.integer(0, 7), choices.pick(COMPRESSIONS), precision))
+    members = _vdi_members(choices.integer(0, 7), choices.pick(COMPRESSIONS), precision)
+    _read_changed(choices, dict(members))
+
+
+def deferred_members(data: bytes) -> None:
+    """The same of a ``.vdi`` file that keeps values."""
+    choices = Choices(data)
+    precision = choices.pick(("exact", "8-byte"))
+    index, compression = choices.integer(0, 7), choices.pick(COMPRESSIONS)
+    _read_changed(choices, dict(_vdi_members(index, compression, precision, True)))
+
+
+def _read_changed(choices: Choices, members: dict[str, bytes]) -> None:
+    """Change members of a ``.vdi`` file, and read what that is."""
     description = json.loads(members["vdi.json"])
     for _ in range(choices.integer(0, 3)):
         description = choices.edited(description)
@@ -378,8 +414,14 @@ def _changed_array(choices: Choices, array: Any) -> Any:
     return changed
 
 
-def _check_valid(vdi: VDI) -> None:
+def _check_valid(vdi: VDI | DeferredVDI) -> None:
     """Check a VDI that was accepted by the rules of docs/conventions.md, written another way."""
+    if isinstance(vdi, DeferredVDI):
+        for values, most in ((vdi.mean, 1), (vdi.spread, 0.5), (vdi.share, 1)):
+            assert all(0 <= float(value) <= most for value in values)
+        assert -np.inf < vdi.value_range[0] < vdi.value_range[1] < np.inf
+        _check_valid(vdi.classified(transfer_function=DARKENING))
+        vdi = vdi.lists
     width, height = vdi.window_size
     starts = [int(o) for o in vdi.offsets]
     assert len(starts) == width * height + 1
@@ -873,7 +915,15 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     target.__name__: target
     for target in (
         *map(_any_bytes, READERS),
-        *(vdi_members, exr_patches, vdis_frames, vdiset_heads, html_patches, served_messages),
+        *(
+            vdi_members,
+            deferred_members,
+            exr_patches,
+            vdis_frames,
+            vdiset_heads,
+            html_patches,
+            served_messages,
+        ),
         *(validator, vtk_form, command_line, public_functions),
     )
 }

@@ -41,6 +41,7 @@ from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 
@@ -296,7 +297,7 @@ class StepsReader(Sequence[VDI]):
             of = self._described(i)
             if self._frames[source][1].kind == layout.VDI_FILE:
                 self.n_decoded += 1
-                vdi = vdi_reader.read(self._path, stream=self._file_in(source))
+                vdi = as_vdi(vdi_reader.read(self._path, stream=self._file_in(source)))
                 if source == i:
                     return vdi
                 arrays = (vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth)

@@ -28,6 +28,7 @@ from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.compositing import opacity, transmittance
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.metrics import over_background
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, whole_file
@@ -235,7 +236,7 @@ def in_parts(data: bytes, cut: int) -> list[bytes]:
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:
     """Read the VDI that a page shows: see :func:`pyvista_vdi.io.read`."""
-    return reader.read(path, progress=progress, stream=data_in(path))
+    return as_vdi(reader.read(path, progress=progress, stream=data_in(path)))
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:

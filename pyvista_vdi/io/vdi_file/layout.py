@@ -29,6 +29,11 @@ CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16, 3: 1 << 16, 4: 1 << 16}
 #: What a description calls the format.
 FORMAT_NAME = "pyvista-vdi"
 
+#: What it calls a file of the same layout whose lists keep values: a program that does not know
+#: what they are refuses it, and takes no value for a colour. Its description has an entry
+#: ``deferred``, with a version of its own.
+DEFERRED_NAME = "pyvista-vdi-deferred"
+
 #: The name that a file's name ends in.
 SUFFIX = ".vdi"
 

@@ -29,6 +29,7 @@ from pyvista_vdi.io.vdi_file.chunks import (
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
+    DEFERRED_NAME,
     DEFLATE,
     DESCRIPTION,
     FORMAT_NAME,
@@ -40,6 +41,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     layouts,
 )
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.packing import (
     Packed16,
@@ -83,7 +85,8 @@ class FileInfo:
     what made the VDI. ``codec``: how the arrays are compressed: ``"zstd"``, ``"lz4"``,
     ``"deflate"`` or ``"none"``. ``file_bytes``: size of the file. ``memory_bytes``: size of the
     VDI's arrays in memory. ``precision``: one of :data:`pyvista_vdi.model.packing.PRECISIONS`.
-    ``depth_step``: of the 8-byte form: step of its depths, world units.
+    ``depth_step``: of the 8-byte form: step of its depths, world units. ``deferred``: of a
+    :class:`~pyvista_vdi.DeferredVDI`, what is known of its values, else None.
     """
 
     path: Path
@@ -100,6 +103,8 @@ class FileInfo:
     memory_bytes: int
     precision: str = "exact"
     depth_step: float = 1.0
+    #: Of lists that keep values: their range and what else is known of them.
+    deferred: dict[str, Any] | None = None
 
 
 def read(
@@ -107,7 +112,7 @@ def read(
     *,
     progress: Progress | None = None,
     stream: BinaryIO | None = None,
-) -> VDI:
+) -> VDI | DeferredVDI:
     """Read a VDI from a .vdi file: see :func:`pyvista_vdi.io.read`.
 
     ``stream`` holds the file where it lies within another, at ``path``.
@@ -165,7 +170,7 @@ class _OpenFile:
         self._archive.close()
         self._stream.close()
 
-    def vdi(self, progress: Progress | None) -> VDI:
+    def vdi(self, progress: Progress | None) -> VDI | DeferredVDI:
         """Return the VDI with its arrays, all checked."""
         info = self.info
         try:
@@ -195,7 +200,7 @@ class _OpenFile:
                 metadata=info.metadata,
             )
             vdi.packing = packing
-            return vdi
+            return vdi if info.deferred is None else DeferredVDI.of_lists(vdi, info.deferred)
         except DamagedChunkError as error:
             self._refuse(str(error))
         except OSError as error:
@@ -237,7 +242,8 @@ class _OpenFile:
             description = from_json(text)
         except (ValueError, RecursionError) as error:
             self._refuse(f"its description {DESCRIPTION} is no JSON ({error})")
-        if not isinstance(description, dict) or description.get("format") != FORMAT_NAME:
+        names = (FORMAT_NAME, DEFERRED_NAME)
+        if not isinstance(description, dict) or description.get("format") not in names:
             raise VDIFileError(
                 f"{self._path} is not a VDI file: {DESCRIPTION} does not name the format "
                 f"{FORMAT_NAME!r}"
@@ -252,6 +258,16 @@ class _OpenFile:
                 f"{__version__}, which reads up to version {FORMAT_VERSION}: "
                 "upgrade by pip install -U pyvista-vdi"
             )
+        if description["format"] == DEFERRED_NAME:
+            about = description.get("deferred")
+            kept = about.get("version") if isinstance(about, dict) else None
+            if isinstance(kept, bool) or not isinstance(kept, int) or kept < 1:
+                self._refuse(f"the version of its values is {kept!r}")
+            if kept > 1:
+                raise VDIFileError(
+                    f"{self._path} keeps values in version {kept}; this is pyvista-vdi "
+                    f"{__version__}, which reads version 1: upgrade by pip install -U pyvista-vdi"
+                )
         return description
 
     def _checked_info(self) -> FileInfo:
@@ -288,6 +304,7 @@ class _OpenFile:
                 memory_bytes=(n_lists + 1) * 8 + n * 24 + packed_bytes[precision],
                 precision=precision,
                 depth_step=number(d["depth_step"]) if precision == "8-byte" else 1.0,
+                deferred=d["deferred"] if d["format"] == DEFERRED_NAME else None,
             )
         except VDIFileError:
             raise

@@ -19,6 +19,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
     COARSE,
     COARSE_STEP,
+    DEFERRED_NAME,
     DEFLATE,
     DESCRIPTION,
     INDEX,
@@ -27,6 +28,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     layouts,
     version_of,
 )
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.list_subsampling import coarser
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
@@ -43,7 +45,7 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def write(
-    vdi: VDI,
+    vdi: VDI | DeferredVDI,
     path: str | os.PathLike[str],
     *,
     compression: str = "lz4",
@@ -63,8 +65,9 @@ def write(
     VDI's own by default. ``progress``: as for :func:`pyvista_vdi.io.write`.
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
+    lists, about = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
     with whole_file(path) as stream:
-        write_to(stream, vdi, compression, level, progress)
+        write_to(stream, lists, compression, level, progress, deferred=about)
     return Path(os.path.realpath(path))
 
 
@@ -76,12 +79,14 @@ def write_to(
     progress: Progress | None = None,
     *,
     coarse: bool = True,
+    deferred: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a .vdi file to a stream that can be sought in.
 
     ``stream``: takes the bytes. ``vdi``, ``compression``, ``level``, ``progress``: as for
     :func:`write`; the VDI has the precision to write. ``coarse``: whether a file of version 4
-    begins with a coarse level.
+    begins with a coarse level. ``deferred``: what a :class:`DeferredVDI` is about, whose lists
+    ``vdi`` are; they have no coarse level, as values do not mix as media do.
     """
     counts = smallest(np.diff(vdi.offsets))
     arrays = layouts(
@@ -92,13 +97,13 @@ def write_to(
         version=version_of(vdi.precision, compression),
         precision=vdi.precision,
     )
-    description = _described(vdi, arrays, compression)
+    description = _described(vdi, arrays, compression, deferred)
     effort = DEFAULT_LEVELS[compression] if level is None else level
     done = Pieces(progress, sum(layout.n_chunks for layout in arrays.values()))
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_member(DESCRIPTION), description)
         shrinks = min(vdi.window_size) >= COARSE_STEP and int(vdi.counts.max()) <= DEPTH_CODES
-        if coarse and compression == DEFLATE and shrinks:
+        if coarse and compression == DEFLATE and shrinks and deferred is None:
             small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
             few = io.BytesIO()
             write_to(few, small, DEFLATE, effort, coarse=False)
@@ -118,9 +123,13 @@ def _member(name: str) -> zipfile.ZipInfo:
     return info
 
 
-def _described(vdi: VDI, arrays: Mapping[str, Layout], codec: str) -> str:
+def _described(
+    vdi: VDI, arrays: Mapping[str, Layout], codec: str, deferred: Mapping[str, Any] | None
+) -> str:
     version = version_of(vdi.precision, codec)
     entries = describe(vdi, version)
+    if deferred is not None:
+        entries |= {"format": DEFERRED_NAME, "deferred": dict(deferred)}
     metadata = entries.pop("metadata")
     packed: dict[str, Any] = {} if version < 3 else {"precision": vdi.precision}
     if isinstance(vdi.packing, Packed8):

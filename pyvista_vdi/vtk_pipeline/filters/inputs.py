@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.generation.classified_values import classify_on_device
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build
@@ -271,6 +275,32 @@ class ImageInput(Input):
         return self._image.GetMTime()
 
 
+class DeferredInput(Input):
+    """Values that a volume property classifies, anew when it has changed; no volume is needed."""
+
+    def __init__(self, deferred: DeferredVDI, prop: Any) -> None:
+        super().__init__()
+        self.deferred, self.prop = deferred, prop
+        self._made_at: Any = None
+
+    def vdi(self) -> VDI:
+        """Return the VDI that the property makes of the values now."""
+        stamp = self.stamp()
+        if self._vdi is None or self._made_at != stamp:
+            look = transfer_function_from_property(self.prop)
+            self._vdi = classify_on_device(self.deferred, look)
+            self._made_at = stamp
+        return self._vdi
+
+    def bounds(self) -> tuple[float, ...]:
+        """Return the bounds in the model frame."""
+        return self.deferred.bounds
+
+    def stamp(self) -> Any:
+        """Return the time stamp of the property and its functions."""
+        return self.prop.GetMTime()
+
+
 def _size(renderer: Any) -> tuple[int, int]:
     width, height = renderer.GetSize()
     return max(1, width), max(1, height)
@@ -280,6 +310,10 @@ def input_of(data: Any) -> Input:
     """Return what to draw for a VDI, an image of one, a VDISource, or what extensions show."""
     if isinstance(data, VDI):
         return Input(data)
+    if isinstance(data, DeferredInput):
+        return data
+    if isinstance(data, DeferredVDI):
+        as_vdi(data)  # raises, and says what to do
     if isinstance(data, VDISource):
         return SourceInput(data)
     if is_vdi_image(data):

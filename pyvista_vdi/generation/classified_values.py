@@ -1,0 +1,79 @@
+"""Classify deferred VDIs on a device, in one pass over their supersegments."""
+
+import threading
+import weakref
+
+import numpy as np
+
+from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime, padded
+from pyvista_vdi.device.constants import GROUP
+from pyvista_vdi.errors import NoDeviceError
+from pyvista_vdi.generation.kernels import CLASSIFY_VALUES
+from pyvista_vdi.model.deferred import CELLS, DeferredVDI, Floats, Media, classify
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import DeviceLike
+from pyvista_vdi.model.vdi import VDI
+
+#: Whole numbers of this stand for opacities: sums over all cells stay below 2^63.
+_UNITS = 2.0**40
+
+#: What is on devices of a deferred VDI: means, spreads and steps, which no look changes.
+_uploads: weakref.WeakKeyDictionary[DeferredVDI, dict[Runtime, list[DeviceBuffer]]] = (
+    weakref.WeakKeyDictionary()
+)
+_lock = threading.Lock()
+
+
+def classify_on_device(
+    deferred: DeferredVDI, transfer_function: TransferFunction, device: DeviceLike | None = None
+) -> VDI:
+    """Return what :func:`~pyvista_vdi.model.deferred.classify` does, computed on a device.
+
+    On the host where there is none, or where it cannot hold the arrays.
+    """
+    try:
+        runtime = get_runtime(device)
+    except NoDeviceError:
+        if device is not None:
+            raise
+        return classify(deferred, transfer_function)
+    n = deferred.n_supersegments
+    if n == 0 or 12 * n > runtime.info.max_allocation:
+        return classify(deferred, transfer_function)
+
+    def on_device(deferred: DeferredVDI, values: Floats) -> Media:
+        integrals = np.zeros((CELLS + 1, 4), np.int64)
+        np.cumsum(np.rint(values * _UNITS).astype(np.int64), axis=0, out=integrals[1:])
+        means, spreads, steps = _uploaded(runtime, deferred)
+        with (
+            runtime.upload(integrals, "integrals of a transfer function") as table,
+            runtime.buffer((n, 3), name="supersegment colours") as colors,
+            runtime.buffer((n,), name="optical depths") as optical_depths,
+        ):
+            launch = runtime.bind(
+                CLASSIFY_VALUES,
+                means=means,
+                spreads=spreads,
+                steps=steps,
+                integrals=table,
+                colors=colors,
+                optical_depths=optical_depths,
+            )
+            launch(padded(n, GROUP), GROUP, count=n, cells=CELLS)
+            return runtime.download(colors), runtime.download(optical_depths)
+
+    return classify(deferred, transfer_function, on_device)
+
+
+def _uploaded(runtime: Runtime, deferred: DeferredVDI) -> list[DeviceBuffer]:
+    """Return means, spreads and steps on a device, made once for a deferred VDI."""
+    with runtime.holding(_lock):
+        kept = _uploads.setdefault(deferred, {})
+        if runtime not in kept:
+            arrays = {"means": deferred.mean, "spreads": deferred.spread, "steps": deferred.steps}
+            kept[runtime] = [
+                runtime.upload(np.ascontiguousarray(array), f"{name} of values")
+                for name, array in arrays.items()
+            ]
+            runtime.finish()  # a thread with another queue may use them next
+        return kept[runtime]

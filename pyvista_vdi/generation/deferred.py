@@ -1,0 +1,151 @@
+"""Volume to a VDI that keeps values, by the same marches: a transfer function that keeps them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.checks import as_range
+from pyvista_vdi.model.deferred import DeferredVDI, importance_points, lengths_of
+from pyvista_vdi.model.options import (
+    Deferral,
+    GenerationOptions,
+    GenerationRequest,
+    record,
+)
+from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
+
+#: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
+#: whatever lies before it: 1 - 2^-36 n is 1 for the voxels n of any ray.
+_PER_VOXEL = 2.0**-36
+#: Table cells over the range of values. Values beyond it by less than one fade out.
+_CELLS = 4096
+#: What values and their squares weigh in the error of merging beside the importance: nothing that
+#: counts where that tells values apart.
+_BESIDE = 2.0**-8
+#: Spreads below what float32 holds of a mean of squares are none; shares this near to 1 are 1.
+_LEAST_SPREAD = 5e-4
+_WHOLE = 1e-3
+
+
+@record
+@dataclass(frozen=True)
+class _LengthOptions(GenerationOptions):
+    """Options under which merging counts lengths alone, of a medium of :data:`_PER_VOXEL`."""
+
+    @property
+    def hidden_weight(self) -> float:
+        """1: what V_O sees makes no difference."""
+        return 1.0
+
+    @property
+    def finest_error(self) -> float:
+        """As little as the features of such a medium are, squared."""
+        return super().finest_error * _PER_VOXEL**2
+
+
+def generate_deferred(
+    request: GenerationRequest,
+    deferral: Deferral,
+    generate: Callable[[GenerationRequest], VDI] = generate_vdi,
+) -> DeferredVDI:
+    """Make a deferred VDI; of the request's transfer function the interpolation counts.
+
+    ``generate`` makes the VDI of a request: here, in blocks, or by workers. InvalidArgumentError if
+    the range or the importance cannot be used, UnsupportedError for what cannot be deferred, and
+    what ``generate`` raises.
+    """
+    volume, options = request.volume, request.options
+    if volume.rgba:
+        raise UnsupportedError(
+            "RGBA volumes have colours of their own, so that nothing is left to be classified "
+            "afterwards: leave classification='deferred' out"
+        )
+    if options.ambient_occlusion is not None:
+        raise UnsupportedError(
+            "ambient occlusion follows from opacities, which a deferred VDI does not have: leave "
+            "ambient_occlusion out, or classification='deferred'"
+        )
+    asked = volume.finite_range() if deferral.value_range is None else deferral.value_range
+    low, high = as_range(asked)
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InvalidArgumentError(
+            f"value_range must be two finite scalars, low < high; got {asked!r}"
+            + (": the volume has one value only" if deferral.value_range is None else "")
+        )
+    points = importance_points(deferral.importance, (low, high))
+    given = {each.name: getattr(options, each.name) for each in fields(options)}
+    made = generate(
+        request.replace(
+            transfer_function=_keeping(request, (low, high), points),
+            options=_LengthOptions(**{**given, "precision": "exact"}),
+        )
+    )
+
+    # What the channels of the table have become: means by length
+    _, mean, square = made.color.T.astype(np.float64) / _BESIDE
+    mean = np.clip(mean, 0, 1)
+    spread = np.sqrt(np.maximum(square / 4 - (mean - 0.5) ** 2, 0))
+    spread = np.minimum(np.where(spread < _LEAST_SPREAD, 0, spread), 0.5)
+    share = made.optical_depth / (_PER_VOXEL / min(volume.spacing) * lengths_of(made))
+    metadata: dict[str, Any] = dict(made.metadata)
+    for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
+        metadata.pop(name)
+    if volume.chunks is None or volume.chunks.ranges() is not None:  # else nothing is read for it
+        metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
+    return DeferredVDI(
+        made.camera,
+        made.window_size,
+        made.offsets,
+        made.front,
+        made.back,
+        mean,
+        spread,
+        np.where(share > 1 - _WHOLE, 1, share),
+        made.bounds,
+        value_range=(low, high),
+        unit_distance=volume.default_unit_distance,
+        sample_distance=metadata["sample_distance"],
+        importance=points,
+        depth_origin=made.depth_origin,
+        metadata=metadata,
+    ).with_precision(options.precision)
+
+
+def _keeping(
+    request: GenerationRequest,
+    value_range: tuple[float, float],
+    points: Sequence[tuple[float, float]] | None,
+) -> TransferFunction:
+    """Return the transfer function whose colours are values: its opacity is that of lengths.
+
+    Entries: one below the range and one above, which are transparent, and between them the
+    integral of the importance, the value, and its square about the middle.
+    """
+    low, high = value_range
+    place = np.arange(-1, _CELLS + 2) / _CELLS
+    share = np.clip(place, 0, 1)
+    weights = np.ones_like(share)
+    if points is not None:
+        values, given = np.transpose(points)
+        weights = np.interp(low + (high - low) * share, values, given)
+    integral = np.zeros_like(share)
+    np.cumsum(np.diff(share) * (weights[1:] + weights[:-1]) / 2, out=integral[1:])
+    if not integral[-1] > 0:
+        raise InvalidArgumentError(
+            f"importance is 0 over all of value_range {low:g} to {high:g}: nothing would be kept"
+        )
+    columns = (integral / integral[-1], _BESIDE * share, _BESIDE * 4 * (share - 0.5) ** 2)
+    kept = (place >= 0) & (place <= 1) & (weights > 0)
+    cell = (high - low) / _CELLS
+    return TransferFunction(
+        np.clip(np.stack(columns, axis=1), 0, 1),
+        np.where(kept, _PER_VOXEL, 0.0),
+        (low - cell, high + cell),
+        unit_distance=min(request.volume.spacing),
+        interpolation=request.transfer_function.interpolation,
+    )

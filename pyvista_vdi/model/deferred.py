@@ -1,0 +1,528 @@
+"""A VDI that keeps values: its transfer function is chosen afterwards (docs/deferred.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi import registry
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVDIError,
+    UnsupportedError,
+    warn_external,
+)
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_floats, as_number, as_range
+from pyvista_vdi.model.list_subsampling import length_per_depth
+from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.model.vdi import VDI
+
+if TYPE_CHECKING:
+    import os
+
+Floats = NDArray[np.float64]
+#: Straight colours and optical depths of supersegments.
+Media = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+#: Cells of the tables that a transfer function is integrated in, over the range of values: a window
+#: of a fiftieth of it has 327.
+CELLS = 1 << 14
+
+
+class DeferredVDI:
+    """A VDI whose supersegments keep the mean and the spread of the values along the ray.
+
+    It is a view-dependent stand-in for a volume that has not been classified yet:
+    :meth:`classified` makes an ordinary :class:`VDI` of it for any transfer function, without the
+    volume. Lists, depths and bounds are those of a :class:`VDI`. It is valid or cannot be built,
+    and its arrays are read-only.
+
+    Parameters
+    ----------
+    camera, window_size, offsets, front, back, bounds
+        As for :class:`VDI`.
+    mean : array_like of float32, shape (n,)
+        Mean by length of the values, as shares of ``value_range``, 0 to 1.
+    spread : array_like of float32, shape (n,)
+        Their standard deviation by length, as a share of ``value_range``, 0 to 1/2.
+    share : array_like of float32, shape (n,)
+        Share of the length that holds values of the range, 0 to 1: below 1 where a gap had to be
+        covered to keep the list's budget.
+    value_range : (float, float)
+        Least and largest value that it keeps; what is outside is in no supersegment.
+    unit_distance : float
+        Opacity unit distance of a transfer function that has none of its own, model units.
+    sample_distance : float
+        Step of the march that made it, model units, by whose opacity values are averaged.
+    importance : sequence of (float, float), optional
+        Points (value, weight) of the importance by which supersegments were cut; 1 by default.
+    depth_origin, metadata
+        As for :class:`VDI`.
+
+    Raises
+    ------
+    InvalidVDIError
+        If an element breaks a rule; the message names the element and the rule.
+    """
+
+    value_range: tuple[float, float]
+    unit_distance: float
+    sample_distance: float
+    importance: tuple[tuple[float, float], ...] | None
+
+    def __init__(
+        self,
+        camera: Camera,
+        window_size: Sequence[int],
+        offsets: ArrayLike,
+        front: ArrayLike,
+        back: ArrayLike,
+        mean: ArrayLike,
+        spread: ArrayLike,
+        share: ArrayLike,
+        bounds: ArrayLike,
+        *,
+        value_range: Sequence[float],
+        unit_distance: float,
+        sample_distance: float,
+        importance: Sequence[Sequence[float]] | None = None,
+        depth_origin: float = 0.0,
+        metadata: Mapping[str, Any] | None = None,
+    ) -> None:
+        columns = [as_floats(values).astype(np.float32) for values in (mean, spread, share)]
+        names = ("mean", "spread", "share")
+        for name, values, most in zip(names, columns, (1.0, 0.5, 1.0), strict=True):
+            good = (values >= 0) & (values <= most)
+            if values.ndim != 1 or len(values) != len(columns[0]):
+                raise InvalidVDIError(
+                    f"{name} must have one number for each of {len(columns[0])} supersegments; "
+                    f"got shape {values.shape}"
+                )
+            if not good.all():
+                k = int(np.argmin(good))
+                raise InvalidVDIError(
+                    f"supersegment {k} breaks the rule '0 <= {name} <= {most:g}': {values[k]}"
+                )
+        # Mean, what of it is left below its float32, and share in the place of a colour; spread in
+        # that of the optical depth: whatever checks, packs, compresses and reads lists does it here
+        color = np.stack([columns[0], np.zeros_like(columns[0]), columns[2]], axis=1)
+        lists = VDI(
+            camera,
+            window_size,
+            offsets,
+            front,
+            back,
+            color,
+            columns[1],
+            bounds,
+            depth_origin=depth_origin,
+            metadata=metadata,
+        )
+        self._set(lists, value_range, unit_distance, sample_distance, importance)
+
+    @classmethod
+    def of_lists(cls, lists: VDI, about: Mapping[str, Any]) -> DeferredVDI:
+        """Return what was stored as :attr:`lists` and :attr:`about`; InvalidVDIError if it is none.
+
+        Only our files call it: ``about`` may be anybody's.
+        """
+        deferred = cls.__new__(cls)
+        if not isinstance(about, Mapping) or about.get("version") != 1:
+            version = about.get("version") if isinstance(about, Mapping) else about
+            raise InvalidVDIError(
+                f"its values are of version {version!r}, and this program reads version 1: "
+                "upgrade by pip install -U pyvista-vdi"
+            )
+        if lists.n_supersegments and not float(lists.optical_depth.max()) <= 0.5:
+            k = int(np.argmax(lists.optical_depth))
+            raise InvalidVDIError(
+                f"supersegment {k} breaks the rule '0 <= spread <= 0.5': {lists.optical_depth[k]}"
+            )
+        names = ("value_range", "unit_distance", "sample_distance", "importance")
+        deferred._set(lists, *(about.get(name) for name in names))
+        return deferred
+
+    def _set(self, lists: VDI, value_range: Any, unit: Any, step: Any, importance: Any) -> None:
+        self._lists = lists
+        low, high = as_range(value_range)
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise InvalidVDIError(
+                f"value_range must be two finite numbers, low < high; got {value_range!r}"
+            )
+        self.value_range = (low, high)
+        for name, value in (("unit_distance", unit), ("sample_distance", step)):
+            length = as_number(value)
+            if not (np.isfinite(length) and length > 0):
+                raise InvalidVDIError(f"{name} must be a length above 0; got {value!r}")
+            setattr(self, name, length)
+        try:
+            self.importance = importance_points(importance, self.value_range)
+        except InvalidArgumentError as error:
+            raise InvalidVDIError(str(error)) from error
+
+    @property
+    def lists(self) -> VDI:
+        """Its lists in the form of a VDI, for storage: colours are no colours (docs/files.md)."""
+        return self._lists
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What is stored beside :attr:`lists`, in values that JSON can hold."""
+        points = self.importance
+        return {
+            "version": 1,
+            "value_range": list(self.value_range),
+            "unit_distance": self.unit_distance,
+            "sample_distance": self.sample_distance,
+            "importance": None if points is None else [list(point) for point in points],
+        }
+
+    @property
+    def camera(self) -> Camera:
+        """The generating view V_O."""
+        return self._lists.camera
+
+    @property
+    def window_size(self) -> tuple[int, int]:
+        """Lists along each edge of the viewport."""
+        return self._lists.window_size
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """Width and height of the pictures that it was made for, pixels."""
+        return self._lists.picture_size
+
+    @property
+    def offsets(self) -> NDArray[np.uint64]:
+        """Where each list begins, uint64 (W * H + 1,)."""
+        return self._lists.offsets
+
+    @property
+    def front(self) -> NDArray[np.float32]:
+        """View depth of the front faces less ``depth_origin``, float32 (n,)."""
+        return self._lists.front
+
+    @property
+    def back(self) -> NDArray[np.float32]:
+        """View depth of the back faces less ``depth_origin``, float32 (n,)."""
+        return self._lists.back
+
+    @property
+    def mean(self) -> NDArray[np.float32]:
+        """Mean by length, as a share of the range of values, float32 (n,)."""
+        color = self._lists.color
+        mean = color[:, 0]
+        if self.precision != "exact":  # two bytes: what is left below the first is in the second
+            mean = np.minimum(mean + color[:, 1] / np.float32(255), np.float32(1))
+        mean.setflags(write=False)
+        return mean
+
+    @property
+    def spread(self) -> NDArray[np.float32]:
+        """Standard deviation by length, as a share of the range of values, float32 (n,)."""
+        return self._lists.optical_depth
+
+    @property
+    def share(self) -> NDArray[np.float32]:
+        """Share of the length that holds values of the range, float32 (n,)."""
+        return self._lists.color[:, 2]
+
+    @cached_property
+    def steps(self) -> NDArray[np.float32]:
+        """Steps of the march through what each supersegment holds, float32 (n,)."""
+        length = lengths_of(self._lists) / self.sample_distance
+        return (length * self.share).astype(np.float32)
+
+    @property
+    def values(self) -> Floats:
+        """The means as scalars of the volume, float64 (n,)."""
+        low, high = self.value_range
+        return low + (high - low) * self.mean.astype(np.float64)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float, float, float]:
+        """Axis-aligned bounds in the model frame."""
+        return self._lists.bounds
+
+    @property
+    def depth_origin(self) -> float:
+        """World units, added to every front and back."""
+        return self._lists.depth_origin
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """How it was made."""
+        return self._lists.metadata
+
+    @property
+    def n_supersegments(self) -> int:
+        """Number of supersegments in all lists."""
+        return self._lists.n_supersegments
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Supersegments per list, int64 (H, W), bottom row first."""
+        return self._lists.counts
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays in memory."""
+        return self._lists.nbytes
+
+    @property
+    def precision(self) -> str:
+        """What a supersegment takes in a file: see :meth:`with_precision`."""
+        return self._lists.precision
+
+    def equals(self, other: object) -> bool:
+        """Whether all arrays, the view, the bounds and the range are the same to the last bit."""
+        same = isinstance(other, DeferredVDI) and self.about == other.about
+        return same and self._lists.equals(other.lists)  # type: ignore[attr-defined]
+
+    def with_precision(self, precision: str) -> DeferredVDI:
+        """Return it with supersegments of fewer bytes: ``"exact"``, ``"8-byte"``.
+
+        In 8 bytes depths have 14 bits of the list's extent, the mean 3825 steps over the range of
+        values, the spread 4 significant bits and the share 8 bits. There are no 16-byte ones:
+        UnsupportedError.
+        """
+        if precision == self.precision:
+            return self
+        if precision == "16-byte":
+            raise UnsupportedError(
+                "a DeferredVDI has no 16-byte supersegments: choose 'exact' or '8-byte'"
+            )
+        lists = self._lists
+        mean = self.mean.astype(np.float64)
+        low, spread = np.zeros_like(mean), lists.optical_depth
+        if precision == "8-byte":
+            # Fewer codes than there is room for, which compress better: 255 * 15, and 4 bits
+            whole = np.round(mean * 3825)
+            mean, low = whole // 15 / 255, whole % 15 / 15
+            fraction, exponent = np.frexp(spread)
+            spread = np.ldexp(np.round(fraction * 16) / 16, exponent)
+        color = np.stack([mean, low, self.share], axis=1)
+        plain = VDI(
+            lists.camera,
+            lists.window_size,
+            lists.offsets,
+            lists.front,
+            lists.back,
+            color,
+            spread,
+            lists.bounds,
+            depth_origin=lists.depth_origin,
+            metadata=lists.metadata,
+        )
+        return DeferredVDI.of_lists(plain.with_precision(precision), self.about)
+
+    def classified(self, **look: Any) -> VDI:
+        """Return the VDI that a transfer function makes of it, without the volume.
+
+        Parameters
+        ----------
+        **look
+            Those of :func:`pyvista_vdi.generate`, with its names and defaults: ``cmap``,
+            ``opacity``, ``clim`` (the range of values by default), ``n_colors``,
+            ``flip_scalars``, ``log_scale``, ``opacity_unit_distance``; or ``volume_property`` or
+            ``transfer_function`` in place of them. And ``device``, where it is computed: by
+            default as for :func:`pyvista_vdi.render`, and on the host where there is none.
+
+        Returns
+        -------
+        VDI
+            What is transparent is left out.
+
+        Raises
+        ------
+        UnsupportedError
+            If the transfer function asks for light or gradient opacity, which no list knows.
+        InvalidArgumentError, MissingDependencyError
+            As for :func:`pyvista_vdi.generate`.
+
+        Warns
+        -----
+        VDIWarning
+            If the transfer function shows values outside :attr:`value_range`, with their share.
+
+        Examples
+        --------
+        >>> import pyvista_vdi as pvdi
+        >>> kept = pvdi.read("values.vdi")  # doctest: +SKIP
+        >>> bone = kept.classified(cmap="bone", opacity=[0, 0, 0.4, 0.9])  # doctest: +SKIP
+        """
+        return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a ``.vdi`` file that `pyvista_vdi.read` opens; see :func:`pyvista_vdi.io.write`."""
+        return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        low, high = self.value_range
+        return repr(self._lists).replace("VDI(", "DeferredVDI(")[:-1] + f", {low:g} to {high:g})"
+
+
+def importance_points(
+    importance: Any, value_range: tuple[float, float]
+) -> tuple[tuple[float, float], ...] | None:
+    """Return an importance as points (value, weight); ``None``: 1 everywhere.
+
+    Points are given as such, with values that grow, or as weights alone, at equal distances over
+    the range, as an opacity curve is. InvalidArgumentError if it is neither.
+    """
+    if importance is None:
+        return None
+    points = as_floats(importance)
+    if points.ndim == 1 and len(points) > 1:
+        points = np.stack([np.linspace(*value_range, len(points)), points], axis=1)
+    if (
+        points.ndim != 2
+        or points.shape[1] != 2
+        or len(points) < 2
+        or not np.isfinite(points).all()
+        or not (np.diff(points[:, 0]) >= 0).all()
+        or not (points[:, 1] >= 0).all()
+    ):
+        raise InvalidArgumentError(
+            "importance must be two or more weights >= 0, or points (value, weight) with values "
+            f"that grow; got {importance!r}"
+        )
+    return tuple((float(value), float(weight)) for value, weight in points)
+
+
+def looked_up(transfer_function: TransferFunction, values: Floats) -> tuple[Floats, Floats]:
+    """Return colours (n, 3) and opacities (n,) of scalars, float64."""
+    low, high = transfer_function.scalar_range
+    entries = len(transfer_function.opacities)
+    if high > low:
+        place = (values - low) / (high - low) * (entries - 1)
+    else:
+        place = np.where(values > low, entries - 1.0, 0.0)
+    nodes = np.arange(entries)
+    columns = [
+        np.interp(place, nodes, column.astype(np.float64))
+        for column in (*transfer_function.colors.T, transfer_function.opacities)
+    ]
+    return np.stack(columns[:3], axis=1), columns[3]
+
+
+def lengths_of(lists: VDI) -> Floats:
+    """Return the model length of each supersegment along its list's centre ray, float64 (n,)."""
+    across, along = ((2 * np.arange(n) + 1) / n - 1 for n in lists.window_size)
+    per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
+    thickness = lists.back.astype(np.float64) - lists.front
+    return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
+
+
+def classify(
+    deferred: DeferredVDI,
+    transfer_function: TransferFunction,
+    media: Callable[[DeferredVDI, Floats], Media] | None = None,
+) -> VDI:
+    """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
+
+    The opacity of a step of the march, and its colour weighted by opacity, are their means over the
+    values from mean - sqrt(3) spread to mean + sqrt(3) spread, within the range: those of values
+    that are spread evenly. ``media``: does what :func:`media_of_values` does, which is the default.
+    Errors and warnings: :meth:`DeferredVDI.classified`.
+    """
+    for name, asked in (
+        ("shading", transfer_function.shading),
+        ("gradient opacity", transfer_function.gradient_opacities),
+    ):
+        if asked is not None:
+            raise UnsupportedError(
+                f"{name} needs gradients, which a DeferredVDI does not keep: leave it out, or "
+                "generate with the transfer function and classification='baked'"
+            )
+    _warn_outside(deferred, transfer_function)
+
+    # A step's opacity, and the colour times it, in cells of the range of values
+    low, high = deferred.value_range
+    unit = transfer_function.unit_distance or deferred.unit_distance
+    values = low + (np.arange(CELLS) + 0.5) / CELLS * (high - low)
+    color, opacity = looked_up(transfer_function, values)
+    with np.errstate(divide="ignore"):
+        of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
+    of_cells = np.column_stack([of_step[:, np.newaxis] * color, of_step])
+    straight, optical_depth = (media or media_of_values)(deferred, of_cells)
+
+    # What is transparent is left out
+    lists = deferred.lists
+    rows: Any = np.flatnonzero(optical_depth > 0)
+    offsets = lists.offsets
+    if len(rows) == len(optical_depth):
+        rows = slice(None)
+    else:
+        offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
+    return VDI(
+        lists.camera,
+        lists.window_size,
+        offsets,
+        lists.front[rows],
+        lists.back[rows],
+        straight[rows],
+        optical_depth[rows],
+        lists.bounds,
+        depth_origin=lists.depth_origin,
+        metadata={
+            **lists.metadata,
+            "opacity_unit_distance": unit,
+            "transfer_function": transfer_function.to_dict(),
+            "deferred": deferred.about,
+        },
+    )
+
+
+def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
+    """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
+
+    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, (CELLS, 4).
+    """
+    integrals = np.zeros((CELLS + 1, 4))
+    np.cumsum(of_cells, axis=0, out=integrals[1:])
+    mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
+    reach = np.maximum(np.sqrt(3) * spread, 0.5 / CELLS)  # at least a cell
+    first, last = (np.clip(mean + sign * reach, 0, 1) * CELLS for sign in (-1, 1))
+    means = _integral(integrals, last) - _integral(integrals, first)
+    means /= (last - first)[:, np.newaxis]
+    of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
+    optical_depth = (-np.log1p(-of_step) * deferred.steps).astype(np.float32)
+    straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
+    return np.clip(straight, 0, 1).astype(np.float32), optical_depth
+
+
+def _integral(integrals: Floats, place: Floats) -> Floats:
+    """Return integrals up to places in cells: within a cell the extinction is the same."""
+    cell = np.minimum(place.astype(np.int64), CELLS - 1)
+    share = (place - cell)[:, np.newaxis]
+    return integrals[cell] * (1 - share) + integrals[cell + 1] * share
+
+
+def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) -> None:
+    """Warn where a transfer function shows values that are not kept, with their share."""
+    volume = deferred.metadata.get("volume")
+    stored = volume.get("scalar_range") if isinstance(volume, Mapping) else None
+    least, largest = as_range(stored or transfer_function.scalar_range)
+    if not (np.isfinite(least) and np.isfinite(largest) and least < largest):
+        return
+    low, high = deferred.value_range
+    values = np.linspace(least, largest, 4097)
+    opacity = looked_up(transfer_function, values)[1]
+    # A value at an end of the range is kept
+    outside = opacity[(values < low) | (values > high)].sum()
+    if outside > 1e-3 * opacity.sum():
+        warn_external(
+            f"the transfer function shows values outside {low:g} to {high:g}, which this VDI does "
+            f"not keep: {outside / opacity.sum():.1%} of its opacity from {least:g} to "
+            f"{largest:g}; generate with a wider value_range, or lower the opacity there"
+        )
+
+
+__all__ = ["DeferredVDI", "classify", "importance_points", "lengths_of", "looked_up"]

@@ -1,0 +1,208 @@
+"""Deferred VDIs: what they keep is what NumPy finds along the rays, whatever can be seen of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.generation.classified_values import classify_on_device
+from pyvista_vdi.generation.deferred import generate_deferred
+from pyvista_vdi.model.deferred import classify, lengths_of
+from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
+
+EDGES = NX, NY, NZ = 7, 6, 33
+#: Lengths of a column's voxels: the first and the last reach half as far into the grid.
+LENGTHS = np.array([0.5, *[1.0] * (NZ - 2), 0.5])
+
+
+def columns(array):
+    """A volume, and the parallel view along -z of which each list is a column of it."""
+    volume = pvdi.Volume(array)
+    middle = ((NX - 1) / 2, (NY - 1) / 2)
+    camera = pvdi.Camera(
+        (*middle, 90), (*middle, 0), (0, 1, 0), parallel_projection=True, parallel_scale=NY / 2
+    )
+    return volume, camera
+
+
+def kept(runtime, array, value_range=None, importance=None, interpolation="nearest", **options):
+    volume, camera = columns(array)
+    looks = pvdi.TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
+    request = GenerationRequest(
+        volume, looks, camera, (NX, NY), GenerationOptions(**options), runtime
+    )
+    return generate_deferred(request, Deferral("deferred", value_range, importance))
+
+
+def inner(deferred):
+    """Yield x, y and the rows of the lists whose rays lie within the grid."""
+    for y in range(1, NY - 1):
+        for x in range(1, NX - 1):
+            yield x, y, deferred.lists.list_at(x, y)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32, np.float64])
+def test_one_supersegment_has_the_mean_and_the_spread_of_its_column(runtime, dtype):
+    rng = np.random.default_rng(1)
+    array = (rng.random(EDGES[::-1]) * 200 + 20).astype(dtype)
+    deferred = kept(runtime, array, (10, 230), max_supersegments=1)
+    for x, y, rows in inner(deferred):
+        values = (array[:, y, x].astype(float) - 10) / 220
+        mean = np.average(values, weights=LENGTHS)
+        assert rows.stop - rows.start == 1
+        assert deferred.mean[rows] == pytest.approx(mean, abs=2e-6)
+        spread = np.sqrt(np.average((values - mean) ** 2, weights=LENGTHS))
+        assert deferred.spread[rows] == pytest.approx(spread, abs=2e-5)
+        assert deferred.share[rows] == 1
+
+
+def test_values_far_from_0_keep_what_tells_them_apart(runtime):
+    """A window of a fiftieth of the range, and pressures about 101325."""
+    array = 101325 + np.random.default_rng(2).random(EDGES[::-1]) * 0.02
+    array[0] = 101326
+    deferred = kept(runtime, array, (101325, 101326), max_supersegments=2)
+    for x, y, rows in inner(deferred):
+        values, weights = array[1:, y, x] - 101325, LENGTHS[1:]
+        mean = np.average(values, weights=weights)
+        spread = np.sqrt(np.average((values - mean) ** 2, weights=weights))
+        # Seen from above, what is left lies in front of the value 101326
+        assert deferred.mean[rows][0] == pytest.approx(mean, abs=1e-5)
+        assert deferred.spread[rows][0] == pytest.approx(spread, abs=5e-4)
+
+
+def test_what_is_outside_the_range_ends_a_supersegment_and_is_no_part_of_it(runtime):
+    array = np.full(EDGES[::-1], 100, np.uint8)
+    array[:, :, ::2] = np.random.default_rng(3).choice([100, 30, 220], (NZ, NY, 4))
+    inside = (array >= 50) & (array <= 200)
+    deferred = kept(runtime, array, (50, 200), max_supersegments=50)
+    assert (deferred.spread == 0).all()
+    assert deferred.values == pytest.approx(100, abs=1e-3)
+    for x, y, rows in inner(deferred):
+        length = (deferred.back[rows] - deferred.front[rows]).sum()
+        assert length == pytest.approx((inside[:, y, x] * LENGTHS).sum(), abs=1e-3)
+    # A list that is too short for its gaps says which share of each length is held
+    one = kept(runtime, array, (50, 200), max_supersegments=1)
+    for x, y, rows in inner(one):
+        length = one.back[rows] - one.front[rows]
+        wanted = (inside[:, y, x] * LENGTHS).sum()
+        assert (length * one.share[rows]) == pytest.approx(wanted, rel=1e-3)
+        assert one.spread[rows] == 0
+
+
+def test_nothing_depends_on_what_the_eye_sees(runtime):
+    """Turned round, the lists are turned round: what is behind counts as what is in front."""
+    rng = np.random.default_rng(4)
+    array = np.repeat(rng.random((11, NY, NX)).astype(np.float32), 3, axis=0)
+    there = kept(runtime, array, (0, 1), max_supersegments=4)
+    back = kept(runtime, np.ascontiguousarray(array[::-1]), (0, 1), max_supersegments=4)
+    for (_, _, rows), (_, _, turned) in zip(inner(there), inner(back), strict=True):
+        assert there.mean[rows] == pytest.approx(back.mean[turned][::-1], abs=1e-4)
+    # And the view cone, which weighs what is hidden, says nothing
+    other = kept(runtime, array, (0, 1), max_supersegments=4, view_cone=5)
+    assert other.equals(there)
+
+
+def test_supersegments_are_cut_where_the_importance_tells_values_apart(runtime):
+    """Noise of no weight is not cut, a step of little height but all the weight is."""
+    array = np.random.default_rng(5).uniform(0.4, 0.9, EDGES[::-1]).astype(np.float32)
+    array[:11], array[11:22] = 0.1, 0.2
+    weights = [(0, 1), (0.3, 1), (0.3001, 1e-6), (1, 1e-6)]
+    deferred = kept(runtime, array, (0, 1), weights, max_supersegments=3)
+    for _, _, rows in inner(deferred):
+        assert deferred.mean[rows][1:] == pytest.approx([0.2, 0.1], abs=1e-5)
+        assert deferred.spread[rows][0] > 0.1
+    # Of weight 0 nothing is kept
+    empty = kept(runtime, array, (0, 1), [(0, 1), (0.3, 1), (0.3001, 0), (1, 0)])
+    assert empty.values.max() < 0.3
+
+
+def test_blocks_of_one_value_are_classified_as_the_volume_is(runtime):
+    """Without a spread nothing is lost: the same medium as of a VDI made for the look."""
+    array = np.random.default_rng(6).integers(0, 255, EDGES[::-1]).astype(np.uint8)
+    volume, camera = columns(array)
+    looks = pvdi.TransferFunction(
+        np.random.default_rng(7).random((9, 3)), [0, 0, 0.3, 0.1, 1, 1, 0, 0.8, 0.5], (0, 255)
+    )
+    deferred = kept(runtime, array, (0, 255), max_supersegments=200)
+    wanted = pvdi.render_volume(volume, camera, (NX, NY), transfer_function=looks, device=runtime)
+    picture = pvdi.render(deferred.classified(transfer_function=looks), camera, device=runtime)
+    # To the cell of the table that a value is averaged over
+    assert np.abs(picture - wanted)[1:-1, 1:-1].max() < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_device_classifies_as_float64_does(runtime, seed):
+    rng = np.random.default_rng(seed)
+    array = rng.random(EDGES[::-1]).astype(np.float32)
+    deferred = kept(runtime, array, (0, 1), max_supersegments=[60, 6, 3, 1][seed])
+    opacities = np.where(rng.random(40) < 0.3, 0, rng.random(40) ** [8, 3, 1, 0][seed])
+    looks = pvdi.TransferFunction(rng.random((40, 3)), opacities, (0, 1))
+    found, wanted = classify_on_device(deferred, looks, runtime), classify(deferred, looks)
+    # What next to nothing is seen of may be nothing on the device, whose table has steps of 2^-40
+    some, those = found.optical_depth > 1e-6, wanted.optical_depth > 1e-6
+    assert np.array_equal(found.front[some], wanted.front[those])
+    assert found.color[some] == pytest.approx(wanted.color[those], abs=5e-5)
+    # Of an opacity of a step of nearly 1 float32 holds less; what is behind it is not seen
+    dense = 8 * lengths_of(wanted)[those] / deferred.sample_distance
+    tau, exact = found.optical_depth[some], wanted.optical_depth[those]
+    assert tau[exact <= dense] == pytest.approx(exact[exact <= dense], rel=2e-4)
+    assert (tau[exact > dense] >= 0.9 * dense[exact > dense]).all()
+
+
+def test_generate_returns_one_and_bakes_by_default(runtime):
+    volume, camera = columns(np.random.default_rng(8).random(EDGES[::-1]).astype(np.float32))
+    asked = {"device": runtime, "max_supersegments": 5}
+    deferred = pvdi.generate(
+        volume, camera, (NX, NY), classification="deferred", value_range=(0.2, 0.8), **asked
+    )
+    assert isinstance(deferred, pvdi.DeferredVDI)
+    assert deferred.value_range == (0.2, 0.8)
+    assert deferred.metadata["volume"]["scalar_range"] == list(volume.finite_range())
+    looks = pvdi.TransferFunction([[0, 0, 0], [1, 1, 1]], [0, 0.5], (0, 1))
+    baked = [
+        pvdi.generate(volume, camera, (NX, NY), transfer_function=looks, **asked, **more)
+        for more in ({}, {"classification": "baked"})
+    ]
+    assert baked[0].equals(baked[1])
+    with pytest.warns(VDIWarning, match=r"outside 0.2 to 0.8.*of its opacity"):
+        deferred.classified(transfer_function=looks)
+
+
+@pytest.mark.parametrize(
+    ("asked", "error", "says"),
+    [
+        ({"cmap": "bone"}, InvalidArgumentError, "give cmap to classified"),
+        ({"shade": True}, UnsupportedError, "shade"),
+        ({"ambient_occlusion": True}, UnsupportedError, "ambient_occlusion"),
+        ({"quality": "fast"}, UnsupportedError, "give max_supersegments"),
+        ({"blending": "maximum"}, UnsupportedError, "blending"),
+        ({"value_range": (1, 0)}, InvalidArgumentError, "value_range must be"),
+        ({"value_range": "all"}, InvalidArgumentError, "value_range must be"),
+        ({"importance": [0, 0, 0]}, InvalidArgumentError, "importance is 0"),
+        ({"importance": [1]}, InvalidArgumentError, "two or more weights"),
+        ({"importance": [(2, 1), (1, 1)]}, InvalidArgumentError, "values that grow"),
+        ({"classification": "later"}, InvalidArgumentError, "'baked' or 'deferred'"),
+        (
+            {"classification": "baked", "value_range": (0, 1)},
+            InvalidArgumentError,
+            "classification='deferred' as well",
+        ),
+    ],
+)
+def test_what_cannot_be_deferred_is_refused_by_name(runtime, asked, error, says):
+    volume, camera = columns(np.random.default_rng(9).random(EDGES[::-1]).astype(np.float32))
+    with pytest.raises(error, match=says):
+        pvdi.generate(
+            volume, camera, (NX, NY), device=runtime, **{"classification": "deferred", **asked}
+        )
+
+
+def test_rgba_has_nothing_left_to_classify(runtime):
+    colors = np.zeros((*EDGES[::-1], 4), np.uint8)
+    _, camera = columns(np.zeros(EDGES[::-1], np.uint8))
+    with pytest.raises(UnsupportedError, match="RGBA"):
+        pvdi.generate(
+            pvdi.Volume(colors), camera, (NX, NY), classification="deferred", device=runtime
+        )
