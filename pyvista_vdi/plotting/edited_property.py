@@ -90,7 +90,7 @@ class EditedProperty:
             self._tell_table()
 
     def _tell_table(self) -> None:
-        """Have the actor's lookup table, which scalar bars show, hold the same in its bytes."""
+        """Write the functions into the actor's lookup table, which scalar bars show."""
         table = getattr(self.actor().GetMapper(), "lookup_table", None)
         if not isinstance(table, pv.LookupTable):
             return
@@ -131,7 +131,7 @@ def rows_of(function: Any) -> Rows:
 
 
 def fill(function: Any, rows: Rows) -> None:
-    """Give a function these nodes, and no others."""
+    """Replace a function's nodes."""
     function.RemoveAllPoints()
     add = getattr(function, "AddRGBPoint", None) or function.AddPoint
     for row in rows.tolist():

@@ -378,7 +378,7 @@ class TransferFunctionEditor:
     def _dragged(
         self, at: NDArray[Any], what: str, begin: NDArray[Any], before: dict[str, Any]
     ) -> None:
-        if what == "point":
+        if what == "point" and self._current >= 0:  # none where it was changed from elsewhere
             self._put(self._current, *self._at(at))
         elif what == "window":
             low, high = self._corners()
