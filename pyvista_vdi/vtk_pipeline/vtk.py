@@ -32,6 +32,7 @@ _NAMES = {
     "util.misc": "calldata_type",
     "util.numpy_support": "numpy_to_vtk vtk_to_numpy",
     "util.vtkAlgorithm": "VTKPythonAlgorithmBase",
+    "vtkChartsCore": "vtkCompositeControlPointsItem vtkCompositeTransferFunctionItem",
     "vtkCommonCore": (
         "VTK_FLOAT VTK_INT VTK_UNSIGNED_CHAR VTK_UNSIGNED_INT mutable reference vtkCollection "
         "vtkDataArray vtkErrorCode vtkFloatArray vtkInformation vtkMath vtkObject vtkObjectBase "

@@ -45,6 +45,7 @@ ARGUMENTS = {
     "series.py": [],
     "sets.py": [],
     "tradeoff.py": [],
+    "transfer_function.py": ["picture.png"],
     "web_page.py": ["page.html"],
     "web_scene.py": ["scene.html"],
 }
@@ -87,7 +88,10 @@ def run_example(name, folder):
         "pipeline.py",
         *(
             pytest.param(f"{name}.py", marks=pytest.mark.slow)
-            for name in ("files", "overlap", "picking", "occlusion", "large_volume")
+            for name in (
+                *("files", "overlap", "picking", "occlusion", "large_volume"),
+                "transfer_function",
+            )
         ),
     ],
 )

@@ -21,6 +21,10 @@ from pyvista.plotting.plotter import _ALL_PLOTTERS
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.plotting.add_transfer_function_editor import (
+    AddTransferFunctionEditor,
+    RemoveTransferFunctionEditor,
+)
 from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
 from pyvista_vdi.plotting.component import AddVDI
 from pyvista_vdi.plotting.pages import PlotterVDIs
@@ -166,7 +170,13 @@ def test_help_is_the_method_s_and_what_is_promised_is_there(plotter):
     assert "plane widget" in inspect.getdoc(plotter.add_vdi_clip_plane)
     ours = pvdi.Plotter(off_screen=True, window_size=WINDOW)
     assert isinstance(ours, pv.Plotter)
-    kinds = {"add_vdi": AddVDI, "add_vdi_clip_plane": AddVDIClipPlane, "vdi": PlotterVDIs}
+    kinds = {
+        "add_vdi": AddVDI,
+        "add_vdi_clip_plane": AddVDIClipPlane,
+        "add_transfer_function_editor": AddTransferFunctionEditor,
+        "remove_transfer_function_editor": RemoveTransferFunctionEditor,
+        "vdi": PlotterVDIs,
+    }
     assert pvdi.Plotter.__annotations__ == {name: kind.__name__ for name, kind in kinds.items()}
     assert {name: type(getattr(ours, name)) for name in kinds} == kinds
 

@@ -57,6 +57,8 @@ class Names:
         widgets = _widgets(renderer)
         groups = getattr(widgets, "radio_button_widget_dict", None) or {}
         self._radio = {w.GetRepresentation() for group in groups.values() for w in group}
+        charts: list[Any] = getattr(renderer, "get_charts", list)()
+        self._editors = bool(charts) and all(map(_is_editor, charts))
         planes = getattr(widgets, "plane_widgets", None) or []
         self._clips = len(planes) > len(set(planes))  # see widgets_of
 
@@ -70,6 +72,8 @@ class Names:
         method = method_of(prop) or ("add_mesh" if kind == "Actor" else f"add_actor({kind})")
         if prop in self._radio:
             method = "add_radio_button_widget"
+        if method == "add_chart" and self._editors:
+            method = "add_transfer_function_editor"
         if method == "add_volume" and self._clips and planes_of(prop):
             method = "add_volume_clip_plane"
         return " ".join([method, *(f"({name})" for name in [self._given.get(prop)] if name)])
@@ -86,6 +90,12 @@ def method_of(prop: Any) -> str | None:
     if method == "show_bounds" and prop.GetDrawXGridlines():
         return "show_grid"
     return method
+
+
+def _is_editor(chart: Any) -> bool:
+    """Whether a chart has points that can be dragged: a transfer function's editor."""
+    plots = [chart.GetPlot(k) for k in range(chart.GetNumberOfPlots())]
+    return any(plot.IsA("vtkCompositeControlPointsItem") for plot in plots)
 
 
 def is_silhouette(prop: Any) -> bool:
