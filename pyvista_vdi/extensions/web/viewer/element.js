@@ -235,12 +235,17 @@ export class VDIViewer extends HTMLElement {
    */
   pointAt(x, y) {
     const [width, height] = this.#size, { clientWidth, clientHeight } = this;
-    if (!this.#raycaster || this.#scene || this.#drawing || !this.#camera) return null;
+    if (!this.#raycaster || this.#scene || !this.#camera) return null;
     const view = { camera: this.#fitted(this.#camera, width, height), width, height,
       clippingPlanes: this.#planes, look: this.#look };
     const [column, row] = [x * width / clientWidth, y * height / clientHeight].map(Math.floor);
     const pixel = [column, height - 1 - row];
-    return this.#raycaster.pointAt(this.#pacer.screen(width, height), view, pixel);
+    const target = this.#pacer.target(1, 1); // of its own: a frame may be half drawn
+    try {
+      return this.#raycaster.pointAt(target, view, pixel);
+    } finally {
+      this.#pacer.free(target);
+    }
   }
 
   /** What is going on: state ("empty", "loading", "coarse", "full", "error"), progress, ... */

@@ -153,7 +153,7 @@ export class Raycaster {
    * Where the ray of a pixel has lost half of the light that it loses: a point of the world, or null
    * where hardly anything is seen. Waits for the device.
    *
-   * @param {object} target Of a Pacer; what it holds is overwritten.
+   * @param {object} target Of a Pacer, of a pixel.
    * @param {object} view As of {@link draw}.
    * @param {number[]} pixel From the lower left corner.
    */

@@ -1,8 +1,14 @@
 // Pure functions of the viewer, by Node: node --test in this folder. No browser is needed.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
+import { pathToFileURL } from "node:url";
 
-const viewer = "../../../../pyvista_vdi/extensions/web/viewer";
+// Of an installation, where it is named
+const named = process.env.PYVISTA_VDI_VIEWER;
+const viewer = named ? pathToFileURL(named).href
+  : new URL("../../../../pyvista_vdi/extensions/web/viewer", import.meta.url).href;
+const textOf = (name) => readFileSync(new URL(`${viewer}/${name}`), "utf-8");
 const { checkedCamera, lookingAt } = await import(`${viewer}/camera.js`);
 const { textOfView, viewOfText } = await import(`${viewer}/link.js`);
 const { AS_MADE, checkedLook, isAsMade } = await import(`${viewer}/look.js`);
@@ -49,4 +55,28 @@ test("a standard view sees all of a box", () => {
 
 test("numbers are said in short", () => {
   assert.deepEqual([90.15912, 1e-7, 0, 123456].map(inShort), ["90.16", "1e-7", "0", "123500"]);
+});
+
+test("types and manifest have what the element has", () => {
+  const source = textOf("element.js"), types = textOf("element.d.ts");
+  const [{ declarations: [told] }] = JSON.parse(textOf("custom-elements.json")).modules;
+  const members = new Set([...source.matchAll(/^  (?:async )?(?:[gs]et )?(\w+)\(.*\) \{$/gm)]
+    .map(([, name]) => name).filter((name) => !/Callback$|^constructor$|^if$|^for$|^while$/.test(name)));
+  // For what is beside the viewer in this package
+  for (const own of ["showBytes", "showStill", "setPrepared", "invalidate"]) members.delete(own);
+  const names = told.members.map(({ name }) => name);
+  assert.deepEqual([...members].sort(), names.toSorted());
+  for (const name of names) assert.match(types, new RegExp(`\\b${name}[?]?[(:]`), name);
+  const observed = source.match(/observedAttributes = \[(.*)\]/)[1].match(/[\w-]+/g);
+  const attributes = told.attributes.map(({ name }) => name);
+  for (const name of observed) assert.ok(attributes.includes(name), name);
+  const events = new Set([...source.matchAll(/new CustomEvent\("(\w+)"/g)].map(([, name]) => name));
+  assert.deepEqual([...events].sort(), told.events.map(({ name }) => name).sort());
+});
+
+test("what the package exports is there", () => {
+  const { exports } = JSON.parse(textOf("package.json"));
+  for (const entry of Object.values(exports)) {
+    for (const path of typeof entry === "string" ? [entry] : Object.values(entry)) textOf(path);
+  }
 });
