@@ -74,7 +74,7 @@ def types(session: nox.Session) -> None:
 
 @nox.session
 def javascript(session: nox.Session) -> None:
-    """Check the viewer's JavaScript by ESLint, unit tests and axe-core: needs Node, npm, Chromium."""
+    """Check the viewer's JavaScript: ESLint, unit tests, axe-core; needs Node, npm, Chromium."""
     session.install("-e", ".[test,browser]")
     folder = CHECKOUT / "tests" / "extensions" / "web" / "javascript"
     with session.chdir(folder):
