@@ -84,8 +84,8 @@ def write(
         does not say how far it is: of ``.vti`` with 1 alone.
     **options
         ``compression`` and ``level`` for these; ``precision`` for ``.vdi`` and ``.html``, there
-        ``title`` and ``background`` as well; ``exact`` and ``linear`` for ``.exr``. See
-        :func:`pyvista_vdi.io.vdi_file.writer.write`,
+        ``title``, ``background`` and ``controls`` as well; ``exact`` and ``linear`` for ``.exr``.
+        See :func:`pyvista_vdi.io.vdi_file.writer.write`,
         :func:`pyvista_vdi.extensions.deep_exr.files.write`,
         :func:`pyvista_vdi.vtk_pipeline.filters.vti.write` and
         :func:`pyvista_vdi.extensions.web.page.page`.

@@ -358,5 +358,5 @@ def open_page(chromium, shared_pages):
         context.close()
     for page, url in pages:
         assert not page.complaints, page.complaints
-        ours = url and (url.partition("?")[0], "blob:", "data:")
+        ours = url and (re.split("[?#]", url)[0], "blob:", "data:")
         assert not url or not [each for each in page.urls if not each.startswith(ours)]

@@ -188,7 +188,7 @@ class VDISeries(VDICollection):
             ``precision``, by default the first step's, and ``"8-byte"`` in a page; ``tolerance``,
             ``key_every``, ``compression`` and ``level`` as for :class:`pyvista_vdi.SeriesWriter`;
             and ``progress``, called with the finished fraction. For pages ``title``,
-            ``background`` and ``autoplay`` as well.
+            ``background``, ``controls`` and ``autoplay`` as well.
 
         Returns
         -------

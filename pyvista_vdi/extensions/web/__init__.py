@@ -21,7 +21,7 @@ EXTENSION = Extension(
         FileFormat(
             ".html",
             "pyvista_vdi.extensions.web.page",
-            write_options=("precision", "title", "background"),
+            write_options=("precision", "title", "background", "controls"),
             compressions=("deflate",),
             page=True,
         ),

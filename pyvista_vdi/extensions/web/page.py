@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter, write_all
 from pyvista_vdi.extensions.web.bundle import viewer_script
@@ -69,10 +69,15 @@ vdi-viewer {{ width: 100%; height: 100%; aspect-ratio: auto; }}
 vdi-viewer:not(:defined) {{ display: block; text-align: center; }}
 vdi-viewer > img {{ max-width: 100%; max-height: 100%; }}
 p {{ font: 14px sans-serif; text-align: center; }}
+main {{ display: contents; }}
+h1 {{ position: absolute; width: 1px; height: 1px; margin: 0; overflow: hidden; }}
 </style>
 </head>
 <body>
-{views}</body>
+<main>
+<h1>{title}</h1>
+{views}</main>
+</body>
 </html>
 """
 
@@ -108,23 +113,31 @@ def page(
     *,
     title: str = "VDI",
     background: Sequence[float] = (0.0, 0.0, 0.0),
+    controls: str = "all",
     precision: str | None = None,
     level: int | None = None,
     progress: Progress | None = None,
 ) -> bytes:
     """Return an HTML page that shows a VDI, as large as the window, behind it an RGB from 0 to 1.
 
-    ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6.
+    ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6. ``controls="none"`` leaves
+    out the bar of buttons.
     """
     view = _view_of(vdi, background)
     view.vdi = vdi.with_precision(precision or "8-byte")
-    return assembled([view], title=title, level=level, progress=progress)
+    return assembled([view], title=title, controls=controls, level=level, progress=progress)
 
 
 def assembled(
-    views: Sequence[View], *, title: str, level: int | None = None, progress: Progress | None = None
+    views: Sequence[View],
+    *,
+    title: str,
+    controls: str = "all",
+    level: int | None = None,
+    progress: Progress | None = None,
 ) -> bytes:
     """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
+    without = check_controls(controls)
     title = html.escape(title)
     has_scene = any(view.scene is not None for view in views)
     has_series = any(view.series for view in views)
@@ -144,7 +157,8 @@ def assembled(
         viewer = "" if number else viewer_script(scene=has_scene, series=has_series)
         script = f"<script>\n{viewer}</script>\n" if viewer else ""
         width, height = view.still_size
-        said = {"fit": f"{width}/{height}", **view.attributes}
+        shares = {} if number else {"hash": ""}  # what the first one shows is in the address
+        said = {"fit": f"{width}/{height}", **shares, **without, **view.attributes}
         named = {name: html.escape(value) for name, value in said.items()}
         parts.append(
             _VIEW.format(
@@ -174,6 +188,7 @@ def write(
     precision: str | None = None,
     title: str | None = None,
     background: Sequence[float] = (0.0, 0.0, 0.0),
+    controls: str = "all",
     progress: Progress | None = None,
 ) -> Path:
     """Write a page with a VDI: see :func:`pyvista_vdi.io.write`, and :func:`page`.
@@ -186,6 +201,7 @@ def write(
         vdi,
         title=target.stem if title is None else title,
         background=background,
+        controls=controls,
         precision=precision,
         level=level,
         progress=progress,
@@ -206,6 +222,7 @@ def write_series(
     level: int | None = None,
     title: str | None = None,
     background: Sequence[float] = (0.0, 0.0, 0.0),
+    controls: str = "all",
     autoplay: bool = False,
     progress: Progress | None = None,
 ) -> Path:
@@ -214,15 +231,23 @@ def write_series(
     With ``autoplay`` it plays as soon as it is opened.
     """
     target = Path(os.path.realpath(check_writable(Path(path))))
+    check_controls(controls)
     view = _view_of(series[0], background)
     view.attributes = {"autoplay": ""} if autoplay else {}
     writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
     cut = write_all(stream, writer, series, series.times, progress)
     view.series = in_parts(stream.getvalue(), cut)
-    content = assembled([view], title=target.stem if title is None else title)
+    content = assembled([view], title=target.stem if title is None else title, controls=controls)
     with whole_file(target) as out:
         out.write(content)
     return target
+
+
+def check_controls(controls: str) -> dict[str, str]:
+    """Return the attributes of a viewer with "all" controls or "none"."""
+    if controls not in ("all", "none"):
+        raise InvalidArgumentError(f'controls is "all" or "none"; got {controls!r}')
+    return {} if controls == "all" else {"controls": controls}
 
 
 def in_parts(data: bytes, cut: int) -> list[bytes]:

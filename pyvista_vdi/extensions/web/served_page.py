@@ -27,10 +27,15 @@ output {{ position: absolute; right: 0; bottom: 100%; max-width: 100%; box-sizin
   padding: 4px 10px; background: #000c; text-align: right; overflow-wrap: anywhere;
   pointer-events: none; }}
 output:empty {{ padding: 0; }}
+main {{ display: contents; }}
+h1 {{ position: absolute; width: 1px; height: 1px; margin: 0; overflow: hidden; }}
 </style>
 <body>
-<vdi-viewer id="viewer"></vdi-viewer>
+<main>
+<h1>A volume, to be turned</h1>
+<vdi-viewer id="viewer" hash></vdi-viewer>
 <form><span id="controls" style="display: contents"></span><output id="status"></output></form>
+</main>
 <script type="module" nonce="{nonce}">
 {script}
 const byId = (id) => document.getElementById(id);

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
+from pyvista_vdi.extensions.web.page import check_controls
 from pyvista_vdi.extensions.web.still import picture, stand_in, still
 from pyvista_vdi.io import write_png
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
@@ -70,6 +71,7 @@ function render({ model, el }) {
   };
   const bytesOf = ({ buffer, byteOffset, byteLength }) =>
     new Uint8Array(buffer, byteOffset, byteLength);
+  const takeControls = () => viewer.setAttribute("controls", model.get("controls"));
   const takeScene = () => {
     const packed = model.get("_scene"); // of a plotter
     if (packed?.byteLength) viewer.scene = new Scene(bytesOf(packed));
@@ -83,7 +85,7 @@ function render({ model, el }) {
   document.querySelectorAll(`img[data-vdi="${key}"]`).forEach((picture) => picture.remove());
   const taken = {
     background: takeBackground, _gradient: takeBackground, clipping_planes: takePlanes,
-    _scene: takeScene, _file: takeFile, camera: takeCamera,
+    controls: takeControls, _scene: takeScene, _file: takeFile, camera: takeCamera,
   };
   for (const [name, take] of Object.entries(taken)) {
     take();
@@ -147,6 +149,8 @@ class VDIWidget(anywidget.AnyWidget):
         What a supersegment takes on its way to the browser, see
         :meth:`pyvista_vdi.VDI.with_precision`; by default 8 bytes, or what it has where lists are
         too long for that.
+    controls : {"all", "none"}
+        Whether there is a bar of buttons over the picture, which fades.
 
     Attributes
     ----------
@@ -160,6 +164,8 @@ class VDIWidget(anywidget.AnyWidget):
     clipping_planes : list of list of float
         Origin and normal of each plane, world coordinates; the side that the normal points to is
         kept. Anything of the shape (k, 6) can be set, or ``None``. A traitlet.
+    controls : str
+        As the argument. A traitlet.
 
     Raises
     ------
@@ -182,10 +188,18 @@ class VDIWidget(anywidget.AnyWidget):
     camera = _CameraTrait(allow_none=False).tag(sync=True)
     background = _ColorTrait(None, allow_none=True).tag(sync=True)
     clipping_planes = _PlanesTrait([]).tag(sync=True)
+    controls = traitlets.Enum(["all", "none"], "all").tag(sync=True)
 
     def __init__(
-        self, vdi: Any, *, camera: Any = None, background: Any = None, precision: str | None = None
+        self,
+        vdi: Any,
+        *,
+        camera: Any = None,
+        background: Any = None,
+        precision: str | None = None,
+        controls: str = "all",
     ) -> None:
+        check_controls(controls)
         self._precision = precision
         self._vdi = as_vdi(vdi)
         super().__init__(
@@ -194,6 +208,7 @@ class VDIWidget(anywidget.AnyWidget):
             _key=secrets.token_hex(8),
             camera=self._vdi.camera if camera is None else camera,
             background=background,
+            controls=controls,
         )
 
     @property

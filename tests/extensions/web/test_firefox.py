@@ -8,11 +8,12 @@ import os
 import re
 import shutil
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import HELPERS, array_of
+from browsers import HELPERS, array_of, picture
 from plugin_scenes import soft_ball
 from virtual_screen import virtual_screen
 
@@ -73,7 +74,7 @@ async def evaluated(port, url, script):
 
 
 def picture_in_firefox(folder, page, script=SHOT):
-    """The picture of a page's viewer, premultiplied, uint8 (H, W, 4)."""
+    """The picture of a page's viewer, premultiplied, uint8 (H, W, 4); ``page``: path or address."""
     named = os.environ.get("PYVISTA_VDI_FIREFOX")
     executable = named or shutil.which("firefox-esr") or shutil.which("firefox")
     if executable is None:
@@ -94,7 +95,9 @@ def picture_in_firefox(folder, page, script=SHOT):
         try:
             addresses = (re.search(r"ws://[^:]*:(\d+)", line) for line in process.stderr)
             port = next(filter(None, addresses))[1]
-            text = asyncio.run(evaluated(port, page.as_uri(), script))
+            url = page if isinstance(page, str) else page.as_uri()
+            with ThreadPoolExecutor(1) as apart:  # Playwright's loop may run in this thread
+                text = apart.submit(asyncio.run, evaluated(port, url, script)).result()
         finally:
             process.terminate()
             process.wait()
@@ -143,3 +146,23 @@ def test_a_page_of_a_series_shows_its_steps(tmp_path, default_runtime):
     page = series.save(tmp_path / "balls.html")
     seek = SHOT.replace("await viewer.ready;", "await viewer.ready; viewer.time = 2;", 1)
     assert_as_rendered(tmp_path, page, pvdi.read(page)[2], seek)
+
+
+def test_a_link_made_in_chromium_opens_in_firefox(tmp_path, default_runtime, open_page):
+    """The same view and look, in the picture of another browser's graphics."""
+    volume = soft_ball()
+    camera = filling_camera(volume.bounds, SIZE)
+    vdi = pvdi.generate(volume, camera, SIZE, cmap="viridis", clim=(0, 1))
+    page = open_page(url=vdi.save(tmp_path / "ball.html").as_uri())
+    page.ready()
+    page.evaluate(
+        """async () => {
+          viewer.camera = { ...viewer.camera, position: [2.1, 1 / 3, -1.7], view_angle: 41 };
+          viewer.look = { brightness: 1.5, opacity: 2, clip: [0.1, 1, 0, 1, 0, 0.7] };
+          await new Promise((next) => setTimeout(next, 500));
+        }"""
+    )
+    shown = picture(page, SIZE).astype(int)
+    assert np.ptp(shown) > 200
+    seen = picture_in_firefox(tmp_path, page.evaluate("location.href"))
+    assert np.abs(seen - shown).max() <= 1

@@ -149,10 +149,10 @@ OF_SERIES = [
     ("canvas", ",", "time"),
     ("canvas", ".", "time"),
     ("canvas", "ArrowLeft", "camera.position[0]"),
-    ("input", "Space", "playing"),
-    *(("input", key, "time") for key in (",", ".", *ARROWS, "Home", "End")),
-    ("button", "Space", "playing"),
-    ("button", "Enter", "playing"),
+    (".controls input", "Space", "playing"),
+    *((".controls input", key, "time") for key in (",", ".", *ARROWS, "Home", "End")),
+    (".controls button", "Space", "playing"),
+    (".controls button", "Enter", "playing"),
 ]
 
 
@@ -170,6 +170,6 @@ def test_a_series_takes_keys_of_its_own_and_no_others(playing):
         assert {name for name in after if after[name] != before[name]} == {changes}, (part, key)
         assert told == [], (part, key)
     keys = ["a", "b", "Escape", "Control+,", "Alt+."]
-    for part in ("canvas", "input", "button"):
+    for part in ("canvas", ".controls input", ".controls button"):
         assert playing.of_the_viewer(part, *keys) == playing.anywhere(*keys), part
         assert not playing.page.evaluate("viewer.playing")

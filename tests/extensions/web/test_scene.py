@@ -493,8 +493,9 @@ def test_a_renderer_without_vdis_is_none_for_the_viewer(plotter):
         scene_of(plotter.renderer)
 
 
-def test_the_viewer_with_scenes_is_as_small_as_the_issue_asks():
-    assert len(viewer_script(scene=True).encode()) <= 160_000
+def test_the_viewer_is_as_small_as_the_issue_asks():
+    assert len(viewer_script().encode()) <= 150_000
+    assert len(viewer_script(scene=True, series=True, remote=True).encode()) <= 270_000
 
 
 def contents(scene):

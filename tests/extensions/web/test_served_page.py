@@ -142,8 +142,8 @@ def test_look_clipping_and_time_are_changed_in_the_page(page):
     wait(page, "remote.received.full >= 2")
     assert ssim_of(page, cmap="hot") > ENOUGH
 
-    page.page.get_by_label("Clip").first.select_option("x")
-    assert page.evaluate("viewer.clippingPlanes") == [{"origin": [0, 0, 0], "normal": [1, 0, 0]}]
+    page.evaluate("viewer.look = { clip: [0.5, 1, 0, 1, 0, 1] }")
+    assert page.evaluate("remote._said.get('clip').planes") == [[0, 0, 0, 1, 0, 0]]
     assert ssim_of(page, cmap="hot", clipping_planes=[(0, 0, 0, 1, 0, 0)]) > ENOUGH
 
     page.page.get_by_label("Time").fill("1")
@@ -169,7 +169,7 @@ def named_controls(page):
 def test_controls_have_names_and_a_range_that_is_none_is_said(page):
     wait(page, "remote.received.coarse >= 1")
     names = named_controls(page)
-    assert len(names) == len(set(names)) == 8
+    assert len(names) == len(set(names)) == 5
     assert all(name and not name.replace(".", "").isdigit() for _, name in names)
 
     line, inputs = page.page.locator("output"), page.page.locator("input[type=number]")

@@ -14,17 +14,20 @@ from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
 from pyvista_vdi.extensions.series.steps_writer import write_all as write_series
 from pyvista_vdi.extensions.sets.files import write_all as write_set
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
-from pyvista_vdi.extensions.web.page import View, assembled, in_parts
+from pyvista_vdi.extensions.web.page import View, assembled, check_controls, in_parts
 from pyvista_vdi.extensions.web.placing import thinned
 from pyvista_vdi.extensions.web.scenes.scene import css, scene_of
 from pyvista_vdi.model.whole_file import whole_file
 
 
-def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
+def export_html(
+    plotter: Any, filename: str | os.PathLike[str] | None, *, controls: str = "all"
+) -> io.StringIO | None:
     """Write a page of a plotter's scene: see ``plotting.pages.PlotterVDIs.export_html``.
 
     All of its renderers are shown; it is drawn, and VDIs that are missing are made.
     """
+    check_controls(controls)
     picture = drawn(plotter)
     left_out: list[str] = []
     views = []
@@ -54,7 +57,9 @@ def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.Str
     target = None if filename is None else Path(filename).with_suffix(".html")
     # The first can be read again
     views.sort(key=lambda view: view.vdi is None and not view.series)
-    page = assembled(views, title=plotter.title if target is None else target.stem)
+    page = assembled(
+        views, title=plotter.title if target is None else target.stem, controls=controls
+    )
     if target is None:
         return io.StringIO(page.decode())
     with whole_file(target) as stream:

@@ -1,6 +1,6 @@
 // Views as VTK's vtkCamera has them, and its movements: pure functions of plain objects.
 import { cameraAxes, isParallel } from "./rays.js";
-import { add, dot, subtract, unit } from "./vectors.js";
+import { add, dot, subtract, times, unit } from "./vectors.js";
 
 /**
  * Return a view as the viewer keeps it; refuse one that shows nothing.
@@ -44,10 +44,11 @@ export function checkedPlane(plane) {
   return { origin, normal };
 }
 
-function checkedNumbers(what, of, name, count = 3) {
+/** Return an entry of something as an array of so many finite numbers; refuse another one. */
+export function checkedNumbers(what, of, name, count = 3) {
   const numbers = of?.[name] && Array.from(of[name]);
   if (numbers?.length !== count || !numbers.every(Number.isFinite)) {
-    const many = count === 2 ? "two" : "three";
+    const many = { 2: "two", 3: "three", 6: "six" }[count];
     throw new TypeError(`A ${what}'s ${name} is ${many} finite numbers; got ${of?.[name]}.`);
   }
   return numbers;
@@ -64,6 +65,24 @@ function turned(vector, axis, degrees) {
     v * c + (z * u - x * w) * s + y * along,
     w * c + (x * v - y * u) * s + z * along,
   ];
+}
+
+/**
+ * Look at a box from a direction, so that all of it is seen: VTK's ResetCamera.
+ *
+ * @param {object} camera Whose lens is kept.
+ * @param {number[]} bounds World: low and high of x, y and z.
+ * @param {number[]} from Direction of the eye from the box's centre.
+ * @param {number[]} view_up
+ */
+export function lookingAt(camera, bounds, from, view_up) {
+  const [low, high] = [0, 1].map((end) => [0, 2, 4].map((k) => bounds[k + end]));
+  const focal_point = times(add(low, high), 0.5);
+  const radius = Math.hypot(...subtract(high, low)) / 2 || 1;
+  const { view_angle, parallel_scale } = camera;
+  const distance = radius / Math.sin(((isParallel(camera) ? 30 : view_angle) * Math.PI) / 360);
+  const lens = parallel_scale === undefined ? { view_angle } : { parallel_scale: radius };
+  return { position: add(focal_point, unit(from), distance), focal_point, view_up, ...lens };
 }
 
 const around = (camera, axis, degrees) => ({

@@ -1,16 +1,20 @@
 // <vdi-viewer src="brain.vdi">: a VDI that people turn. docs/web.md has its contract, which is that of
 // one class: hence more than 500 lines.
 import { checkedCamera, checkedPlane, fitted } from "./camera.js";
+import { CONTROLS_STYLE, viewerControls } from "./controls.js";
 import { leaveGraphics, showPicture, takeGraphics } from "./graphics.js";
 import { htmlElement } from "./html.js";
 import { hearKeys, interact, keyed, scrollsAround } from "./interaction.js";
+import { followAddress } from "./link.js";
 import { embedded, load } from "./loader.js";
+import { AS_MADE, checkedLook, isAsMade } from "./look.js";
 import { Pacer } from "./pacer.js";
 import { Player, playerControls } from "./player.js";
 import { Raycaster } from "./raycast.js";
-import { isParallel } from "./rays.js";
+import { frameOf, isParallel } from "./rays.js";
 import { MOST_CLIPPING_PLANES } from "./shader.js";
 import { Surround } from "./surround.js";
+import { dot } from "./vectors.js";
 
 const STYLE = `
 :host { display: block; position: relative; width: 100%; aspect-ratio: 16 / 9; overflow: hidden;
@@ -30,6 +34,7 @@ p, .hint { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em;
 .controls output { min-width: 3em; overflow: hidden; text-align: right; font-variant-numeric: tabular-nums; }
 .controls:not([hidden]) ~ :is(p, .hint) { bottom: 2.4em; }
 progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; border: 0; }
+${CONTROLS_STYLE}
 [hidden] { display: none !important; }
 @media print { canvas { object-fit: contain; } }`;
 
@@ -48,11 +53,11 @@ const HINT = 1500;
 const LABEL = "volume, to be turned";
 
 /** Properties that may be set before this module has come. */
-const PROPERTIES = ["src", "background", "camera", "clippingPlanes", "scene"];
+const PROPERTIES = ["src", "background", "camera", "clippingPlanes", "home", "look", "scene"];
 
 /** The element. */
 export class VDIViewer extends HTMLElement {
-  static observedAttributes = ["src", "background", "still", "fit", "aria-label"];
+  static observedAttributes = ["src", "background", "still", "fit", "controls", "aria-label"];
 
   #parts = {};
   #holder = { lost: () => this.#lose() }; // of a part of the page's graphics
@@ -62,6 +67,10 @@ export class VDIViewer extends HTMLElement {
   #prepared = null;
   #camera = null;
   #planes = [];
+  #look = checkedLook(AS_MADE);
+  #home = null; // a camera that was given as the first
+  #linked = false; // whether the view came from the page's address
+  #wantedTime = null; // of a series, from there
   #status = { state: "empty", progress: 0 };
   #ready = resolvers();
   #loading = null; // an AbortController
@@ -85,6 +94,8 @@ export class VDIViewer extends HTMLElement {
   #player = null;
   #step = null; // that is drawn with the next frame
   #controls = null;
+  #bar = null; // as those, but beside turning and playing
+  #address = null;
 
   constructor() {
     super();
@@ -100,6 +111,8 @@ export class VDIViewer extends HTMLElement {
       laid: make("img", "over", { alt: "" }),
       over: make("canvas", "over"),
       slot: make("slot"),
+      marks: make("canvas", "over"),
+      frame: make("div", "frame", { hidden: false }),
       controls: make("div", "controls"),
       progress: make("progress", "", { max: 1 }),
       p: make("p", "", { role: "alert" }),
@@ -107,6 +120,7 @@ export class VDIViewer extends HTMLElement {
     };
     root.append(...Object.values(parts));
     parts.picture = parts.canvas.getContext("2d");
+    parts.marked = parts.marks.getContext("2d");
     parts.canvas.setAttribute("aria-label", LABEL);
     this.#ready.promise.catch(() => {}); // who awaits it is told; nobody need
   }
@@ -169,6 +183,69 @@ export class VDIViewer extends HTMLElement {
     this.#planes = checked;
     this.showStill(null);
     this.invalidate();
+  }
+
+  /** How it is shown: `{brightness, opacity, clip}`; what is not set is as the VDI was made. */
+  get look() {
+    return structuredClone(this.#look);
+  }
+
+  set look(look) {
+    const checked = checkedLook(look);
+    if (JSON.stringify(checked) === JSON.stringify(this.#look)) return;
+    this.#look = checked;
+    this.showStill(null);
+    this.#bar?.show();
+    this.#address?.changed();
+    this.dispatchEvent(new CustomEvent("lookchange", { detail: { look: this.look } }));
+    this.invalidate();
+  }
+
+  /** The first view, which `resetCamera` goes back to; null where none is known. */
+  get home() {
+    const of = this.#home ?? this.#scene?.camera ?? this.#series?.camera ?? this.#prepared?.camera;
+    return of ? checkedCamera({ ...of, parallel_projection: isParallel(of) }) : null;
+  }
+
+  set home(camera) {
+    this.#home = camera && checkedCamera(camera);
+  }
+
+  /** A box of the world that the VDI is in: low and high of x, y and z; null without a VDI. */
+  get bounds() {
+    if (!this.#prepared) return null;
+    const { linear, offset, half, scale } = frameOf(this.#prepared);
+    return linear.flatMap((row, k) => {
+      const reach = dot(row.map(Math.abs), half);
+      return [offset[k] - reach, offset[k] + reach].map((x) => x / scale);
+    });
+  }
+
+  /** The transfer function of the VDI, as its file has it: `colors`, `scalar_range` and others; or null. */
+  get transferFunction() {
+    const { transfer_function: told } = this.#prepared?.metadata ?? {};
+    return told?.colors?.length && told.scalar_range ? told : null;
+  }
+
+  /**
+   * A point of the world under a place of the picture: where half of what hides the ray lies.
+   *
+   * @param {number} x CSS pixels from the left, and from the top `y`.
+   * @returns {number[]|null} null where hardly anything is seen, and in scenes.
+   */
+  pointAt(x, y) {
+    const [width, height] = this.#size, { clientWidth, clientHeight } = this;
+    if (!this.#raycaster || this.#scene || !this.#camera) return null;
+    const view = { camera: this.#fitted(this.#camera, width, height), width, height,
+      clippingPlanes: this.#planes, look: this.#look };
+    const [column, row] = [x * width / clientWidth, y * height / clientHeight].map(Math.floor);
+    const pixel = [column, height - 1 - row];
+    const target = this.#pacer.target(1, 1); // of its own: a frame may be half drawn
+    try {
+      return this.#raycaster.pointAt(target, view, pixel);
+    } finally {
+      this.#pacer.free(target);
+    }
   }
 
   /** What is going on: state ("empty", "loading", "coarse", "full", "error"), progress, ... */
@@ -334,6 +411,7 @@ export class VDIViewer extends HTMLElement {
       return;
     }
     if (!this.#camera) this.resetCamera();
+    this.#bar?.show();
     this.#tell({ state: prepared.level === "coarse" ? "coarse" : "full", message: undefined,
       ...(prepared.level === "coarse" ? {} : { progress: 1 }) });
     this.invalidate();
@@ -341,12 +419,8 @@ export class VDIViewer extends HTMLElement {
 
   /** Go back to the view that the VDI was made for, or in which the scene began. */
   resetCamera() {
-    const of = this.#scene?.camera ?? this.#series?.camera ?? this.#prepared?.camera;
-    if (of) {
-      const { parallel_scale, view_angle, ...rest } = of;
-      this.camera = isParallel(of) ? { ...rest, parallel_scale, parallel_projection: true }
-        : { ...rest, view_angle, parallel_projection: false };
-    }
+    const { home } = this;
+    if (home) this.camera = home;
   }
 
   /** What is seen beside the VDI: a Scene of scene.js, or null. Swapped whole. */
@@ -375,7 +449,10 @@ export class VDIViewer extends HTMLElement {
     if (!scene || !this.#scene) this.#takeScene(scene);
     else scene.whole.then(() => isWanted() && this.#takeScene(scene), () => {});
     scene?.loaded.then(() => {
-      if (isWanted() && scene.camera) this.camera = scene.camera;
+      if (!isWanted()) return;
+      if (scene.camera && !this.#linked) this.camera = scene.camera;
+      this.#linked = false; // another scene is looked at as it begins
+      this.#bar?.show();
     }, () => {});
     scene?.whole.then(() => {
       if (!isWanted() || this.#status.state !== "empty") return;
@@ -414,12 +491,22 @@ export class VDIViewer extends HTMLElement {
       changed: () => {
         if (!player.playing) this.#awaitStep();
         this.#controls?.show();
+        this.#address?.changed();
       },
       failed: (error) => player === this.#player && this.#fail(error),
     });
-    series.changed = () => this.#controls?.show();
-    this.#controls?.show();
-    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const comeToTime = () => {
+      if (this.#wantedTime === null) return;
+      this.#seek(series.nearest(this.#wantedTime)); // until the step itself has come
+      if (series.complete || player.time === this.#wantedTime) this.#wantedTime = null;
+    };
+    series.changed = () => {
+      this.#controls?.show();
+      comeToTime();
+    };
+    [this.#controls, this.#bar].forEach((each) => each?.show());
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches || this.#wantedTime !== null;
+    comeToTime();
     if (this.hasAttribute("autoplay") && !still) player.play();
   }
 
@@ -475,6 +562,32 @@ export class VDIViewer extends HTMLElement {
     if (this.series) this.dispatchEvent(new CustomEvent("vditime", { detail: { time, step } }));
   }
 
+  // -- the page's address ------------------------------------------------------------------------
+
+  // What is seen, for a link; null where it is what the page begins with.
+  #linkable() {
+    const { camera, home, look } = this;
+    if (!camera) return null;
+    const time = this.series && !this.playing && this.#player.step > 0 ? this.time : null;
+    const begins = time === null && isAsMade(look) && JSON.stringify(camera) === JSON.stringify(home);
+    return begins ? null : { camera, look, time };
+  }
+
+  #takeLinked(state) {
+    this.look = state?.look ?? AS_MADE;
+    if (!state) {
+      this.resetCamera();
+      if (this.series) this.#seek(0);
+      return;
+    }
+    this.#linked = !this.#scene?.head;
+    this.camera = state.camera;
+    this.#wantedTime = this.series ? null : state.time;
+    if (!this.series) return;
+    this.pause();
+    this.#seek(state.time === null ? 0 : this.#series.nearest(state.time));
+  }
+
   // -- life --------------------------------------------------------------------------------------
 
   connectedCallback() {
@@ -488,6 +601,11 @@ export class VDIViewer extends HTMLElement {
       }
     } catch (error) {
       this.#fail(error);
+    }
+    if (this.hasAttribute("hash")) {
+      this.#address = followAddress(this.getAttribute("hash") || "view", {
+        state: () => this.#linkable(), take: (state) => this.#takeLinked(state),
+      }, signal);
     }
     // First: decoding goes on while the browser starts its graphics
     this.#loadEmbedded();
@@ -512,6 +630,20 @@ export class VDIViewer extends HTMLElement {
         seek: (step) => this.#seek(step),
       }, signal);
     this.#controls?.show();
+    const { frame, marked } = this.#parts;
+    this.#bar = viewerControls(frame, canvas, marked, this, {
+      background: () => {
+        const { backgroundColor: color, backgroundImage: image } = getComputedStyle(this);
+        return { color, image };
+      },
+      camera: (width, height) => this.#fitted(this.#camera, width, height),
+      hasLink: () => this.#address !== null,
+      link: () => {
+        this.#address.now();
+        return location.href;
+      },
+      say: (text) => this.#hint(text),
+    }, signal);
     this.#listen(signal);
     this.invalidate(false);
   }
@@ -558,6 +690,8 @@ export class VDIViewer extends HTMLElement {
   // Whether a key that is pressed in here is taken.
   #key(event, target) {
     if (event.altKey || event.metaKey || event.ctrlKey) return false;
+    if (this.#bar?.key(event, target)) return true;
+    if (this.#parts.frame.contains(target)) return false;
     if (target !== this.#parts.canvas || !this.#camera) {
       return this.#controls?.key(event, target) ?? false;
     }
@@ -609,6 +743,7 @@ export class VDIViewer extends HTMLElement {
       this.#shownBefore = this.#prepared?.bounds;
       this.load(value).catch(() => {});
     }
+    if (name === "controls") this.#bar?.show();
     if (name === "background") this.style.background = value ?? "";
     if (name === "still" && value) this.#parts.img.src = value;
     if (name === "aria-label") this.#parts.canvas.setAttribute("aria-label", value ?? LABEL);
@@ -714,6 +849,7 @@ export class VDIViewer extends HTMLElement {
         if (pacer !== this.#pacer || !done) continue;
         showPicture(target.framebuffer, size, this.#parts.picture);
         this.#scene?.annotate(this.#parts.over, this.#fitted(camera, width, height), [width, height]);
+        this.#bar?.drawn();
         this.#drawn(full, shown === this.#prepared);
         if (this.#asked) continue;
         if (full) return;
@@ -745,8 +881,9 @@ export class VDIViewer extends HTMLElement {
   // pixels of it for one of the page, which lines and points are as wide as; `few`: of few lists.
   #painter(camera, width, height, { density = 1, moving = false, few = false } = {}) {
     const gl = this.#gl, raycaster = this.#raycaster, scene = this.#scene, planes = this.#planes;
+    const look = this.#look;
     camera = this.#fitted(camera, width, height);
-    const view = { camera, width, height, density, moving, few, clippingPlanes: planes };
+    const view = { camera, width, height, density, moving, few, look, clippingPlanes: planes };
     return (target) => {
       if (scene) {
         scene.paint(raycaster, target, view);
@@ -754,7 +891,7 @@ export class VDIViewer extends HTMLElement {
       }
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      raycaster.draw({ camera, width, height, clippingPlanes: planes, few });
+      raycaster.draw({ camera, width, height, clippingPlanes: planes, few, look });
       gl.disable(gl.BLEND);
     };
   }
@@ -773,6 +910,7 @@ export class VDIViewer extends HTMLElement {
 
   #announceCamera() {
     this.#player?.look?.(this.#camera);
+    this.#address?.changed();
     this.dispatchEvent(new CustomEvent("camerachange", { detail: { camera: this.camera } }));
   }
 

@@ -5,3 +5,14 @@ export function htmlElement(name, { label, ...properties } = {}, ...children) {
   made.append(...children);
   return made;
 }
+
+/** Return a picture of strokes, as an SVG path in a square of 20 x 20, which takes the text's colour. */
+export function strokes(path) {
+  const [svg, line] = ["svg", "path"].map((name) =>
+    document.createElementNS("http://www.w3.org/2000/svg", name));
+  svg.setAttribute("viewBox", "0 0 20 20");
+  svg.setAttribute("aria-hidden", "true");
+  line.setAttribute("d", path);
+  svg.append(line);
+  return svg;
+}

@@ -1,7 +1,9 @@
 // A VDI in WebGL 2: textures of its lists, and a fragment shader that casts a ray for each pixel.
+import { AS_MADE } from "./look.js";
 import { TEXTURE_WIDTH } from "./prepare.js";
 import {
-  frameForms, frameOf, isParallel, listSpace, listsCrossed, pixelRays, pixelsOfBoxes, thinnedSpace,
+  frameForms, frameOf, isParallel, listSpace, listsCrossed, pixelRays, pixelsOfBoxes, pointAlong,
+  thinnedSpace,
 } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 
@@ -10,6 +12,9 @@ const TRANSMITTANCE_CUTOFF = 1e-6;
 
 /** Lists that rays must cross along an edge for every second one to be worth it. */
 const OBLIQUE = 16;
+
+/** Opacity, of 255, below which a ray sees too little for its place to be asked for. */
+const LEAST_SEEN = 4;
 
 /** Rows of pixels that are drawn at once. */
 const STRIP = 16;
@@ -86,9 +91,12 @@ export class Raycaster {
    * @param {WebGLTexture} [view.depthTexture] R32F: view depth of what is opaque, world units, at
    *   each texel of the framebuffer; rays end there.
    * @param {boolean} [view.few] Whether every second list does: see {@link thinning}.
+   * @param {object} [view.look] Of look.js.
+   * @param {number} [view.cutoff] A ray ends where less transmittance is left.
+   * @param {boolean} [view.finds] Whether t of a ray's end is written, as four bytes of a float32.
    */
   draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null,
-    few = false }) {
+    few = false, look = AS_MADE, cutoff = TRANSMITTANCE_CUTOFF, finds = false }) {
     const { gl, vdi } = this;
     if (!vdi) return;
     const { bounds } = vdi;
@@ -98,7 +106,7 @@ export class Raycaster {
     const frame = camera.model_transform ? frameOf({ bounds, camera }) : vdi.frame;
     const rays = pixelRays(frame, camera, [width, height]);
     const { coordinates, planes } = frameForms(frame, space, windowSize, rays, isParallel(camera),
-      clippingPlanes);
+      clippingPlanes, look.clip);
     if (planes.length > MOST_PLANES) {
       throw new Error(`A VDI is clipped to at most ${clippingPlanes.length - planes.length +
         MOST_PLANES} planes, not to ${clippingPlanes.length}.`);
@@ -121,7 +129,10 @@ export class Raycaster {
     gl.uniform1f(u.depthOrigin, space.origin);
     gl.uniform1f(u.firstDepth, vdi.firstDepth);
     gl.uniform1f(u.slabsPerDepth, vdi.slabsPerDepth);
-    gl.uniform1f(u.cutoff, TRANSMITTANCE_CUTOFF);
+    gl.uniform1f(u.cutoff, cutoff);
+    gl.uniform1f(u.brightness, look.brightness);
+    gl.uniform1f(u.thickness, look.opacity);
+    gl.uniform1i(u.finds, Number(finds));
     gl.uniform1f(u.codeStep, vdi.step);
     gl.uniform1f(u.nearest, space.parallel ? -1e30 : space.nearest - space.origin);
     gl.uniform1f(u.worldScale, frame.scale);
@@ -136,6 +147,37 @@ export class Raycaster {
     this.drawStrips(pixelsOfBoxes(frame, camera, [width, height], vdi.corners), corner, height);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
+  }
+
+  /**
+   * Where the ray of a pixel has lost half of the light that it loses: a point of the world, or null
+   * where hardly anything is seen. Waits for the device.
+   *
+   * @param {object} target Of a Pacer, of a pixel.
+   * @param {object} view As of {@link draw}.
+   * @param {number[]} pixel From the lower left corner.
+   */
+  pointAt(target, view, [x, y]) {
+    const { gl, vdi } = this, { camera, width, height } = view;
+    if (!vdi) return null;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(0, 0, 1, 1);
+    gl.clearColor(0, 0, 0, 0);
+    const bytes = new Uint8Array(4);
+    const drawn = (more) => {
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      this.draw({ ...view, corner: [-x, -y], ...more });
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    };
+    drawn({});
+    const opacity = bytes[3] / 255, isSeen = bytes[3] > LEAST_SEEN;
+    if (isSeen) drawn({ cutoff: 1 - opacity / 2, finds: true });
+    gl.disable(gl.SCISSOR_TEST);
+    const t = new DataView(bytes.buffer).getFloat32(0, true);
+    if (!isSeen || !Number.isFinite(t)) return null;
+    const rays = pixelRays(vdi.frame, camera, [width, height]);
+    return pointAlong(vdi.frame, rays, [x + 0.5 - width / 2, y + 0.5 - height / 2], t);
   }
 
   /**

@@ -158,6 +158,14 @@ export function formOf(rays, normal, offset) {
   return form;
 }
 
+/** The world's point at view depth t, less the reference, along the ray of a pixel (a, b). */
+export function pointAlong(frame, rays, [a, b], t) {
+  const [from, towards] = [rays.origin, rays.direction].map(([one, ofA, ofB]) =>
+    add(add(one, ofA, a), ofB, b));
+  const point = add(from, towards, t);
+  return times(add(frame.linear.map((row) => dot(row, point)), frame.offset), 1 / frame.scale);
+}
+
 /**
  * Forms that a frame needs: list coordinates, and planes that rays are clipped to.
  *
@@ -167,15 +175,18 @@ export function formOf(rays, normal, offset) {
  * @param {object} rays Of {@link pixelRays}, of the new view.
  * @param {boolean} parallel Of the new view.
  * @param {{origin: number[], normal: number[]}[]} clippingPlanes World; the normal's side is kept.
+ * @param {number[]} [clip] The part of the bounds that is seen: low and high of x, y and z, shares.
  */
-export function frameForms(frame, space, windowSize, rays, parallel, clippingPlanes) {
+export function frameForms(frame, space, windowSize, rays, parallel, clippingPlanes,
+  clip = [0, 1, 0, 1, 0, 1]) {
   const coordinates = space.rows.map((row) => formOf(rays, row.slice(0, 3), row[3]));
   const [u, v, , denominator] = coordinates;
   const planes = [];
   for (let axis = 0; axis < 3; ++axis) {
     const normal = [0, 1, 2].map((k) => Number(k === axis));
-    planes.push(formOf(rays, normal, frame.half[axis]));
-    planes.push(formOf(rays, times(normal, -1), frame.half[axis]));
+    const [low, high] = clip.slice(2 * axis, 2 * axis + 2);
+    planes.push(formOf(rays, normal, frame.half[axis] * (1 - 2 * low)));
+    planes.push(formOf(rays, times(normal, -1), frame.half[axis] * (2 * high - 1)));
   }
   for (const [form, lists] of [[u, windowSize[0]], [v, windowSize[1]]]) {
     for (const sign of [1, -1]) {

@@ -4,6 +4,7 @@
 // finds that the picture is too far from the volume's: a coarse one first. Each is swapped whole.
 // Where the view rests, the volume's own picture of it is laid over the VDI until it moves again.
 import { htmlElement } from "./html.js";
+import { AS_MADE } from "./look.js";
 
 /** Milliseconds between two messages of a moving view, and without one after which it rests. */
 const VIEW_PERIOD = 50;
@@ -13,6 +14,8 @@ const FIRST_RETRY = 500;
 const LAST_RETRY = 16000;
 /** The server's longest edge of a picture, pixels. */
 const LONGEST_EDGE = 8192;
+/** Planes that a server clips by. */
+const MOST_TOLD_PLANES = 6;
 /** Why a server ends a connection for good: the client has said something wrong. */
 const REFUSED = 1008;
 /** Code of a connection that has ended, or was not made, without a word. */
@@ -37,6 +40,7 @@ export class RemoteVDI extends EventTarget {
     this.url = url;
     this.hello = null;
     this.received = { coarse: 0, full: 0, pictures: 0, bytes: 0 };
+    this._pictured = true; // whether the server's pictures show what the viewer shows
     this._said = new Map(); // the last message of each kind, said again to a new connection
     this._retry = FIRST_RETRY;
     this._showing = false;
@@ -44,8 +48,14 @@ export class RemoteVDI extends EventTarget {
     this._timer = 0;
     this._restTimer = 0;
     this._viewSentAt = -Infinity;
+    this._planes = [];
     this._onCamera = () => this._viewMoved();
+    this._onLook = () => {
+      this._sayClip();
+      this._viewMoved(); // a picture of the volume may do again
+    };
     viewer.addEventListener("camerachange", this._onCamera);
+    viewer.addEventListener("lookchange", this._onLook);
     this._sizes = new ResizeObserver(this._onCamera);
     this._sizes.observe(viewer);
     this._connect();
@@ -64,12 +74,31 @@ export class RemoteVDI extends EventTarget {
   /** Clip by planes, [{origin, normal}], world coordinates: here at once, and in estimates. */
   setClippingPlanes(planes) {
     this.viewer.clippingPlanes = planes;
-    this._say({ type: "clip", planes: planes.map((p) => [...p.origin, ...p.normal]) });
+    this._planes = planes.map((p) => [...p.origin, ...p.normal]);
+    this._sayClip();
+  }
+
+  // Tell of these planes, and of the faces of the box that the viewer's own sliders have moved.
+  _sayClip() {
+    const { clip } = this.viewer.look ?? AS_MADE, bounds = this.hello?.bounds;
+    const faces = clip.flatMap((share, k) => {
+      if (!bounds || share === k % 2) return [];
+      const axis = k >> 1, [low, high] = bounds.slice(2 * axis, 2 * axis + 2);
+      const place = [0, 1, 2].map((i) => (bounds[2 * i] + bounds[2 * i + 1]) / 2);
+      place[axis] = low + share * (high - low);
+      return [[...place, ...[0, 1, 2].map((i) => (i === axis ? 1 - 2 * (k % 2) : 0))]];
+    });
+    const planes = [...this._planes, ...faces];
+    this._pictured = planes.length <= MOST_TOLD_PLANES;
+    const message = { type: "clip", planes: planes.slice(0, MOST_TOLD_PLANES) };
+    const before = this._said.get("clip")?.planes ?? [];
+    if (JSON.stringify(before) !== JSON.stringify(message.planes)) this._say(message);
   }
 
   /** End the connection for good. The viewer goes on drawing what it has. */
   close() {
     this.viewer.removeEventListener("camerachange", this._onCamera);
+    this.viewer.removeEventListener("lookchange", this._onLook);
     this._sizes.disconnect();
     clearTimeout(this._timer);
     clearTimeout(this._restTimer);
@@ -107,8 +136,10 @@ export class RemoteVDI extends EventTarget {
     if (message.type === "hello") {
       const first = this.hello === null;
       this.hello = message;
-      if (first) this.viewer.camera = message.camera;
+      if (first) this.viewer.home = message.camera;
+      if (first && !this.viewer.camera) this.viewer.camera = message.camera; // no link has said another
       this._said.forEach((said) => this._send(said));
+      if (first) this._sayClip(); // a link may have said it before there was a server
       this._sendView(false);
       this._status(null, "");
       this.dispatchEvent(new CustomEvent("hello", { detail: message }));
@@ -130,7 +161,8 @@ export class RemoteVDI extends EventTarget {
     const isLatest = this._picture.said === this._messages && this._timer === 0;
     this._picture = null;
     this.received.bytes += file.byteLength;
-    if (!isLatest) return;
+    const { brightness, opacity } = this.viewer.look;
+    if (!isLatest || !this._pictured || brightness !== 1 || opacity !== 1) return;
     this.received.pictures += 1;
     this.viewer.showStill(new Blob([file]));
   }
@@ -278,23 +310,6 @@ function fillPanel(panel, remote, hello, complain) {
     controls.push(labelled("Colours", cmap), labelled("Opacity", opacity));
     controls.push(labelled("Range", low, high));
   }
-  const axis = choice("Clip", ["no plane", "x", "y", "z"], "no plane");
-  const place = htmlElement("input", {
-    type: "range", min: 0, max: 1, step: 0.01, value: 0.5, label: "Place of the clipping plane",
-  });
-  const flip = htmlElement("input", { type: "checkbox", label: "Clip the other side" });
-  const clipped = () => {
-    const k = ["x", "y", "z"].indexOf(axis.value);
-    if (k < 0) return remote.setClippingPlanes([]);
-    const origin = [0, 1, 2].map((i) => (hello.bounds[2 * i] + hello.bounds[2 * i + 1]) / 2);
-    const [least, most] = hello.bounds.slice(2 * k, 2 * k + 2);
-    origin[k] = least + Number(place.value) * (most - least);
-    const normal = [0, 0, 0];
-    normal[k] = flip.checked ? -1 : 1;
-    return remote.setClippingPlanes([{ origin, normal }]);
-  };
-  [axis, place, flip].forEach((input) => input.addEventListener("input", clipped));
-  controls.push(labelled("Clip", axis, place), labelled("other side", flip));
   if (hello.steps > 1) {
     const time = htmlElement("input", {
       type: "range", min: 0, max: hello.steps - 1, value: 0, label: "Time step",

@@ -133,7 +133,7 @@ export class Scene {
    * @param {Raycaster} raycaster The viewer's own VDI.
    * @param {object} target Of a Pacer.
    * @param {object} view camera, width, height, density (pixels of it for one of the page), moving,
-   *   clippingPlanes; the same object for all bands of a picture.
+   *   look, clippingPlanes; the same object for all bands of a picture.
    */
   paint(raycaster, target, view) {
     const gl = this.#gl, { width, height } = view;
@@ -190,7 +190,8 @@ export class Scene {
       { corner, cornerBehind, pictured, height: view.height });
   }
 
-  #drawVDIs(raycaster, { camera, width, height, moving, few, clippingPlanes }, depthTexture) {
+  #drawVDIs(raycaster, view, depthTexture) {
+    const { camera, width, height, moving, few, clippingPlanes, look } = view;
     const bodies = this.#bodies.map((body, k) => k ? body : { ...body, raycaster })
       .filter(({ raycaster: caster }) => caster?.vdi);
     const boxes = bodies.map((body) => cornersOf(body.raycaster.vdi.bounds, matrixOf(body)));
@@ -204,7 +205,7 @@ export class Scene {
       const slab = near === -Infinity ? [] : [plane(near, 1), plane(far, -1)];
       caster.draw({
         camera: { ...camera, model_transform: matrixOf(bodies[body]) },
-        width, height, depthTexture, few, clippingPlanes: [...planes, ...clippingPlanes, ...slab],
+        width, height, depthTexture, few, look, clippingPlanes: [...planes, ...clippingPlanes, ...slab],
       });
     }
   }

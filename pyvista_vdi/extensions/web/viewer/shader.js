@@ -47,6 +47,8 @@ uniform ivec2 thinned;            // along each edge: 1 for every second list, o
 uniform float depthOrigin;        // world'
 uniform float firstDepth, slabsPerDepth; // of the occupancy grid, offsets from the depth origin
 uniform float cutoff;
+uniform float brightness, thickness; // factors of colours and of optical depths
+uniform bool finds;               // where the ray ends, in place of what it sees
 uniform usampler2D lists, masks;
 #ifdef PACKED
 uniform usampler2D faces;         // both words of a supersegment
@@ -236,7 +238,7 @@ CLIPPING
   deep = away ? end : start;
   float rEnd = away ? 0.0 : 1.0;
   float r = rEnd - 1.0;
-  float scale = (t1 - t0) * length(direction * pixel) * reciprocal(start.z) * reciprocal(end.z);
+  float scale = (t1 - t0) * length(direction * pixel) * reciprocal(start.z) * reciprocal(end.z) * thickness;
   float sense = away ? 1.0 : -1.0;
   float perDepth = along.z != 0.0 ? sense / along.z : 0.0;
   vec2 half_ = vec2(window) * 0.5, last = vec2(window - 1);
@@ -252,7 +254,7 @@ CLIPPING
   float depth = sense * start.z;
   bool goes = true;
   bool fresh = abs(along.x) + abs(along.y) > 2.0; // a stack that has not been looked at
-  int n = 0;
+  int n = 0, low = 0;
   vec3 color = vec3(0.0);
   float left = 1.0;
 
@@ -286,7 +288,8 @@ CLIPPING
     }
     fresh = false;
     bool entered = true;
-    int low = 0, high = 0x7fffffff, missed = 0;
+    int high = 0x7fffffff, missed = 0;
+    low = 0;
     for (int turn = 0; goes && !fresh && turn < 100000; ++turn) {
       if (entered) enter(int(cell.x), int(cell.y));
       vec2 border = crossings(cell);
@@ -322,7 +325,7 @@ CLIPPING
         goes = rNext < rEnd && left >= cutoff && all(greaterThanEqual(next, vec2(0.0))) &&
           all(lessThanEqual(next, last));
         cell = next;
-        r = rNext;
+        r = goes ? rNext : r;
         depth = nextDepth;
         low = missed = 0;
         high = 0x7fffffff;
@@ -330,6 +333,17 @@ CLIPPING
       entered = !stays;
     }
   }
+  if (finds) { // t, as the bits of a float32: where the ray meets the supersegment that ended it
+    if (n > 0 && low == n) --n; // it has been passed
+    if (n < count && perDepth != 0.0) {
+      r = clamp((facesMet(n).x - sense * deep.z) * perDepth, r, rEnd);
+    }
+    float share = r + 1.0 - rEnd, first = reciprocal(start.z), last_ = reciprocal(end.z);
+    float t = t0 + (t1 - t0) * share * last_ / (first + share * (last_ - first));
+    seen = vec4(uvec4(floatBitsToUint(t)) >> uvec4(0, 8, 16, 24) & 255u) / 255.0;
+    return;
+  }
+  if (brightness != 1.0) color = min(color * brightness, vec3(1.0 - left));
   seen = vec4(color, 1.0 - left);
 }
 `;
