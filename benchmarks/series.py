@@ -22,6 +22,7 @@ from shared import execute, marked, parser_of, table_of  # beside this file
 import pyvista_vdi as pvdi
 from pyvista_vdi import Volume, examples
 from pyvista_vdi.device import get_runtime
+from pyvista_vdi.io.files import read_info
 from pyvista_vdi.measure.harness import Bench, Case
 from pyvista_vdi.measure.results import Results, table
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -143,7 +144,7 @@ def measured(volumes: list[Volume], looks: Any, folder: Path, options: Any) -> d
                 writer.append(vdi)
         for writer in writers.values():
             writer.close()
-        info = files.read_info(files[0.0])
+        info = read_info(files[0.0])
         shown = sorted({0, len(vdis) // 2, len(vdis) - 1})
         exact = pvdi.read(files[0.0])
         return {

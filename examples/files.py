@@ -58,7 +58,7 @@ def opened_where_it_is_not(file: Path, target: str, show: bool) -> None:
     assert pvdi.read(file.with_suffix(".exr")).equals(vdi)
     plotter = pv.Plotter(off_screen=not show, window_size=(640, 480))
     plotter.background_color = "white"
-    plotter.add_vdi(pv.read(file))
+    plotter.add_vdi(pv.read(file), regenerate="never")  # the volume is elsewhere
     plotter.camera.position = vdi.camera.position
     plotter.camera.focal_point = vdi.camera.focal_point
     plotter.camera.up = vdi.camera.view_up
