@@ -1,0 +1,41 @@
+"""Stores of HDF5; h5py is imported where one is opened."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from pyvista_vdi.errors import InvalidVolumeError, MissingDependencyError
+from pyvista_vdi.io.stores.arrays import array_store, only_array
+from pyvista_vdi.io.stores.record import Store
+
+
+def open_hdf5(path: str, inner: str) -> Store:
+    """Open an array of an HDF5 file, by its name in it or as the only one."""
+    try:
+        import h5py
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{path} needs h5py ({error}): pip install 'pyvista-vdi[hdf5]'"
+        ) from error
+    try:
+        file = h5py.File(os.path.abspath(path), "r")  # noqa: PTH100 - links may differ elsewhere
+    except (OSError, ValueError) as error:
+        raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
+    try:
+        return array_store(path, only_array(path, inner, arrays_in(file)), "HDF5")
+    except BaseException:
+        file.close()  # whoever keeps the error would keep it from being written
+        raise
+
+
+def arrays_in(file: Any) -> dict[str, Any]:
+    """Return the arrays of three axes or more in an HDF5 file, by their names."""
+    found: dict[str, Any] = {}
+
+    def visit(name: str, node: Any) -> None:
+        if hasattr(node, "shape") and node.ndim > 2:
+            found[name] = node
+
+    file.visititems(visit)
+    return found
