@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
+from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.packed_values import packing_of
 
 
@@ -230,6 +231,25 @@ class Volume(Geometry):
         loaded = Volume(array, self.spacing, self.origin, self.direction, name=self.name)
         loaded.unit_distance, loaded.unit = self.unit_distance, self.unit
         return loaded
+
+    def in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
+        """Return what of several levels these views require: of one, itself."""
+        return self
+
+    def load_in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
+        """Return the volume in memory, of several levels the one that views require.
+
+        Raises
+        ------
+        DeviceMemoryError
+            If it is read chunk by chunk, and the host has not so much memory free.
+        """
+        if not self.chunked:
+            return self
+        found = self.in_view(*cameras, window_size=window_size)
+        what = f"the volume {found.name}"
+        require_free_memory(found.array.nbytes, what, "open a coarser level (level=...)")
+        return found.load()
 
     @property
     def scalars(self) -> NDArray[np.generic]:

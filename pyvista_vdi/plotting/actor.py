@@ -84,9 +84,17 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 class PlotterVDIActor(VDIActorMethods, Volume):
     """What ``Plotter.add_vdi`` returns: a ``pyvista.Volume`` with :attr:`vdi`."""
 
+    #: What reads finer levels of a store; ``None`` where none is shown.
+    _refinement: Any = None
+
     def __init__(self) -> None:
         super().__init__()
         self._become_vdi_actor()
+
+    @property
+    def level(self) -> int | None:
+        """Level of the store that is shown, 0 is the finest; ``None`` where no store is."""
+        return None if self._refinement is None else self._refinement.shown.level  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         """Return what is shown, and what of it the last frame drew."""

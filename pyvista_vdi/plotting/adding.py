@@ -31,10 +31,12 @@ from pyvista_vdi.model.render_options import DrawingOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
 from pyvista_vdi.plotting.prepared import framing_camera, prepared
 from pyvista_vdi.plotting.progress import progress_callback
+from pyvista_vdi.plotting.refinement import Refinement
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import refuse_settings
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
@@ -151,7 +153,7 @@ def added(
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
-    volume = prepared(plotter, volume, asked.array.scalars, asked.resample, asked.mask)
+    volume, stored = prepared(plotter, volume, asked.array.scalars, asked.resample, asked.mask)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if asked.deferral.given and not isinstance(first, VDI | DeferredVDI) and several is None:
@@ -160,7 +162,7 @@ def added(
     if isinstance(first, DeferredVDI):
         shown = _deferred_shown(first, asked)
     else:
-        shown = _vdi_shown(first, asked) if made else _volume_shown(first, asked, plotter)
+        shown = _vdi_shown(first, asked) if made else _volume_shown(first, asked, plotter, stored)
     actor = PlotterVDIActor()
     if shown.prop is not None:
         actor.prop = shown.prop
@@ -189,6 +191,8 @@ def added(
             plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
         if place.status:
             actor.show_status(plotter)
+    if stored is not None:
+        actor._refinement = Refinement(actor, plotter.renderer, stored)
     plotter.renderer.Modified()
     return actor
 
@@ -284,7 +288,7 @@ def _deferred_shown(deferred: DeferredVDI, asked: Addition) -> _Shown:
     return _Shown(shown, table, table.scalar_range, title, prop, place.show_scalar_bar)
 
 
-def _volume_shown(volume: Any, asked: Addition, plotter: Any) -> _Shown:
+def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | None) -> _Shown:
     """Return a source of VDIs of a volume, classified as ``add_volume`` would."""
     scalars, preference = asked.array.scalars, asked.array.preference
     look, place, source = asked.look, asked.place, VDISource()
@@ -311,7 +315,8 @@ def _volume_shown(volume: Any, asked: Addition, plotter: Any) -> _Shown:
         look, bar = look.of_rgba(), False
     look = replace(look, clim=range_to_classify(scalars, look.clim))
     table = look.lookup_table(read.array)
-    prop = look.volume_property(table, read.default_unit_distance, rgba=read.rgba)
+    unit_distance = (read if stored is None else stored).default_unit_distance
+    prop = look.volume_property(table, unit_distance, rgba=read.rgba)
     look.light(prop)
     source.SetLights(plotter.renderer)
     source.SetVolumeProperty(prop)

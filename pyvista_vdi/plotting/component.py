@@ -138,7 +138,8 @@ class AddVDI(Component):
         ----------
         volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, path, or VDIs
             A file as :func:`pyvista_vdi.read_volume` or :func:`pyvista_vdi.read` reads it; of a
-            store, what :func:`pyvista_vdi.open_volume` opens, the level that the view requires. A
+            store, what :func:`pyvista_vdi.open_volume` opens, the level that the view requires
+            (``actor.level``), and a finer one when the view comes nearer. A
             uniform grid, or a rectilinear one of equidistant points (other grids are refused,
             with the remedy), a NumPy array as ``add_volume`` takes it, blocks of uniform grids, a
             VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
@@ -352,6 +353,8 @@ class AddVDI(Component):
         """Release images and textures, even where the user keeps an actor."""
         for weak in self._actors:
             actor = weak()
+            if actor is not None and actor._refinement is not None:
+                actor._refinement.stop()
             if actor is not None and actor.mapper is not None:
                 actor.mapper.driver.release()
         self._actors.clear()

@@ -16,7 +16,7 @@ from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.refinement import load
 from pyvista_vdi.plotting.volumes import as_image
 from pyvista_vdi.vtk_pipeline.vtk import vtkCommonDataModel, vtkImageData
 
@@ -28,27 +28,25 @@ _MOST_POINTS = 2**27
 _HIDDEN = 2
 
 
-def prepared(plotter: Any, volume: Any, scalars: Any, resample: Any, mask: Any) -> Any:
-    """Return what can be shown of what is given: a path is read, a store's level loaded."""
+def prepared(
+    plotter: Any, volume: Any, scalars: Any, resample: Any, mask: Any
+) -> tuple[Any, StoredVolume | None]:
+    """Return what can be shown of what is given, and the level of a store that this is."""
+    stored = None
     if isinstance(volume, str | os.PathLike):
         array = scalars if isinstance(scalars, str) else None
         volume = read(volume) if is_vdi_file(volume) else read_volume(volume, array=array)
     if isinstance(volume, StoredVolume):
-        volume = _level_in_view(plotter, volume)
+        stored = volume.in_view(
+            framing_camera(plotter, volume.bounds), window_size=plotter.window_size
+        )
+        volume = load(stored)
     if resample is not None and isinstance(volume, vtkCommonDataModel.vtkDataSet):
         volume = resampled(pv.wrap(volume), resample)
-    return volume if mask is None else masked(volume, mask)
-
-
-def _level_in_view(plotter: Any, volume: StoredVolume) -> Volume:
-    """Load the level of a store that the plotter's view requires, and say which in the log."""
-    if len(volume.store.levels) > 1 and volume.why != "asked for":
-        camera = framing_camera(plotter, volume.bounds)
-        volume = volume.at_level("auto", camera, plotter.window_size)
-    remedy = "open a coarser level by pyvista_vdi.open_volume(path, level=...), or generate a VDI"
-    require_free_memory(volume.array.nbytes, f"the volume in {volume.store.path}", remedy)
-    _log.info("%s: %s", volume.store.path, volume.describe())
-    return volume.load()
+    if mask is None:
+        return volume, stored
+    # A mask has the points of one level
+    return masked(volume, mask), None if stored is None else stored.at_level(stored.level)
 
 
 def framing_camera(plotter: Any, bounds: Sequence[float]) -> Camera:

@@ -47,15 +47,21 @@ def generate_anywhere(
 ) -> VDI:
     """Generate a VDI of a volume in memory, or of a chunked one in blocks, here or by workers.
 
-    Errors are those of :func:`pyvista_vdi.generate`.
+    A target takes of a store the level that the view requires, and loads it. Errors are those of
+    :func:`pyvista_vdi.generate`.
     """
     name = request.volume.name
     if request.volume.chunked:
-        if target:
+        if target and client is not None:
             raise UnsupportedError(
-                "quality, target_ssim, target_fps and max_bytes measure the scene, and "
-                f"{name!r} is chunked: give max_supersegments, or load a coarse level"
+                "quality, target_ssim, target_fps and max_bytes measure the scene on this "
+                f"machine, and {name!r} is left to a client: give max_supersegments, or leave "
+                "client out"
             )
+        if target:  # which takes many looks at the whole
+            view, size = request.camera, request.window_size
+            loaded = request.volume.load_in_view(view, window_size=size)
+            return generate_anywhere(request.replace(volume=loaded), target)
         return registry.generator("blocks")(request, client)  # type: ignore[no-any-return]
     if client is not None:
         raise InvalidArgumentError(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 
 pytestmark = pytest.mark.usefixtures("default_runtime")
@@ -63,21 +62,3 @@ def test_what_a_mask_leaves_out_is_blank():
     assert not seen[..., 0].any()
     with pytest.raises(InvalidArgumentError, match="a label for each"):
         shown(image, mask=np.zeros((4, 5, 7)))
-
-
-def test_a_store_is_shown_at_the_level_that_the_view_requires(tmp_path, caplog):
-    zarr = pytest.importorskip("zarr", minversion="3")
-    group = zarr.open_group(str(tmp_path / "a.ome.zarr"), mode="w", zarr_format=2)
-    fine = np.arange(64**3, dtype=np.uint16).reshape(64, 64, 64)
-    datasets = []
-    for level, step in enumerate((1, 2, 4)):
-        group.create_array(str(level), data=fine[::step, ::step, ::step])
-        scale = [{"type": "scale", "scale": [float(step)] * 3}]
-        datasets.append({"path": str(level), "coordinateTransformations": scale})
-    axes = [{"name": a, "type": "space"} for a in "zyx"]
-    group.attrs["multiscales"] = [{"version": "0.4", "datasets": datasets, "axes": axes}]
-    caplog.set_level("INFO", "pyvista_vdi")
-    path = tmp_path / "a.ome.zarr"
-    assert max(shown(pvdi.open_volume(path)).dimensions) < 64
-    assert "level" in caplog.text
-    assert shown(pvdi.open_volume(path, level=1)).dimensions == (32, 32, 32)

@@ -71,7 +71,8 @@ def generate_series(
         for which ``spacing`` is given, so that a NumPy or Dask array indexed [step, z, y, x] will
         do. They are taken one by one. Or a function that returns step i; or a VTK or PyVista
         source that has time steps; or what :func:`pyvista_vdi.open_volume` returned for a store
-        that has.
+        that has. Of a multi-scale store, steps are of the level that the view requires, unless
+        another was asked for.
     camera : pyvista.Camera or vtkCamera or Camera
         The generating view V_O.
     window_size : (int, int)
@@ -161,7 +162,7 @@ class StepMaker:
         **given: Any,
     ) -> None:
         self._camera = Camera.from_any(camera)
-        self._size = check_window_size(window_size)
+        self._size = self._pictures = check_window_size(window_size)
         self._device, self._client = device, client
         looks = {n: v for n, v in given.items() if n not in (*GENERATION_NAMES, *_DIAL, *_GRID)}
         self._looks = Classification.composited(
@@ -217,7 +218,8 @@ class StepMaker:
         if self._grid and not hasattr(volume, "GetClassName") and not isinstance(volume, Volume):
             array = volume if self._client is not None else np.asarray(volume)
             volume = Volume(array, **self._grid)
-        return as_volume(volume, self._looks.scalars, self._looks.preference)
+        volume = as_volume(volume, self._looks.scalars, self._looks.preference)
+        return volume.in_view(self._camera, window_size=self._pictures)
 
     def _keep_the_choice(self, vdi: VDI) -> None:
         """Take what the dial chose for the first step as the settings of all others."""

@@ -64,7 +64,8 @@ def generate_set(
     Parameters
     ----------
     volume : pyvista.ImageData or vtkImageData or Volume
-        As for :func:`pyvista_vdi.generate`. It is uploaded once.
+        As for :func:`pyvista_vdi.generate`. It is uploaded once; of a store, the finest level that
+        one of the views requires is loaded.
     views : "sphere" or sequence of cameras
         What is to be seen: the volume from all directions, or from these views. V_Os are put
         among these.
@@ -144,14 +145,6 @@ def generate_set(
     chosen = {name: given.pop(name) for name in _OPTIONS if name in given}
     looks = Classification.composited(given, "generate_set", _OPTIONS)
     read = as_volume(volume, looks.scalars, looks.preference)
-    maker = ViewMaker(
-        read,
-        looks.transfer_function_of(read),
-        size,
-        GenerationOptions(**{"view_cone": VIEW_CONE, "precision": "8-byte", **chosen}),
-        {"classification": looks.describe(), "scalars": read.name},
-        device,
-    )
     if isinstance(views, str):
         if views != "sphere":
             raise InvalidArgumentError(f"views must be 'sphere' or cameras; got {views!r}")
@@ -165,6 +158,15 @@ def generate_set(
         probes = [Camera.from_any(view) for view in views]
         if not probes:
             raise InvalidArgumentError("there is no view: pass at least one camera")
+    read = read.load_in_view(*probes, window_size=size)
+    maker = ViewMaker(
+        read,
+        looks.transfer_function_of(read),
+        size,
+        GenerationOptions(**{"view_cone": VIEW_CONE, "precision": "8-byte", **chosen}),
+        {"classification": looks.describe(), "scalars": read.name},
+        device,
+    )
     sphere = isinstance(views, str)
     placing = Placing(maker, probes, goal, max_bytes, int(max_views), progress)
     placing.measure(lists, max_supersegments, sphere=sphere)

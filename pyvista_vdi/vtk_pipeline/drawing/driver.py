@@ -65,6 +65,7 @@ class Driver(Deciding):
         self._selection = Selection()
         self._images, self._last = Images(), NOTHING
         self._counted = self._generation = 0  # the VDI that was shown last, and how many were
+        self.level: tuple[int, int] | None = None  # of a store, and of how many
         self._scene_at_hand = SceneAtHand(self._say_not_exported)
         self._trouble: BaseException | None = None
         self._astray = False  # whether something else than the actor draws
@@ -341,6 +342,7 @@ class Driver(Deciding):
             stand_in=last.placeholder,
             drawn=last.way,
             time=None if player is None else player.time,
+            level=self.level,
         )
 
     def between_frames(self) -> bool:

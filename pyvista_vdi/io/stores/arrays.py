@@ -1,0 +1,89 @@
+"""Arrays that stand by themselves: what their names and attributes say of their axes and voxels."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
+from pyvista_vdi.io.coordinates import attributes_of
+from pyvista_vdi.io.stores.record import AXES, Level, Store
+from pyvista_vdi.model.volume import Grid
+
+#: The axes of an array that does not name them, by their number.
+_UNNAMED = {3: AXES[2:], 4: ("t", *AXES[2:]), 5: AXES}
+
+#: What libraries and metadata that break their format raise.
+BROKEN = (OSError, KeyError, IndexError, TypeError, ValueError, AttributeError, RuntimeError)
+
+
+def only_array(path: str, inner: str, found: Mapping[str, Any]) -> tuple[str, Any]:
+    """Return the array that is meant, by its name or as the only one."""
+    if inner in found:
+        return inner, found[inner]
+    if not inner and len(found) == 1:
+        return next(iter(found.items()))
+    known = ", ".join([f"{path}::{name}" for name in sorted(found)][:8])
+    said = f"has no array {inner!r} of three or more dimensions" if inner else "holds several"
+    raise InvalidVolumeError(
+        f"{path} {said}: open one of {known}" if found else f"{path} holds no array of 3 dimensions"
+    )
+
+
+def array_store(path: str, named: tuple[str, Any], kind: str) -> Store:
+    """Return an array that stands by itself, with what its attributes say of its voxels."""
+    name, array = named
+    axes, are_named = _axis_names(array)
+    check_axes(f"{path}::{name}", axes)
+    attributes = attributes_of(array, axes)
+    unit, spacing = attributes.get("unit of length", ""), attributes.get("spacing")
+    if "element_size_um" in attributes:
+        unit, spacing = "micrometer", attributes["element_size_um"]
+    try:
+        shape = [n for n, axis in zip(array.shape, axes, strict=True) if axis in "zyx"]
+        grid = grid_of(shape, spacing, attributes.get("origin"))
+    except BROKEN as error:
+        raise InvalidVolumeError(
+            f"{path}::{name}: element_size_um, spacing and origin must be three numbers, along "
+            f"z, y and x ({error})"
+        ) from error
+    return Store(path, (Level(name, array, grid),), axes, unit, (), kind, named=are_named)
+
+
+def check_axes(path: str, axes: tuple[str, ...]) -> None:
+    """Refuse axes among which z, y and x are not in this order."""
+    if tuple(axis for axis in axes if axis in "zyx") != ("z", "y", "x"):
+        raise UnsupportedError(
+            f"{path} has the axes {', '.join(axes)}: z, y, x must be among them in this order; "
+            "give pyvista_vdi.Volume a transposed dask array instead"
+        )
+
+
+def _axis_names(array: Any) -> tuple[tuple[str, ...], bool]:
+    """Return the names that zarr 3, xarray or HDF5 have for an array's axes; whether they do."""
+    names: Any = getattr(getattr(array, "metadata", None), "dimension_names", None)
+    names = names or array.attrs.get("_ARRAY_DIMENSIONS")
+    if "axistags" in array.attrs:  # of ilastik and vigra
+        names = [axis["key"] for axis in json.loads(array.attrs["axistags"])["axes"]]
+    names = names or [dimension.label for dimension in getattr(array, "dims", ())]
+    short = [{"time": "t", "channel": "c"}.get(str(n).lower(), str(n).lower()) for n in names]
+    if len(short) == array.ndim and set(short) >= {"z", "y", "x"}:
+        return tuple(short), True
+    if array.ndim not in _UNNAMED:
+        raise InvalidVolumeError(
+            f"a volume has three axes, before them time and channel; got shape {array.shape}"
+        )
+    return _UNNAMED[array.ndim], False
+
+
+def grid_of(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Grid:
+    """Return the grid of points whose numbers are given along z, y and x."""
+    numbers = [(1.0,) * 3 if spacing is None else spacing, (0.0,) * 3 if origin is None else origin]
+    along = [np.asarray(n, dtype=np.float64).ravel()[-3:][::-1].tolist() for n in numbers]
+    (x, y, z), (at_x, at_y, at_z) = along
+    nz, ny, nx = shape
+    turn = np.diag(np.sign([x, y, z]))  # coordinates may fall
+    return Grid((nx, ny, nz), (abs(x), abs(y), abs(z)), (at_x, at_y, at_z), turn)

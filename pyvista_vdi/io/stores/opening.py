@@ -1,0 +1,124 @@
+"""Where a store is opened: its kind, and what of it is meant."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict
+
+import numpy as np
+
+from pyvista_vdi import registry
+from pyvista_vdi.io.stores.hdf5 import open_hdf5
+from pyvista_vdi.io.stores.record import StoredVolume, chosen_level
+from pyvista_vdi.io.stores.zarr import open_zarr
+from pyvista_vdi.model.chunk_ranges import ZARR_FILES
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.model.whole_file import as_path
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+_HDF5 = (".h5", ".hdf5", ".he5")
+
+
+class Meant(TypedDict, total=False):
+    """What is meant of a store: arguments of :func:`open_volume`, with its defaults."""
+
+    level: int | str
+    camera: Any
+    window_size: Sequence[int] | None
+    time: int
+    channel: int | str
+
+
+def is_store(path: str | os.PathLike[str]) -> bool:
+    """Whether a path looks like one that :func:`open_volume` opens, by its name or its files."""
+    outer, inner = _parts(path)
+    if inner or outer.rstrip("/\\").lower().endswith((".zarr", *_HDF5)):
+        return True
+    return os.path.isdir(outer) and any(  # noqa: PTH112 - pathlib's raises for too long names
+        (Path(outer) / name).is_file() for name in ZARR_FILES
+    )
+
+
+def open_volume(
+    path: str | os.PathLike[str],
+    *,
+    level: int | str = "auto",
+    camera: Any = None,
+    window_size: Sequence[int] | None = None,
+    time: int = 0,
+    channel: int | str = 0,
+) -> Volume:
+    """Open a volume in a store of chunks, of which only the metadata are read.
+
+    Any other file is read whole, by :func:`read_volume`.
+
+    Parameters
+    ----------
+    path : path-like
+        ``"x.zarr"``, ``"x.ome.zarr"`` or ``"x.h5::/path"``: a zarr array, an image of OME-Zarr 0.4
+        or 0.5, an HDF5 file. What follows ``::`` is a group or an array in it; without it the only
+        one.
+    level : int or "auto"
+        Level of a multi-scale image, 0 is the finest. ``"auto"``: the coarsest whose voxels are
+        still as fine as half a list's width where the volume is nearest to V_O; without a camera
+        the finest.
+    camera : Camera or anything that :func:`generate` takes as one, optional
+        V_O.
+    window_size : (int, int), optional
+        Lists of V_O along x and y; with ``camera``.
+    time : int
+        Which time step.
+    channel : int or str
+        Which channel, by its number or its name.
+
+    Returns
+    -------
+    StoredVolume
+        A :class:`Volume` that is read where a part is needed. Its ``describe()`` says which level
+        it is and why.
+
+    Raises
+    ------
+    MissingDependencyError
+        If zarr or h5py is not installed.
+    InvalidVolumeError
+        If there is no store, or its metadata break their format.
+    UnsupportedError
+        If it is of another version, or OME-Zarr 0.5 where zarr is older than 3; if its axes are
+        not z, y, x in this order behind time and channel.
+    InvalidArgumentError
+        If it has no such level, time or channel.
+    """
+    if is_store(path):
+        view: Meant = {"level": level, "camera": camera, "window_size": window_size}
+        meant: Meant = {**view, "time": time, "channel": channel}
+        return open_store(path, **meant)
+    chosen = {"time": time, "channel": channel}
+    given: dict[str, Any] = {k: v for k, v in chosen.items() if not np.array_equal(v, 0)}
+    return registry.method("Volume.read")(path, level=level, **given)  # type: ignore[no-any-return]
+
+
+def open_store(path: str | os.PathLike[str], **meant: Unpack[Meant]) -> StoredVolume:
+    """Open a store; arguments as of :func:`open_volume`."""
+    outer, inner = _parts(path)
+    named = outer.rstrip("/\\").lower()
+    hdf5 = named.endswith(_HDF5) or (os.path.isfile(outer) and not named.endswith(".zarr"))  # noqa: PTH113
+    store = open_hdf5(outer, inner) if hdf5 else open_zarr(outer, inner)
+    view = meant.get("camera"), meant.get("window_size")
+    number, why = chosen_level(store, meant.get("level", "auto"), *view)
+    time, channel = meant.get("time", 0), meant.get("channel", 0)
+    no_time = np.array_equal(time, 0)  # whatever else it is, a number or not
+    either = "t" in store.axes and "c" not in store.axes and not store.named
+    if either and no_time and not isinstance(channel, str):
+        time, channel = channel, 0  # of four axes without names the first may be either
+    return StoredVolume(store, number, why, time, channel)
+
+
+def _parts(path: str | os.PathLike[str]) -> tuple[str, str]:
+    as_path(path)
+    outer, _, inner = os.fspath(path).partition("::")
+    return outer, inner.strip("/")
