@@ -140,7 +140,8 @@ def test_wheel_metadata_and_entry_points(wheel):
     # the engine runs on machines without these
     assert required.isdisjoint({"vtk", "pyvista", "matplotlib", "pydicom", "intel-opencl-rt"})
     assert "pyvista-vdi = pyvista_vdi.cli:main" in entry_points
-    assert "[pyvista.plotter_components]\nadd_vdi = pyvista_vdi.plotting.component" in entry_points
+    _, components = entry_points.split("[pyvista.plotter_components]\n")
+    assert "add_vdi = pyvista_vdi.plotting.component\n" in components.split("\n\n")[0] + "\n"
     assert "[pyvista.accessors]\nvdi = pyvista_vdi.plotting.accessor" in entry_points
     for group, function in (("readers", "reader:read_vdi"), ("writers", "writer:write_vdi")):
         names = [f"{suffix} = pyvista_vdi.plotting.{function}" for suffix in (".exr", ".vdi")]

@@ -251,7 +251,8 @@ def test_the_first_step_is_shown_while_the_rest_comes(series, data, frames, open
     page.evaluate("goOn()")
     page.wait_for("viewer.series.complete")
     assert page.evaluate("viewer.series.times") == list(series.times)
-    assert page.page.locator("vdi-viewer input").get_attribute("max") == str(N - 1)
+    time = page.page.get_by_label("Time", exact=True)
+    assert time.get_attribute("max") == str(N - 1)
 
 
 @pytest.mark.slow
