@@ -45,7 +45,8 @@ def _coordinates(array: Any) -> list[Any]:
     else:
         names = getattr(getattr(array, "metadata", None), "dimension_names", None)
         names = [*(names or array.attrs.get("_ARRAY_DIMENSIONS", ()))]
-        group = _group_of(array) if len(names) == array.ndim else {}
+        # An array that is the whole store has nothing beside it
+        group = _group_of(array) if len(names) == array.ndim and array.path else {}
     found: list[Any] = [None] * array.ndim
     for i, n in enumerate(array.shape):
         scales = dims[i].values() if len(dims) else []

@@ -9,7 +9,7 @@ import pytest
 from drawing import generate_chunked
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, UnsupportedError, Volume
+from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, Volume
 from pyvista_vdi.model.chunked import ChunkedArray
 
 VALUES = np.random.default_rng(4).integers(0, 200, (30, 21, 26), np.uint8)
@@ -130,8 +130,6 @@ def test_what_needs_the_whole_array_says_so():
     ):
         with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
             use()
-    with pytest.raises(UnsupportedError, match="target_ssim.*chunked"):
-        pvdi.generate(*scene, transfer_function=function, target_ssim=0.9)
     with pytest.raises(InvalidVolumeError, match="three slices of step 1"):
         volume.array[0]
     assert not hasattr(volume.array, "something")

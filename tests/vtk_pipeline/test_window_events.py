@@ -335,7 +335,14 @@ DRIVING = {
     "vtk_pipeline/drawing": {"deciding", "driver", "mapper"},
     "vtk_pipeline/interaction": {"behind", "browser", "status", "timer", "window"},
     "vtk_pipeline/filters": {"algorithm", "source", "source_settings", "temporal", "view"},
-    "plotting": {"actor", "component", "progress", "registration"},
+    "plotting": {
+        "actor",
+        "component",
+        "edited_property",
+        "progress",
+        "refinement",
+        "registration",
+    },
 }
 
 
