@@ -342,6 +342,7 @@ DRIVING = {
         "progress",
         "refinement",
         "registration",
+        "transfer_function_editor",
     },
 }
 
