@@ -52,7 +52,7 @@ class Scissor:
 
     def narrow(self, window: Any, box: Box) -> None:
         """Draw in this box alone, and within what was set, until :meth:`end`."""
-        self.end()
+        # What a frame that VTK broke off has left is not set again: each renderer sets its own box
         state, before = window.GetState(), [0, 0, 0, 0]
         state.vtkglGetIntegerv(_GL_SCISSOR_BOX, before)
         low = [max(a, b) for a, b in zip(before[:2], box[:2], strict=True)]
