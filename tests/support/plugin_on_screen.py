@@ -22,7 +22,7 @@ from plugin_scenes import LOOKS, soft_ball
 from skimage.io import imread
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.quality.frame_rate import FrameRate
 from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor
 from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtk_to_numpy, vtkUnsignedCharArray
 
@@ -348,7 +348,7 @@ def main():
     # Matplotlib 3.8, the oldest allowed, uses what newer versions of pyparsing deprecate
     warnings.filterwarnings("default", category=DeprecationWarning, module="matplotlib")
     # Every preview as coarse as it may be, whatever frames take
-    FrameRateController.choose = lambda controller, full: 1
+    FrameRate.chosen = lambda rate, full: 1
     failed = 0
     for case in CASES:
         if len(sys.argv) > 1 and case.__name__ not in sys.argv[1:]:
