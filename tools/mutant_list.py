@@ -703,7 +703,7 @@ PYTHON_MUTANTS = (
     _m(
         "options: what a VDI refuses of add_volume's is dropped",
         "pyvista_vdi/plotting/adding.py",
-        "changed = {*self.array.given, *self.look.given, *self.options.given, *target}",
+        "changed = {*self.array.given, *given, *self.options.given, *target, *self.deferral.given}",
         "changed = set()",
         ("plotting",),
     ),

@@ -23,11 +23,7 @@ from pyvista_vdi.plotting.edited_property import (
     simplified,
     windowed,
 )
-from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkCompositeControlPointsItem,
-    vtkCompositeTransferFunctionItem,
-    vtkPiecewiseFunction,
-)
+from pyvista_vdi.vtk_pipeline.vtk import vtkPiecewiseFunction
 
 #: Pixels from a point, or from the curve, within which the mouse meets it.
 _REACH = 8
@@ -81,6 +77,12 @@ class TransferFunctionEditor:
             self._range = float(edges[0]), float(edges[-1])
             heights = np.log1p(counts) / max(np.log1p(counts).max(), 1e-9)
             self._chart.area(np.repeat(edges, 2)[1:-1], np.repeat(heights, 2), color="grey")
+        # Here, because cvista has none of them, and all but the editor does without
+        from pyvista_vdi.vtk_pipeline.vtk import (
+            vtkCompositeControlPointsItem,
+            vtkCompositeTransferFunctionItem,
+        )
+
         self._fill = vtkCompositeTransferFunctionItem()
         self._handles, self._shown = vtkCompositeControlPointsItem(), vtkPiecewiseFunction()
         self._handles.SetOpacityFunction(self._shown)

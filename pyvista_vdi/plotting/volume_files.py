@@ -6,7 +6,6 @@ import contextlib
 import itertools
 import math
 import os
-import pickle
 import re
 import subprocess
 import sys
@@ -197,23 +196,22 @@ def _read_apart(file: Path) -> Any:
                     f"{file} cannot be read as XDMF: it has {count} values for {said} points"
                 )
     code = (
-        "import pickle, sys, pyvista\n"
+        "import sys, pyvista\n"
         "from pyvista_vdi.vtk_pipeline import vtk\n"
         "reader = vtk.vtkXdmfReader()\n"
         "reader.SetFileName(sys.argv[1])\n"
         "reader.Update()\n"
-        "with open(sys.argv[2], 'wb') as found:\n"
-        "    pickle.dump(pyvista.wrap(reader.GetOutputDataObject(0)), found)\n"
+        "pyvista.MultiBlock([reader.GetOutputDataObject(0)]).save(sys.argv[2])\n"
     )
     with tempfile.TemporaryDirectory() as folder:
-        found = Path(folder, "found")
+        found = Path(folder, "found.vtm")
         command = [sys.executable, "-c", code, str(file.resolve()), str(found)]
         done = subprocess.run(command, capture_output=True, text=True, errors="replace")
         if done.returncode or re.search(r"ERR|rror", done.stderr):
             messages = [*_errors_in(done.stderr), f"its reader ended by {done.returncode}"]
             why = messages[0][:200]
             raise InvalidVolumeError(f"{file} cannot be read as XDMF ({why}): is it whole?")
-        return pickle.loads(found.read_bytes())
+        return pv.read(found)
 
 
 def _grids_of_xdmf(file: Path) -> Iterable[Any]:

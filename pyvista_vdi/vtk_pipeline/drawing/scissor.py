@@ -1,4 +1,4 @@
-"""Have OpenGL fill only the pixels in which a preview shows something."""
+"""The pixels in which a preview shows something: OpenGL fills no others."""
 
 from __future__ import annotations
 
