@@ -13,6 +13,7 @@ from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
 from pyvista_vdi.plotting.volumes import held
 from pyvista_vdi.quality.worker import Job, Worker
+from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of
 from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
 from pyvista_vdi.vtk_pipeline.interaction.timer import Timer
@@ -82,7 +83,9 @@ class Refinement:
             return
         if _data_of(actor) is not self._data():  # somebody has set other data, or a VDI
             self.stop()
-            actor.GetMapper().driver.level = actor._refinement = None
+            actor._refinement = None
+            if isinstance(actor.GetMapper(), VDIMapperMethods):
+                actor.GetMapper().driver.level = None
             return
         self._take()
         if tuple(window.GetTileScale()) != (1, 1) or min(renderer.GetSize()) < 1:
@@ -155,5 +158,6 @@ def _watched(window: Any) -> bool:
 
 def _data_of(actor: Any) -> Any:
     """Return the grid that an actor's VDI is made of; ``None`` without one."""
-    source = None if actor.GetMapper() is None else actor.GetMapper().GetSource()
+    mapper = actor.GetMapper()
+    source = mapper.GetSource() if isinstance(mapper, VDIMapperMethods) else None
     return None if source is None else source.GetInputDataObject(0, 0)

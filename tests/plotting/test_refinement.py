@@ -139,6 +139,15 @@ def test_a_removed_actor_reads_nothing_and_other_data_stay(store, plotter, monke
     assert actor.level is None
 
 
+def test_an_actor_whose_mapper_is_taken_away_reads_nothing(store, plotter, monkeypatch):
+    actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
+    found = actor._refinement
+    monkeypatch.setattr(refinement, "load", lambda _: pytest.fail("a level was read"))
+    actor.SetMapper(None)
+    found._before_frame()  # VTK would print what it raises, and go on
+    assert found._observer == 0
+
+
 def test_in_a_window_a_thread_reads_and_frames_go_on(store, plotter, monkeypatch):
     actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
     picture(plotter)
