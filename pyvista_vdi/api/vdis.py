@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from numpy.typing import ArrayLike
 
-from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.classification import Classification, refuse_keywords
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest, QualityTarget
@@ -215,15 +214,15 @@ def generate(
         *(max_supersegments, criterion, tolerance, view_cone, precision),
     )
     read = as_volume(volume, scalars, preference)
-    deferred = deferral.classification == "deferred"
-    if deferred:
+    if deferral.deferred:
         look.require_no_look()
+        deferral.refuse_target(target)
+    from pyvista_vdi.generation.deferred import generate_deferred, unclassified
+
     request = GenerationRequest(
         volume=read,
         transfer_function=(
-            TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
-            if deferred
-            else look.transfer_function_of(read)
+            unclassified(interpolation) if deferral.deferred else look.transfer_function_of(read)
         ),
         camera=camera,  # type: ignore[arg-type]  # which it checks
         window_size=window_size,  # type: ignore[arg-type]  # likewise
@@ -234,14 +233,7 @@ def generate(
     )
     from pyvista_vdi.quality.probe import generate_anywhere
 
-    if deferred:
-        if target:
-            raise UnsupportedError(
-                "quality, target_ssim, target_fps and max_bytes choose settings by a look, which "
-                "a deferred VDI does not have: give max_supersegments"
-            )
-        from pyvista_vdi.generation.deferred import generate_deferred
-
+    if deferral.deferred:
         return generate_deferred(  # type: ignore[return-value]
             request, deferral, lambda asked: generate_anywhere(asked, target, client)
         )

@@ -39,7 +39,7 @@ def generate(options: argparse.Namespace) -> int:
     arguments = classification(options)
     looks = Classification.composited(arguments, "generate")  # refused before the volume is read
     kept = {name: getattr(options, name) for name in declared(Deferral)}
-    deferred = Deferral(**kept).classification == "deferred"
+    deferred = Deferral(**kept).deferred
     if deferred:
         looks.require_no_look()
     occlusion = ambient_occlusion(options)

@@ -9,7 +9,8 @@ from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime, padded
 from pyvista_vdi.device.constants import GROUP
 from pyvista_vdi.errors import NoDeviceError
 from pyvista_vdi.generation.kernels import CLASSIFY_VALUES
-from pyvista_vdi.model.deferred import CELLS, DeferredVDI, Floats, Media, classify
+from pyvista_vdi.model.classify_values import CELLS, Media, classify
+from pyvista_vdi.model.deferred import DeferredVDI, Floats
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import DeviceLike
 from pyvista_vdi.model.vdi import VDI
@@ -27,7 +28,7 @@ _lock = threading.Lock()
 def classify_on_device(
     deferred: DeferredVDI, transfer_function: TransferFunction, device: DeviceLike | None = None
 ) -> VDI:
-    """Return what :func:`~pyvista_vdi.model.deferred.classify` does, computed on a device.
+    """Return what :func:`~pyvista_vdi.model.classify_values.classify` does, computed on a device.
 
     On the host where there is none, or where it cannot hold the arrays.
     """

@@ -32,6 +32,11 @@ _LEAST_SPREAD = 5e-4
 _WHOLE = 1e-3
 
 
+def unclassified(interpolation: str) -> TransferFunction:
+    """Return what stands in a request for the transfer function that is chosen afterwards."""
+    return TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
+
+
 @record
 @dataclass(frozen=True)
 class _LengthOptions(GenerationOptions):

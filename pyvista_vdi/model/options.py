@@ -14,7 +14,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import (
@@ -327,6 +327,19 @@ class Deferral(Options):
                     f"{name}={getattr(self, name)!r} says what is kept to be classified "
                     f"afterwards: give classification='deferred' as well, or leave {name} out"
                 )
+
+    @property
+    def deferred(self) -> bool:
+        """Whether values are kept."""
+        return self.classification == "deferred"
+
+    def refuse_target(self, target: "QualityTarget") -> None:
+        """Refuse, where values are kept, a target by which settings would be chosen."""
+        if self.deferred and target:
+            raise UnsupportedError(
+                f"{', '.join(target.given)} choose settings by a look, which a deferred VDI does "
+                "not have: give max_supersegments"
+            )
 
 
 @record

@@ -13,7 +13,7 @@ import pyvista as pv
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
-from pyvista_vdi.generation.deferred import generate_deferred
+from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -28,7 +28,6 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.render_options import DrawingOptions
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -245,20 +244,15 @@ def _vdi_shown(vdi: Any, asked: Addition) -> _Shown:
 
 def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, Addition]:
     """Generate a deferred VDI for the plotter's view, and say what is left to be honoured."""
-    array, target = asked.array, asked.target
+    array = asked.array
     array.require_composite()
-    if target:
-        raise UnsupportedError(
-            f"{', '.join(target.given)} choose settings by a look, which a deferred VDI does not "
-            "have: give max_supersegments"
-        )
+    asked.deferral.refuse_target(asked.target)
     image, name = as_image(volume, array.scalars, asked.resolution)
     read = as_volume(image, name, array.preference)
     view = asked.camera or framing_camera(plotter, read.bounds)
-    looks = TransferFunction([[0] * 3], [0], (0, 1), interpolation=asked.look.interpolation)
     request = GenerationRequest(
         read,
-        looks,
+        unclassified(asked.look.interpolation),
         view,  # type: ignore[arg-type]  # which it checks
         tuple(plotter.window_size),
         asked.options,

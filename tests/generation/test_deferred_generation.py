@@ -9,7 +9,8 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.generation.classified_values import classify_on_device
 from pyvista_vdi.generation.deferred import generate_deferred
-from pyvista_vdi.model.deferred import classify, lengths_of
+from pyvista_vdi.model.classify_values import classify
+from pyvista_vdi.model.deferred import lengths_of
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
 
 EDGES = NX, NY, NZ = 7, 6, 33

@@ -135,6 +135,16 @@ def test_what_needs_the_whole_array_says_so():
     assert not hasattr(volume.array, "something")
 
 
+def test_a_target_loads_the_whole_array():
+    """Settings are chosen by pictures of the volume, which need it in memory."""
+    camera = Camera((60, 50, 70), (13, 10, 15), (0, 1, 0))
+    looks = {"cmap": "bone", "opacity": "linear", "clim": (0, 200), "target_ssim": 0.5}
+    found, whole = (
+        pvdi.generate(Volume(array), camera, (24, 18), **looks) for array in (Counted(), VALUES)
+    )
+    assert found.equals(whole)
+
+
 @pytest.mark.parametrize("source", ["dask", "h5py"])
 def test_colours_and_uneven_chunks_are_refused_by_name(source, tmp_path):
     dask = pytest.importorskip("dask.array")

@@ -227,7 +227,7 @@ class Window:
             window.SetMultiSamples(0)
         # From 9.7 on VTK draws the whole window once more to give the screen a depth buffer, which
         # nothing reads: window.GetZbufferData reads that of VTK's own framebuffer
-        if _draws_depth_to_screen(window):
+        if self._blit is None and _draws_depth_to_screen(window):
             self._blit = window.GetFrameBlitMode()
             window.SetFrameBlitModeToBlitToCurrent()
         self.pace = self.pace.began(samples)

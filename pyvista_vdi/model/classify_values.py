@@ -1,0 +1,147 @@
+"""What a transfer function makes of a deferred VDI, in float64 (docs/conventions.md).
+
+On a device: ``generation/classify_values.cl``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import UnsupportedError, warn_external
+from pyvista_vdi.model.checks import as_range
+from pyvista_vdi.model.deferred import DeferredVDI, Floats
+from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.model.vdi import VDI
+
+#: Straight colours and optical depths of supersegments.
+Media = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
+#: Cells of the tables that a transfer function is integrated in, over the range of values: a window
+#: of a fiftieth of it has 327.
+CELLS = 1 << 14
+
+
+def classify(
+    deferred: DeferredVDI,
+    transfer_function: TransferFunction,
+    media: Callable[[DeferredVDI, Floats], Media] | None = None,
+) -> VDI:
+    """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
+
+    The opacity of a step of the march, and its colour weighted by opacity, are their means over the
+    values from mean - sqrt(3) spread to mean + sqrt(3) spread, within the range: those of values
+    that are spread evenly. ``media``: does what :func:`media_of_values` does, which is the default.
+    Errors and warnings: :meth:`DeferredVDI.classified`.
+    """
+    for name, asked in (
+        ("shading", transfer_function.shading),
+        ("gradient opacity", transfer_function.gradient_opacities),
+    ):
+        if asked is not None:
+            raise UnsupportedError(
+                f"{name} needs gradients, which a DeferredVDI does not keep: leave it out, or "
+                "generate with the transfer function and classification='baked'"
+            )
+    _warn_outside(deferred, transfer_function)
+
+    # A step's opacity, and the colour times it, in cells of the range of values
+    low, high = deferred.value_range
+    unit = transfer_function.unit_distance or deferred.unit_distance
+    values = low + (np.arange(CELLS) + 0.5) / CELLS * (high - low)
+    color, opacity = looked_up(transfer_function, values)
+    with np.errstate(divide="ignore"):
+        of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
+    of_cells = np.column_stack([of_step[:, np.newaxis] * color, of_step])
+    straight, optical_depth = (media or media_of_values)(deferred, of_cells)
+
+    # What is transparent is left out
+    lists = deferred.lists
+    rows: Any = np.flatnonzero(optical_depth > 0)
+    offsets = lists.offsets
+    if len(rows) == len(optical_depth):
+        rows = slice(None)
+    else:
+        offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
+    return VDI(
+        lists.camera,
+        lists.window_size,
+        offsets,
+        lists.front[rows],
+        lists.back[rows],
+        straight[rows],
+        optical_depth[rows],
+        lists.bounds,
+        depth_origin=lists.depth_origin,
+        metadata={
+            **lists.metadata,
+            "opacity_unit_distance": unit,
+            "transfer_function": transfer_function.to_dict(),
+            "deferred": deferred.about,
+        },
+    )
+
+
+def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
+    """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
+
+    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, (CELLS, 4).
+    """
+    integrals = np.zeros((CELLS + 1, 4))
+    np.cumsum(of_cells, axis=0, out=integrals[1:])
+    mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
+    reach = np.maximum(np.sqrt(3) * spread, 0.5 / CELLS)  # at least a cell
+    first, last = (np.clip(mean + sign * reach, 0, 1) * CELLS for sign in (-1, 1))
+    means = _integral(integrals, last) - _integral(integrals, first)
+    means /= (last - first)[:, np.newaxis]
+    of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
+    optical_depth = (-np.log1p(-of_step) * deferred.steps).astype(np.float32)
+    straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
+    return np.clip(straight, 0, 1).astype(np.float32), optical_depth
+
+
+def _integral(integrals: Floats, place: Floats) -> Floats:
+    """Return integrals up to places in cells: within a cell the extinction is the same."""
+    cell = np.minimum(place.astype(np.int64), CELLS - 1)
+    share = (place - cell)[:, np.newaxis]
+    return integrals[cell] * (1 - share) + integrals[cell + 1] * share
+
+
+def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) -> None:
+    """Warn where a transfer function shows values that are not kept, with their share."""
+    volume = deferred.metadata.get("volume")
+    stored = volume.get("scalar_range") if isinstance(volume, Mapping) else None
+    least, largest = as_range(stored or transfer_function.scalar_range)
+    if not (np.isfinite(least) and np.isfinite(largest) and least < largest):
+        return
+    low, high = deferred.value_range
+    values = np.linspace(least, largest, 4097)
+    opacity = looked_up(transfer_function, values)[1]
+    # A value at an end of the range is kept
+    outside = opacity[(values < low) | (values > high)].sum()
+    if outside > 1e-3 * opacity.sum():
+        warn_external(
+            f"the transfer function shows values outside {low:g} to {high:g}, which this VDI does "
+            f"not keep: {outside / opacity.sum():.1%} of its opacity from {least:g} to "
+            f"{largest:g}; generate with a wider value_range, or lower the opacity there"
+        )
+
+
+def looked_up(transfer_function: TransferFunction, values: Floats) -> tuple[Floats, Floats]:
+    """Return colours (n, 3) and opacities (n,) of scalars, float64."""
+    low, high = transfer_function.scalar_range
+    entries = len(transfer_function.opacities)
+    if high > low:
+        place = (values - low) / (high - low) * (entries - 1)
+    else:
+        place = np.where(values > low, entries - 1.0, 0.0)
+    nodes = np.arange(entries)
+    columns = [
+        np.interp(place, nodes, column.astype(np.float64))
+        for column in (*transfer_function.colors.T, transfer_function.opacities)
+    ]
+    return np.stack(columns[:3], axis=1), columns[3]
