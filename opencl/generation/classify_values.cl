@@ -1,5 +1,5 @@
 // Values to media: a transfer function applied to the supersegments of a deferred VDI
-// (docs/conventions.md, "Values in place of colours"). In float64: pyvista_vdi/model/classify_values.py.
+// (docs/conventions.md, "Values in place of colours"); in float64: model/classify_values.py.
 #pragma OPENCL FP_CONTRACT OFF
 
 #define PER_UNIT 9.094947e-13f // 2^-40
