@@ -176,7 +176,7 @@ def drawn(
 
 def resident(which: str = "VmRSS") -> int:
     """Return what the process has in memory, or with ``"VmHWM"`` had at most; bytes."""
-    lines = Path("/proc/self/status").read_text().splitlines()
+    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
     (line,) = (line for line in lines if line.startswith(f"{which}:"))
     return int(line.split()[1]) * 1024
 
@@ -185,7 +185,7 @@ def forget_peak() -> None:
     """Hand back what was freed, and let the peak begin anew."""
     gc.collect()
     ctypes.CDLL("libc.so.6").malloc_trim(0)
-    Path("/proc/self/clear_refs").write_text("5")
+    Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
 
 
 def report(results: Results, every: list[Case]) -> Iterator[str]:

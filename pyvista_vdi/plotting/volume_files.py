@@ -121,7 +121,7 @@ def _head_of_cube(file: Path) -> NDArray[np.float64]:
     It does on atoms of no element, too, and these lines must be there for what the counts say.
     """
     why, size = "its lines 3 to 6 must each be a whole number and three others", file.stat().st_size
-    with file.open(errors="replace") as stream:
+    with file.open(encoding="utf-8", errors="replace") as stream:
         rows = _numbers(itertools.islice(stream, 2, 6), 4)
         if rows.shape == (4, 4):
             n_atoms, points = abs(rows[0, 0]), rows[1:, 0]

@@ -413,7 +413,7 @@ def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):
 
 def resident_bytes():
     try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
     except OSError:
         return None
     return pages * os.sysconf("SC_PAGE_SIZE")

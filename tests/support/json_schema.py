@@ -16,6 +16,6 @@ def faults(value, schema):
 
 def read_checked(path, schema_path):
     """Read a JSON file after holding it to the schema in another."""
-    data = json.loads(Path(path).read_text())
-    assert faults(data, json.loads(Path(schema_path).read_text())) == []
+    data = json.loads(Path(path).read_text(encoding="utf-8"))
+    assert faults(data, json.loads(Path(schema_path).read_text(encoding="utf-8"))) == []
     return data

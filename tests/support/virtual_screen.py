@@ -23,7 +23,7 @@ def virtual_screen() -> Iterator[str]:
     )
     try:
         os.close(writer)
-        with open(reader) as file:  # noqa: PTH123 - a pipe
+        with open(reader, encoding="utf-8") as file:  # noqa: PTH123 - a pipe
             number = file.readline().strip()  # written when the server is ready
         yield f":{number}"
     finally:
