@@ -58,8 +58,8 @@ def _import_instrumented() -> None:
     except ImportError:
         raise SystemExit('atheris is not installed: pip install "pyvista-vdi[fuzz]"') from None
     with atheris.instrument_imports(include=["pyvista_vdi"]):
-        import pyvista_vdi.extensions.deep_exr.files
-        import pyvista_vdi.plotting.classify
+        import pyvista_vdi.extensions.deep_exr.files  # noqa: F401
+        import pyvista_vdi.plotting.classify  # noqa: F401
         import pyvista_vdi.vtk_pipeline.filters.convert  # noqa: F401
 
 
