@@ -33,13 +33,13 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.prepared import framing_camera, prepared
+from pyvista_vdi.plotting.prepared import framing_camera, prepared, require_grid
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import Refinement
 from pyvista_vdi.plotting.volumes import as_image, held
 from pyvista_vdi.quality.dial import refuse_settings
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
-from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, require_image, vdi_from_image
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
@@ -152,7 +152,9 @@ def added(
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
-    volume, stored = prepared(plotter, volume, asked.array.scalars, asked.resample, asked.mask)
+    volume, stored = prepared(
+        *(plotter, volume, asked.array.scalars, asked.resample, asked.mask, asked.progress_bar)
+    )
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if asked.deferral.given and not isinstance(first, VDI | DeferredVDI) and several is None:
@@ -202,11 +204,11 @@ def added_blocks(
     """Add each block of a ``MultiBlock``; return their actors, lists of those within blocks.
 
     Blocks that are missing are left out, and a name gets the block's number. A block that is no
-    uniform grid is refused before anything is added.
+    uniform grid, and cannot be resampled to one, is refused before anything is added.
     """
     blocks = pv.wrap(blocks)
     for block in blocks.recursive_iterator(skip_none=True):
-        require_image(block)
+        require_grid(block, asked.resample)
     actors: list[Any] = []
     maps = cycle(_MAPS)
     with _all_or_nothing(plotter, actors):

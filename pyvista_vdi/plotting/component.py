@@ -188,9 +188,10 @@ class AddVDI(Component):
         log_scale : bool
             Map values to colours by their logarithm.
         resample : "auto" or (int, int, int), optional
-            Take rectilinear, structured and unstructured grids, too, resampled to a uniform grid of
-            so many points along x, y and z; ``"auto"``: voxels as large as the mean cell. What lies
-            outside their cells is not drawn. The log says what differs at the grid's points.
+            Take rectilinear, structured and unstructured grids, too, and blocks of them, each
+            resampled to a uniform grid of so many points along x, y and z; ``"auto"``: voxels as
+            large as the mean cell. What lies outside their cells is not drawn. The log says the
+            largest and the mean difference at the grid's own points.
         mask : pyvista.ImageData, Volume, numpy.ndarray or path, optional
             Labels at the points of the volume: where they are 0, nothing is drawn.
         max_supersegments : int

@@ -2,39 +2,48 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
+from pyvista_vdi.errors import (
+    Cancelled,
+    InvalidArgumentError,
+    InvalidVolumeError,
+    UnsupportedError,
+)
 from pyvista_vdi.io import is_vdi_file, read
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import load
 from pyvista_vdi.plotting.volumes import as_image
+from pyvista_vdi.vtk_pipeline.filters.convert import require_image
 from pyvista_vdi.vtk_pipeline.vtk import vtkCommonDataModel, vtkImageData
 
 _log = logging.getLogger(__name__)
 
 #: Points that ``resample="auto"`` takes, at most.
 _MOST_POINTS = 2**27
+#: Points that are resampled at a time, about, between reports of how far it is.
+_SLAB = 2**22
 #: VTK's bit for a point that is not shown.
 _HIDDEN = 2
 
 
 def prepared(
-    plotter: Any, volume: Any, scalars: Any, resample: Any, mask: Any
+    plotter: Any, volume: Any, scalars: Any, resample: Any, mask: Any, progress_bar: Any = False
 ) -> tuple[Any, StoredVolume | None]:
     """Return what can be shown of what is given, and the level of a store that this is."""
-    stored = None
+    stored, array = None, scalars if isinstance(scalars, str) else None
     if isinstance(volume, str | os.PathLike):
-        array = scalars if isinstance(scalars, str) else None
         volume = read(volume) if is_vdi_file(volume) else read_volume(volume, array=array)
     if isinstance(volume, StoredVolume):
         stored = volume.in_view(
@@ -42,7 +51,8 @@ def prepared(
         )
         volume = load(stored)
     if resample is not None and isinstance(volume, vtkCommonDataModel.vtkDataSet):
-        volume = resampled(pv.wrap(volume), resample)
+        progress = progress_callback(progress_bar, "resampling a grid")
+        volume = resampled(pv.wrap(volume), resample, array, progress)
     if mask is None:
         return volume, stored
     # A mask has the points of one level
@@ -60,12 +70,30 @@ def framing_camera(plotter: Any, bounds: Sequence[float]) -> Camera:
     return Camera.from_any(framed)
 
 
-def resampled(grid: Any, resample: str | Sequence[int]) -> pv.ImageData:
+def require_grid(data: Any, resample: Any) -> None:
+    """Refuse what is no uniform grid, or, where it is to be resampled, what has no volume."""
+    vtk = vtkCommonDataModel
+    if (
+        resample is None
+        or not isinstance(data, vtk.vtkDataSet)
+        or isinstance(data, vtk.vtkPolyData)
+    ):
+        require_image(data)
+
+
+def resampled(
+    grid: Any,
+    resample: str | Sequence[int],
+    name: str | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> pv.ImageData:
     """Return a grid's arrays at the points of a uniform one; points outside are hidden.
 
     ``resample``: numbers of points along x, y and z, or ``"auto"``, by which voxels are as large as
-    the grid's mean cell. The log says how large the difference at the grid's own points is.
+    the grid's mean cell. The log says how large the difference at the grid's own points is, of the
+    array ``name`` or the active one. ``progress``: gets the fraction done.
     """
+    require_grid(grid, resample)
     if isinstance(grid, vtkImageData):
         return pv.wrap(grid)
     low, high = np.reshape(grid.bounds, (3, 2)).T
@@ -93,29 +121,63 @@ def resampled(grid: Any, resample: str | Sequence[int]) -> pv.ImageData:
     need = count * 8 * max(1, len(grid.array_names))
     require_free_memory(need, f"the grid of {count} points", "resample to fewer")
     image = pv.ImageData(dimensions=numbers, spacing=size / (numbers - 1), origin=low)
-    found = image.sample(grid, categorical=False)
-    valid = found.point_data.pop("vtkValidPointMask")
-    found.point_data.pop("vtkGhostType", None)
-    if not valid.any():
+    _probe(image, grid, progress)
+    if not (image.point_data["vtkGhostType"] == 0).any():
         raise InvalidVolumeError("no point of the uniform grid lies in a cell of the other")
-    found.point_data["vtkGhostType"] = np.where(valid, 0, _HIDDEN).astype(np.uint8)
-    name = grid.active_scalars_name
-    if name in found.point_data:
-        found.set_active_scalars(name, "point")
-    if name in grid.point_data and grid.point_data[name].ndim == 1:
-        seen = pv.PolyData(grid.points).sample(found)
-        at = seen["vtkValidPointMask"].astype(bool)
-        off = np.abs(seen[name][at].astype(float) - grid.point_data[name][at].astype(float))
-        if off.size:
-            _log.info(
-                "%s resampled to %s points: at its own %r differs by %.3g at most, %.3g on average",
-                type(grid).__name__,
-                " x ".join(map(str, numbers)),
-                name,
-                off.max(),
-                off.mean(),
-            )
-    return found
+    name = name or grid.active_scalars_name
+    if name in image.point_data:
+        image.set_active_scalars(name, "point")
+        _say_difference(grid, image, name)
+    return image
+
+
+def _probe(image: Any, grid: Any, progress: Callable[[float], object] | None) -> None:
+    """Set the arrays of a uniform grid to another's, slab by slab."""
+    nx, ny, nz = image.dimensions
+    count = min(nz, 16, -(-image.n_points // _SLAB))  # each goes through all cells
+    edges = np.linspace(0, nz, count + 1).astype(int)
+    arrays: dict[str, Any] = {}
+    for low, high in itertools.pairwise(edges):
+        if progress is not None and progress(low / nz) is False:
+            raise Cancelled("resampling was stopped by its progress callback")
+        slab = pv.ImageData(
+            dimensions=(nx, ny, high - low),
+            spacing=image.spacing,
+            origin=np.add(image.origin, (0, 0, low * image.spacing[2])),
+        )
+        found = slab.sample(grid, categorical=False).point_data
+        found["vtkGhostType"] = np.where(found.pop("vtkValidPointMask"), 0, _HIDDEN).astype(
+            np.uint8
+        )
+        for name, values in found.items():
+            shape = (image.n_points, *values.shape[1:])
+            whole = arrays.setdefault(name, np.empty(shape, values.dtype))
+            whole[low * nx * ny : high * nx * ny] = values
+    for name, values in arrays.items():
+        image.point_data[name] = values
+    if progress is not None:
+        progress(1.0)
+
+
+def _say_difference(grid: Any, image: pv.ImageData, name: str) -> None:
+    """Log how far a uniform grid is from another's values, where the other has them."""
+    own = grid if name in grid.point_data else grid.cell_centers()
+    seen = pv.PolyData(own.points).sample(image)
+    at = seen["vtkValidPointMask"].astype(bool)
+    off = np.abs(seen[name][at].astype(float) - own.point_data[name][at].astype(float))
+    off = off[np.isfinite(off)]
+    if off.size:
+        _log.info(
+            "%s resampled to %s points: at %d of its own %d, %r differs by %.3g at most, %.3g on "
+            "average (the others are at its border)",
+            type(grid).__name__,
+            " x ".join(map(str, image.dimensions)),
+            np.count_nonzero(at),
+            len(at),
+            name,
+            off.max(),
+            off.mean(),
+        )
 
 
 def masked(volume: Any, mask: Any) -> pv.ImageData:

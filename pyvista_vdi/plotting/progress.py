@@ -79,7 +79,7 @@ class DelayedBar:
 
 
 def progress_callback(
-    progress_bar: bool | Callable[[float], object] | None,
+    progress_bar: bool | Callable[[float], object] | None, label: str = "generating a VDI"
 ) -> Callable[[float], object] | None:
     """Return what to call with the fraction done.
 
@@ -90,4 +90,4 @@ def progress_callback(
         return progress_bar
     if progress_bar is False:
         return None
-    return DelayedBar(always=bool(progress_bar))
+    return DelayedBar(always=bool(progress_bar), label=label)

@@ -58,6 +58,32 @@ def test_very_many_voxels(runtime, worst, planes, interpolation):
     assert_within(worst, f"{planes} planes, VDI at V_O", seen, image)
 
 
+@pytest.mark.parametrize("axis", range(3), ids="xyz")
+def test_an_axis_longer_than_a_3d_texture_s(runtime, worst, axis):
+    """The end of 20000 voxels along an axis, where many drivers' textures have 2048."""
+    n, size = 20000, [4, 4, 4]
+    size[2 - axis] = n
+    array = np.moveaxis(np.zeros(size, np.uint8), 2 - axis, 0)
+    array[-6:] = np.random.default_rng(axis).integers(50, 200, array[-6:].shape)
+    volume = Volume(np.ascontiguousarray(np.moveaxis(array, 0, 2 - axis)))
+    start = [0, 0, 0]
+    start[axis] = n - 8
+    part = Volume(volume.array[start[2] :, start[1] :, start[0] :].copy(), origin=start)
+    function = TransferFunction(
+        [[0.2, 0.5, 0.8]] * 2, [0, 0.3], (0, 200), unit_distance=2.0, interpolation="linear"
+    )
+    centre = np.add(start, [1.5 + 3 * (a == axis) for a in range(3)])
+    camera = Camera(centre + np.array([14.0, 9, 11]), centre, (0.1, 0.2, 1))
+    exact = reference.volume_image(part, camera, WINDOW, function)
+    assert exact[..., 3].max() > 0.3
+    image = raycast_volume(volume, camera, WINDOW, function, device=runtime)
+    # As above: a coordinate is rounded by 2^-24 of n, and a channel changes by half in a voxel
+    bound = max(BOUND, 2.0**-24 * n)
+    assert_within(worst, f"{n} along {'xyz'[axis]}", image, exact, bound)
+    vdi = generate_vdi(volume, camera, WINDOW, function, device=runtime)
+    assert_within(worst, f"{n}, VDI", render_vdi(vdi, camera, device=runtime), image)
+
+
 def test_what_one_allocation_does_not_hold_goes_brick_by_brick(runtime, monkeypatch):
     rng = np.random.default_rng(5)
     volume = Volume(rng.integers(0, 256, (96, 96, 300), np.uint8))

@@ -16,25 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, warn_external
-from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, stack
 
 #: What is read of a header, by DICOM's keywords.
-_WANTED = [
-    "SOPClassUID",
-    "SeriesDescription",
-    "SliceThickness",
-    "SeriesInstanceUID",
-    "ImagePositionPatient",
-    "ImageOrientationPatient",
-    "Rows",
-    "Columns",
-    "PixelSpacing",
-    "InstanceNumber",
-    "NumberOfFrames",
-    "ImageType",
-    "SamplesPerPixel",
-    "PhotometricInterpretation",
-]
+_WANTED = (
+    "SOPClassUID SeriesDescription SliceThickness SeriesInstanceUID ImagePositionPatient "
+    "ImageOrientationPatient Rows Columns PixelSpacing InstanceNumber NumberOfFrames ImageType "
+    "SamplesPerPixel PhotometricInterpretation"
+)
 
 #: By how much of their mean the distances of slices may differ: more are missing slices.
 _EVEN = 0.01
@@ -123,7 +112,7 @@ def _header(path: Path) -> Slice | None:
     import pydicom
 
     try:
-        header = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_WANTED)
+        header = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_WANTED.split())
         if "Rows" not in header:  # a directory, a report, a plan ...
             uid = pydicom.uid.UID(_text(header, "SOPClassUID"), pydicom.config.IGNORE)
             if uid.name.endswith("Image Storage"):
@@ -164,27 +153,9 @@ def _of_slices(folder: Path, slices: list[Slice], name: str, *, checked: bool) -
             raise refusal
 
         return VolumeInFile(Lazy((len(slices), 2, 2), np.int16, refused), name=name)
-    ordered = [slices[i] for i in order]
-    unplaced = slices[0].position is None
-    first = _pixels(ordered[0].path)
-    shape = (len(ordered), *first.shape)
-
-    def read() -> NDArray[Any]:
-        array = np.empty(shape, first.dtype)
-        for i, one in enumerate(ordered):
-            values = _pixels(one.path)
-            if values.shape != first.shape:
-                raise InvalidVolumeError(
-                    f"{one.path} is {' x '.join(map(str, values.shape))} pixels, and "
-                    f"{ordered[0].path.name} is {' x '.join(map(str, first.shape))}: the slices of "
-                    "a volume have one size"
-                )
-            if values.dtype != array.dtype:  # rescaled in another way than those before
-                array = array.astype(np.promote_types(array.dtype, values.dtype))
-            array[i] = values[::-1] if unplaced else values
-        return array
-
-    return VolumeInFile(Lazy(shape, first.dtype, read), "zyx", place, name, "mm")
+    files, upwards = [slices[i].path for i in order], -1 if slices[0].position is None else 1
+    array = stack(files, lambda file: _pixels(file)[::upwards], mixed=True)
+    return VolumeInFile(array, "zyx", place, name, "mm")
 
 
 def _placed(folder: Path, slices: list[Slice]) -> tuple[NDArray[np.float64], Sequence[int]]:

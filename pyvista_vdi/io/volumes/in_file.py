@@ -40,6 +40,36 @@ class Lazy:
         return self._read(index) if self._in_parts else np.asarray(self._read())[index]
 
 
+def stack(
+    files: Sequence[Path], read: Callable[[Path], NDArray[Any]], *, mixed: bool = False
+) -> Lazy:
+    """Return slices, a file each, as an array along z; slices of another size are refused.
+
+    ``mixed``: slices may be of several types, and the array is of one that holds all.
+    """
+    first = read(files[0])
+
+    def all_of_them() -> NDArray[Any]:
+        array = np.empty((len(files), *first.shape), first.dtype)
+        for i, file in enumerate(files):
+            one = read(file)
+            if one.shape != first.shape or (one.dtype != first.dtype and not mixed):
+                raise InvalidVolumeError(
+                    f"{file} is {form(one)}, and {files[0].name} is {form(first)}: the slices of a "
+                    "volume have one size and one type"
+                )
+            array = array.astype(np.promote_types(array.dtype, one.dtype), copy=False)
+            array[i] = one
+        return array
+
+    return Lazy((len(files), *first.shape), first.dtype, all_of_them)
+
+
+def form(picture: NDArray[Any]) -> str:
+    """Return a picture's size and type for people."""
+    return f"{' x '.join(map(str, picture.shape))} {picture.dtype}"
+
+
 @dataclass(frozen=True, eq=False)
 class VolumeInFile:
     """A volume in a file: what the file says of it; its voxels are not read.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
-from pyvista_vdi.io.volumes.pieces import names_of
+from pyvista_vdi.io.volumes.pieces import files_of
 
 _TYPES = {"CHAR": "i1", "SHORT": "i2", "INT": "i4", "LONG": "i4", "LONG_LONG": "i8"}
 _TYPES |= {f"U{name}": f"u{kind[1]}" for name, kind in _TYPES.items()}
@@ -39,43 +39,37 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         return any(entries.get(name, "").lower() in ("true", "1") for name in names)
 
     def numbers(default: NDArray[np.float64], *names: str) -> NDArray[np.float64]:
-        found = [np.array(entries[n].split(), dtype=np.float64) for n in names if n in entries]
-        if found and found[0].size != default.size:
+        said = next((entries[n].split() for n in names if n in entries), default)
+        if np.size(said) != default.size:
             raise InvalidVolumeError(
-                f"it has {found[0].size} numbers for {names[0]}: {default.size} are needed"
+                f"it has {len(said)} numbers for {names[0]}: {default.size} are needed"
             )
-        return found[0].reshape(default.shape) if found else default
+        return np.array(said, dtype=np.float64).reshape(default.shape)
 
     n_axes, sizes = int(entries["NDims"]), [int(n) for n in entries["DimSize"].split()]
     kind = entries["ElementType"].removeprefix("MET_").removesuffix("_ARRAY")
-    if n_axes not in (3, 4) or len(sizes) != n_axes or min(sizes) < 1:
+    if n_axes not in (3, 4) or len(sizes) != n_axes or min(sizes) < 1 or kind not in _TYPES:
         raise UnsupportedError(
-            f"it has {n_axes} axes of {sizes} points: 3, or 4 with time, are read"
+            f"it has {n_axes} axes of {sizes} points, and voxels of type {kind}: 3 axes are read, "
+            f"or 4 with time, of {', '.join(_TYPES)}: convert it"
         )
-    if kind not in _TYPES:
-        raise UnsupportedError(f"voxels of type {kind} are not read: convert them")
     big = true("BinaryDataByteOrderMSB", "ElementByteOrderMSB")
     dtype = np.dtype((">" if big else "<") + _TYPES[kind])
     n = int(entries.get("ElementNumberOfChannels", 1))
     shape, axes = sizes[::-1], "tzyx"[-n_axes:]
     if n > 1:
         shape, axes = [*shape, n], axes + ("s" if n in (3, 4) and dtype.itemsize == 1 else "c")
-
     count, name = int(np.prod(shape, dtype=object)), said[1].decode("latin-1")
 
     def read() -> NDArray[Any]:
-        behind, skipped = file.read_bytes()[said.end() :], int(entries.get("HeaderSize", 0))
-        listed = behind.decode("latin-1").splitlines() if name.startswith("LIST") else []
-        raw = b""
-        for piece in names_of(name, listed):
-            try:
-                one = behind if piece.upper() == "LOCAL" else (file.parent / piece).read_bytes()
-            except OSError as error:
-                raise InvalidVolumeError(
-                    f"its data file {piece} cannot be read ({error.strerror}): put it beside it"
-                ) from error
-            one = one[max(0, skipped) :]
-            raw += zlib.decompressobj(wbits=47).decompress(one) if true("CompressedData") else one
+        parts, skipped = [file.read_bytes()[said.end() :]], int(entries.get("HeaderSize", 0))
+        if name.upper() != "LOCAL":
+            listed = parts[0].decode("latin-1").splitlines() if name.startswith("LIST") else []
+            parts = [piece.read_bytes() for piece in files_of(file.parent, name, listed)]
+        parts = [one[max(0, skipped) :] for one in parts]
+        if true("CompressedData"):
+            parts = [zlib.decompressobj(wbits=47).decompress(one) for one in parts]
+        raw = b"".join(parts)
         if skipped < 0:  # the data are the last bytes
             raw = raw[-count * dtype.itemsize :]
         text = entries.get("BinaryData", "True").lower() == "false"

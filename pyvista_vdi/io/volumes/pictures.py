@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, warn_external
 from pyvista_vdi.io.time_steps import natural_key
-from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
+from pyvista_vdi.io.volumes.in_file import VolumeInFile, form, stack
 from pyvista_vdi.io.volumes.table import head_of
 
 #: What pictures of slices are called, kind by kind.
@@ -51,22 +51,8 @@ def volumes_in(path: Path) -> list[VolumeInFile]:
             f"({files[0].name} to {files[-1].name}, {len(files)} files), and are taken as if: are "
             "some missing?"
         )
-    first = _read(files[0])
-    shape = (len(files), *first.shape)
-
-    def read() -> NDArray[Any]:
-        array = np.empty(shape, dtype=first.dtype)
-        for i, file in enumerate(files):
-            picture = _read(file)
-            if picture.shape != first.shape or picture.dtype != first.dtype:
-                raise InvalidVolumeError(
-                    f"{file} is {_form(picture)}, and {files[0].name} is {_form(first)}: the "
-                    "slices of a volume have one size and one type"
-                )
-            array[i] = picture[::-1]
-        return array
-
-    return [VolumeInFile(Lazy(shape, first.dtype, read), "zyxs"[: len(shape)])]
+    array = stack(files, _read)
+    return [VolumeInFile(array, "zyxs"[: len(array.shape)])]
 
 
 def _read(file: Path) -> NDArray[Any]:
@@ -84,11 +70,7 @@ def _read(file: Path) -> NDArray[Any]:
         raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
     if picture.ndim != 2 and not (picture.ndim == 3 and picture.shape[2] in (2, 3, 4)):
         raise InvalidVolumeError(
-            f"{file} is {_form(picture)}, not one slice: a file of several pages is a volume by "
+            f"{file} is {form(picture)}, not one slice: a file of several pages is a volume by "
             "itself, give its name in place of the folder's"
         )
-    return picture
-
-
-def _form(picture: NDArray[Any]) -> str:
-    return f"{' x '.join(str(n) for n in picture.shape)} {picture.dtype}"
+    return picture[::-1]

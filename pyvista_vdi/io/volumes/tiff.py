@@ -39,8 +39,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
             array: Any = Lazy(shape, one.dtype, partial(read, number, level, down))
             mapped = one.dataoffset is not None and one.keyframe.is_memmappable
             if mapped and one.dtype != bool and not tiff.is_ome:
-                dtype = one.dtype.newbyteorder(tiff.byteorder)
-                whole = tiff.filehandle.memmap_array(dtype, shape, offset=one.dataoffset)
+                whole = tifffile.memmap(file, series=number, level=level, mode="r")
                 array = np.flip(whole, down)
             size, unit, channels = _described(tiff, number, one)
             coarser = [series.shape[axes.index(a)] / shape[axes.index(a)] for a in "xyz"]
@@ -69,8 +68,7 @@ def _described(tiff: Any, number: int, series: Any) -> tuple[list[float], str, t
             unit = units.pop() if "PhysicalSizeX" in one.attrib and len(units) == 1 else ""
             return size, unit, _all([c.get("Name", "") for c in one.findall("{*}Channel")])
     page = series.keyframe
-    ratios = [page.tags.get(f"{a}Resolution") for a in "XY"]
-    per = [r.value[0] / r.value[1] if r and all(r.value) else 0.0 for r in ratios]
+    per = page.get_resolution() if 282 in page.tags and 283 in page.tags else (0, 0)
     size = [1 / n if n else 1.0 for n in per]
     if tiff.is_imagej:
         entries = tiff.imagej_metadata or {}
