@@ -16,34 +16,53 @@ inline float4 between_cells(__global const long4 *integrals, int first, int last
 __kernel void classify_values(uint count, int cells, __global const float *means,
                               __global const float *spreads,
                               __global const float *steps,     // of the march, in each supersegment
-                              __global const long4 *integrals, // up to each cell, `cells` + 1
+                              __global const long4 *integrals, // of the low end, cells, high end
                               __global float *colors,          // straight RGB, 3 per supersegment
                               __global float *optical_depths)
 {
     const uint i = (uint)get_global_id(0);
     if (i >= count)
         return;
-    const float middle = means[i] * cells;
-    const float reach = fmax(ROOT_OF_3 * spreads[i] * cells, 0.5f); // at least a cell
-    const float first = clamp(middle - reach, 0.0f, (float)cells);
-    const float last = clamp(middle + reach, 0.0f, (float)cells);
+    // Values from 0 to 1, seen from the end that their mean is nearer to: evenly spread, and where
+    // that would leave the range, from its end on, with the others at the ends
+    const float mean = means[i], nearer = fmin(mean, 1.0f - mean), reach = ROOT_OF_3 * spreads[i];
+    float low = nearer - reach, high = nearer + reach, even = 1.0f, at_near = 0.0f, at_far = 0.0f;
+    if (low <= 0.0f) {
+        const float square = fmin(spreads[i] * spreads[i] + nearer * nearer, nearer);
+        low = 0.0f;
+        high = nearer > 0.0f ? fmin(1.5f * square / nearer, 1.0f) : 1.0f;
+        even = high < 1.0f ? 2.0f * nearer / high : 6.0f * (nearer - square);
+        at_far = fmax(nearer - 0.5f * even * high, 0.0f);
+        at_near = fmax(1.0f - even - at_far, 0.0f);
+    }
+    const bool turned = mean > 0.5f;
+    const float middle = 0.5f * (low + high), half_width = fmax(0.5f * (high - low), 0.5f / cells);
+    const float from = (turned ? 1.0f - middle : middle) * cells, wide = half_width * cells;
+    const float first = clamp(from - wide, 0.0f, (float)cells);
+    const float last = clamp(from + wide, 0.0f, (float)cells);
     const int a = min((int)first, cells - 1), b = min((int)last, cells - 1);
     const float into_a = first - (float)a, into_b = last - (float)b;
+    __global const long4 *inner = integrals + 1; // up to each cell of the range
     // The width is summed up as the opacities are: where all are 1, their mean is
     float4 sum;
     float width;
     if (a == b) {
         width = into_b - into_a;
-        sum = width * between_cells(integrals, a, a + 1);
+        sum = width * between_cells(inner, a, a + 1);
     } else {
         width = (1.0f - into_a) + (float)(b - a - 1) + into_b;
-        sum = (1.0f - into_a) * between_cells(integrals, a, a + 1) +
-              between_cells(integrals, a + 1, b) + into_b * between_cells(integrals, b, b + 1);
+        sum = (1.0f - into_a) * between_cells(inner, a, a + 1) + between_cells(inner, a + 1, b) +
+              into_b * between_cells(inner, b, b + 1);
     }
-    const float opacity = sum.w / width;
-    const float of_step =
-        opacity < 1.0f ? fmin(-log1p(-opacity), OPAQUE_OPTICAL_DEPTH) : OPAQUE_OPTICAL_DEPTH;
-    optical_depths[i] = of_step * steps[i];
-    const float3 color = sum.w > 0.0f ? sum.xyz / sum.w : (float3)(0.0f);
+    const float4 at_low = between_cells(integrals, 0, 1);
+    const float4 at_high = between_cells(integrals, cells + 1, cells + 2);
+    const float share_low = turned ? at_far : at_near, share_high = turned ? at_near : at_far;
+    const float4 of_all = even * (sum / width) + share_low * at_low + share_high * at_high;
+    // What passes a step is summed up by itself: where all are opaque, it is 0
+    const float passes = even * (1.0f - sum.w / width) + share_low * (1.0f - at_low.w) +
+                         share_high * (1.0f - at_high.w);
+    const float of_step = passes > 0.5f ? -log1p(-of_all.w) : -log(passes);
+    optical_depths[i] = fmin(of_step, OPAQUE_OPTICAL_DEPTH) * steps[i];
+    const float3 color = of_all.w > 0.0f ? of_all.xyz / of_all.w : (float3)(0.0f);
     vstore3(clamp(color, 0.0f, 1.0f), i, colors);
 }

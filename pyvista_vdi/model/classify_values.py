@@ -34,9 +34,8 @@ def classify(
     """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
-    values from mean - sqrt(3) spread to mean + sqrt(3) spread, within the range: those of values
-    that are spread evenly. ``media``: does what :func:`media_of_values` does, which is the default.
-    Errors and warnings: :meth:`DeferredVDI.classified`.
+    values of :func:`spread_of_values`. ``media``: does what :func:`media_of_values` does, which is
+    the default. Errors and warnings: :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
         ("shading", transfer_function.shading),
@@ -49,10 +48,10 @@ def classify(
             )
     _warn_outside(deferred, transfer_function)
 
-    # A step's opacity, and the colour times it, in cells of the range of values
+    # A step's opacity, and the colour times it, in cells of the range of values and at its ends
     low, high = deferred.value_range
     unit = transfer_function.unit_distance or deferred.unit_distance
-    values = low + (np.arange(CELLS) + 0.5) / CELLS * (high - low)
+    values = low + (np.arange(-1, CELLS + 1) + 0.5).clip(0, CELLS) / CELLS * (high - low)
     color, opacity = looked_up(transfer_function, values)
     with np.errstate(divide="ignore"):
         of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
@@ -89,19 +88,53 @@ def classify(
 def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
     """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
 
-    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, (CELLS, 4).
+    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, between those of
+    its ends: (CELLS + 2, 4).
     """
     integrals = np.zeros((CELLS + 1, 4))
-    np.cumsum(of_cells, axis=0, out=integrals[1:])
+    np.cumsum(of_cells[1:-1], axis=0, out=integrals[1:])
     mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
-    reach = np.maximum(np.sqrt(3) * spread, 0.5 / CELLS)  # at least a cell
-    first, last = (np.clip(mean + sign * reach, 0, 1) * CELLS for sign in (-1, 1))
+    low, high, even, at_low, at_high = spread_of_values(mean, spread)
+    # Evenly spread ones reach over a cell at least
+    widening = np.maximum(0.5 / CELLS - (high - low) / 2, 0)
+    first, last = (np.clip(x, 0, 1) * CELLS for x in (low - widening, high + widening))
     means = _integral(integrals, last) - _integral(integrals, first)
-    means /= (last - first)[:, np.newaxis]
+    means *= (even / (last - first))[:, np.newaxis]
+    for share, cell in ((at_low, of_cells[0]), (at_high, of_cells[-1])):
+        means += share[:, np.newaxis] * cell
     of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
     optical_depth = (-np.log1p(-of_step) * deferred.steps).astype(np.float32)
     straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
     return np.clip(straight, 0, 1).astype(np.float32), optical_depth
+
+
+def spread_of_values(mean: Floats, spread: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return how values from 0 to 1 with this mean and spread are taken to lie.
+
+    Low and high end of those that are spread evenly, the share of these, and the shares of values
+    that are 0 and 1. All are evenly spread unless they would leave the range: then they reach from
+    its nearer end as far as mean and spread say, and the others pile up there, as air does; and at
+    the farther end too, if they would leave that.
+    """
+    nearer = np.minimum(mean, 1 - mean)
+    reach = np.sqrt(3) * spread
+    inside = reach < nearer
+    square = np.minimum(spread**2 + nearer**2, nearer)  # the mean of squares of values from 0 to 1
+    tiny = np.finfo(np.float64).tiny
+    high = np.where(inside, nearer + reach, np.minimum(1.5 * square / np.maximum(nearer, tiny), 1))
+    even = np.where(high < 1, 2 * nearer / np.maximum(high, tiny), 6 * (nearer - square))
+    even = np.where(inside, 1, even)
+    low = np.where(inside, nearer - reach, 0)
+    far = np.where(inside, 0, np.maximum(nearer - even * high / 2, 0))
+    near = 1 - even - far
+    up = mean > 0.5
+    return (
+        np.where(up, 1 - high, low),
+        np.where(up, 1 - low, high),
+        even,
+        np.where(up, far, near),
+        np.where(up, near, far),
+    )
 
 
 def _integral(integrals: Floats, place: Floats) -> Floats:

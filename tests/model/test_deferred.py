@@ -21,6 +21,7 @@ from pyvista_vdi.errors import (
     VDIFileError,
     VDIWarning,
 )
+from pyvista_vdi.model.classify_values import spread_of_values
 from pyvista_vdi.model.deferred import lengths_of
 
 LOOKS = TransferFunction([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0.8, 0.3], (100, 300))
@@ -79,17 +80,27 @@ def test_what_breaks_a_rule_is_refused(name, value, says):
         DeferredVDI(**given)
 
 
-def test_classification_is_the_mean_over_evenly_spread_values():
-    """Against sums over many values: mean - sqrt(3) spread to mean + sqrt(3) spread."""
+def test_classification_is_the_mean_over_values_of_that_mean_and_spread():
+    """Against sums over many values, some of them at the ends of the range."""
     given = arguments(2)
+    mean = given["mean"].astype(float)
+    given["spread"] = np.minimum(given["spread"], np.sqrt(mean * (1 - mean)) * 0.99)
     made = DeferredVDI(**given)
     vdi = made.classified(transfer_function=LOOKS)
-    length, at = lengths_of(made.lists), 0
+    length, at, kinds = lengths_of(made.lists), 0, set()
     for k in range(made.n_supersegments):
-        mean, reach = float(made.mean[k]), np.sqrt(3) * float(made.spread[k])
-        low, high = max(mean - reach, 0), min(mean + reach, 1)
-        values = 100 + 200 * (low + (high - low) * (np.arange(20001) + 0.5) / 20001)
-        place = (values - 100) / 100
+        mean, spread = float(made.mean[k]), float(made.spread[k])
+        low, high, *shares = (float(x) for x in spread_of_values(made.mean[k], made.spread[k]))
+        n = 200001
+        counts = np.round(np.array(shares) * n).astype(int)
+        even = low + (high - low) * (np.arange(counts[0]) + 0.5) / max(counts[0], 1)
+        values = np.concatenate([even, np.zeros(counts[1]), np.ones(counts[2])])
+        assert (values >= 0).all()
+        assert (values <= 1).all()
+        assert values.mean() == pytest.approx(mean, abs=2e-5)
+        assert values.std() == pytest.approx(spread, abs=2e-4)
+        kinds.add((shares[0] < 1, shares[1] > 0 and shares[2] > 0))
+        place = 2 * values
         opacity = np.interp(place, range(3), LOOKS.opacities)
         color = np.stack([np.interp(place, range(3), c) for c in LOOKS.colors.T], axis=1)
         alpha = 1 - (1 - opacity) ** (made.sample_distance / made.unit_distance)
@@ -98,12 +109,24 @@ def test_classification_is_the_mean_over_evenly_spread_values():
         if tau == 0:
             continue
         assert vdi.front[at] == made.front[k]
-        assert vdi.optical_depth[at] == pytest.approx(tau, rel=2e-3, abs=1e-7)
+        assert vdi.optical_depth[at] == pytest.approx(tau, rel=2e-3, abs=1e-6)
         wanted = (alpha[:, np.newaxis] * color).mean(axis=0) / alpha.mean()
         assert vdi.color[at] == pytest.approx(wanted, abs=2e-3)
         at += 1
     assert at == vdi.n_supersegments
+    assert kinds == {(False, False), (True, False), (True, True)}
     assert vdi.metadata["transfer_function"] == LOOKS.to_dict()
+
+
+def test_what_no_values_have_is_spread_at_both_ends():
+    """A file may have any mean and spread: shares are shares, and nothing is outside."""
+    mean, spread = np.meshgrid(np.linspace(0, 1, 101), np.linspace(0, 0.5, 51))
+    low, high, *shares = spread_of_values(mean.ravel(), spread.ravel())
+    assert (low >= 0).all()
+    assert (high >= low).all()
+    assert (high <= 1).all()
+    assert (np.array(shares) >= 0).all()
+    assert sum(shares) == pytest.approx(1)
 
 
 def test_what_is_opaque_is_opaque_and_what_is_transparent_left_out():
