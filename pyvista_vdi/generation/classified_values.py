@@ -43,7 +43,7 @@ def classify_on_device(
         return classify(deferred, transfer_function)
 
     def on_device(deferred: DeferredVDI, values: Floats) -> Media:
-        integrals = np.zeros((CELLS + 1, 4), np.int64)
+        integrals = np.zeros((CELLS + 2, 4), np.int64)
         np.cumsum(np.rint(values * _UNITS).astype(np.int64), axis=0, out=integrals[1:])
         means, spreads, steps = _uploaded(runtime, deferred)
         with (

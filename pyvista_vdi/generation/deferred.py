@@ -27,6 +27,9 @@ _CELLS = 4096
 #: What values and their squares weigh in the error of merging beside the importance: nothing that
 #: counts where that tells values apart.
 _BESIDE = 2.0**-8
+#: What the low end of the range counts by default beside all above it, so that air, which piles up
+#: there, is seldom in one supersegment with what borders on it.
+_LOW_END = 2.0**-4
 #: Spreads below what float32 holds of a mean of squares are none; shares this near to 1 are 1.
 _LEAST_SPREAD = 5e-4
 _WHOLE = 1e-3
@@ -140,6 +143,8 @@ def _keeping(
         weights = np.interp(low + (high - low) * share, values, given)
     integral = np.zeros_like(share)
     np.cumsum(np.diff(share) * (weights[1:] + weights[:-1]) / 2, out=integral[1:])
+    if points is None:
+        integral[place > 0] += _LOW_END
     if not integral[-1] > 0:
         raise InvalidArgumentError(
             f"importance is 0 over all of value_range {low:g} to {high:g}: nothing would be kept"

@@ -34,9 +34,8 @@ def classify(
     """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
-    values from mean - sqrt(3) spread to mean + sqrt(3) spread, within the range: those of values
-    that are spread evenly. ``media``: does what :func:`media_of_values` does, which is the default.
-    Errors and warnings: :meth:`DeferredVDI.classified`.
+    values of :func:`spread_of_values`. ``media``: does what :func:`media_of_values` does, which is
+    the default. Errors and warnings: :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
         ("shading", transfer_function.shading),
@@ -49,10 +48,10 @@ def classify(
             )
     _warn_outside(deferred, transfer_function)
 
-    # A step's opacity, and the colour times it, in cells of the range of values
+    # A step's opacity, and the colour times it, at the low end of the range and in cells of it
     low, high = deferred.value_range
     unit = transfer_function.unit_distance or deferred.unit_distance
-    values = low + (np.arange(CELLS) + 0.5) / CELLS * (high - low)
+    values = low + (np.arange(-1, CELLS) + 0.5).clip(0) / CELLS * (high - low)
     color, opacity = looked_up(transfer_function, values)
     with np.errstate(divide="ignore"):
         of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
@@ -89,19 +88,44 @@ def classify(
 def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
     """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
 
-    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, (CELLS, 4).
+    ``of_cells``: (step opacity times colour, step opacity) at the low end of the range, and of
+    cells of it: (1 + CELLS, 4).
     """
     integrals = np.zeros((CELLS + 1, 4))
-    np.cumsum(of_cells, axis=0, out=integrals[1:])
+    np.cumsum(of_cells[1:], axis=0, out=integrals[1:])
     mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
-    reach = np.maximum(np.sqrt(3) * spread, 0.5 / CELLS)  # at least a cell
-    first, last = (np.clip(mean + sign * reach, 0, 1) * CELLS for sign in (-1, 1))
-    means = _integral(integrals, last) - _integral(integrals, first)
-    means /= (last - first)[:, np.newaxis]
+    low, high, even, above = spread_of_values(mean, spread)
+    means = (1 - even - above)[:, np.newaxis] * of_cells[0]
+    for first, last, share in ((low, high, even), (high, np.ones_like(high), above)):
+        # Over a cell at least
+        widening = np.maximum(0.5 / CELLS - (last - first) / 2, 0)
+        ends = [np.clip(x, 0, 1) * CELLS for x in (first - widening, last + widening)]
+        between = _integral(integrals, ends[1]) - _integral(integrals, ends[0])
+        means += between * (share / (ends[1] - ends[0]))[:, np.newaxis]
     of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
     optical_depth = (-np.log1p(-of_step) * deferred.steps).astype(np.float32)
     straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
     return np.clip(straight, 0, 1).astype(np.float32), optical_depth
+
+
+def spread_of_values(mean: Floats, spread: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return how values from 0 to 1 with this mean and spread are taken to lie.
+
+    Low and high end of those that are spread evenly and their share, and the share of those that
+    are spread evenly from there to 1; the others are 0. All are in the first lot unless they would
+    leave the range. At the low end some are then 0, as air is; at the high end they lie closer
+    above the mean than below it.
+    """
+    reach, tiny = np.sqrt(3) * spread, np.finfo(np.float64).tiny
+    inside = reach < np.minimum(mean, 1 - mean)
+    at_low = ~inside & (mean <= 0.5)
+    below = np.minimum(3 * spread**2 / np.maximum(1 - mean, tiny), mean)
+    to = np.minimum(1.5 * (spread**2 / np.maximum(mean, tiny) + mean), 1)
+    low = np.where(inside, mean - reach, np.where(at_low, 0, mean - below))
+    high = np.where(inside, mean + reach, np.where(at_low, to, mean))
+    above = np.where(inside | at_low, 0, below / np.maximum(1 - mean + below, tiny))
+    even = np.where(at_low, 2 * mean / np.maximum(to, tiny), 1 - above)
+    return low, high, np.where(inside, 1, even), above
 
 
 def _integral(integrals: Floats, place: Floats) -> Floats:

@@ -119,6 +119,18 @@ def test_supersegments_are_cut_where_the_importance_tells_values_apart(runtime):
     assert empty.values.max() < 0.3
 
 
+def test_what_piles_up_at_an_end_of_the_range_is_kept_from_what_borders_on_it(runtime):
+    """Air, a boundary that is faint, and noise of the same height, which may stay together."""
+    array = np.zeros(EDGES[::-1], np.float32)
+    array[10:13] = 0.04
+    array[20:] = np.random.default_rng(10).choice([0.5, 0.54], (NZ - 20, NY, NX))
+    deferred = kept(runtime, array, (0, 1), max_supersegments=4)
+    for _, _, rows in inner(deferred):
+        assert deferred.mean[rows][1:] == pytest.approx([0, 0.04, 0], abs=1e-5)
+    looks = pvdi.TransferFunction([[1] * 3] * 101, [0, *[0.5] * 9, *[0] * 91], (0, 1))
+    assert deferred.classified(transfer_function=looks).n_supersegments == NX * NY
+
+
 def test_blocks_of_one_value_are_classified_as_the_volume_is(runtime):
     """Without a spread nothing is lost: the same medium as of a VDI made for the look."""
     array = np.random.default_rng(6).integers(0, 255, EDGES[::-1]).astype(np.uint8)
@@ -131,6 +143,16 @@ def test_blocks_of_one_value_are_classified_as_the_volume_is(runtime):
     picture = pvdi.render(deferred.classified(transfer_function=looks), camera, device=runtime)
     # To the cell of the table that a value is averaged over
     assert np.abs(picture - wanted)[1:-1, 1:-1].max() < 2e-3
+
+
+def test_air_that_nobody_shows_is_left_out(runtime):
+    """By a ramp from nothing at the least value on, which next to it is little, but not nothing."""
+    array = np.zeros(EDGES[::-1], np.float32)
+    array[15:] = np.random.default_rng(11).uniform(0.5, 0.6, (NZ - 15, NY, NX))
+    deferred = kept(runtime, array, (0, 1), max_supersegments=2)
+    ramp = pvdi.TransferFunction([[1] * 3] * 2, [0, 0.5], (0, 1))
+    for vdi in (classify(deferred, ramp), classify_on_device(deferred, ramp, runtime)):
+        assert (vdi.counts == 1).all()
 
 
 @pytest.mark.parametrize("seed", range(4))

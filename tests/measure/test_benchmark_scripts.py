@@ -43,6 +43,7 @@ CASES = [
 RUNS = {
     "accuracy": "--volumes brain",
     "films": "--volumes brain --repeats 1",
+    "deferred": "--volumes phantom",
     "baselines": "--size 64x36 --repeats 1",
     "files": "--volumes brain --repeats 1",
     "frames": "--volumes brain --repeats 1",

@@ -21,6 +21,7 @@ from pyvista_vdi.errors import (
     VDIFileError,
     VDIWarning,
 )
+from pyvista_vdi.model.classify_values import spread_of_values
 from pyvista_vdi.model.deferred import lengths_of
 
 LOOKS = TransferFunction([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0.8, 0.3], (100, 300))
@@ -79,17 +80,29 @@ def test_what_breaks_a_rule_is_refused(name, value, says):
         DeferredVDI(**given)
 
 
-def test_classification_is_the_mean_over_evenly_spread_values():
-    """Against sums over many values: mean - sqrt(3) spread to mean + sqrt(3) spread."""
+def test_classification_is_the_mean_over_values_of_that_mean_and_spread():
+    """Against sums over many values, some of them at the ends of the range."""
     given = arguments(2)
+    mean = given["mean"].astype(float)
+    most = np.where(mean <= 0.5, 2 * mean / 3 - mean**2, mean * (1 - mean) / 3)
+    given["spread"] = np.minimum(given["spread"], np.sqrt(most) * 0.999)
     made = DeferredVDI(**given)
     vdi = made.classified(transfer_function=LOOKS)
-    length, at = lengths_of(made.lists), 0
+    length, at, kinds = lengths_of(made.lists), 0, set()
     for k in range(made.n_supersegments):
-        mean, reach = float(made.mean[k]), np.sqrt(3) * float(made.spread[k])
-        low, high = max(mean - reach, 0), min(mean + reach, 1)
-        values = 100 + 200 * (low + (high - low) * (np.arange(20001) + 0.5) / 20001)
-        place = (values - 100) / 100
+        mean, spread = float(made.mean[k]), float(made.spread[k])
+        low, high, *shares = (float(x) for x in spread_of_values(made.mean[k], made.spread[k]))
+        counts = np.round(np.array([*shares, 1 - sum(shares)]) * 200001).astype(int)
+        places = [(np.arange(count) + 0.5) / max(count, 1) for count in counts]
+        values = np.concatenate(
+            [low + (high - low) * places[0], high + (1 - high) * places[1], 0 * places[2]]
+        )
+        assert (values >= 0).all()
+        assert (values <= 1).all()
+        assert values.mean() == pytest.approx(mean, abs=2e-5)
+        assert values.std() == pytest.approx(spread, abs=2e-4)
+        kinds.add((shares[1] > 0, sum(shares) < 1 - 1e-9))
+        place = 2 * values
         opacity = np.interp(place, range(3), LOOKS.opacities)
         color = np.stack([np.interp(place, range(3), c) for c in LOOKS.colors.T], axis=1)
         alpha = 1 - (1 - opacity) ** (made.sample_distance / made.unit_distance)
@@ -98,12 +111,23 @@ def test_classification_is_the_mean_over_evenly_spread_values():
         if tau == 0:
             continue
         assert vdi.front[at] == made.front[k]
-        assert vdi.optical_depth[at] == pytest.approx(tau, rel=2e-3, abs=1e-7)
+        assert vdi.optical_depth[at] == pytest.approx(tau, rel=2e-3, abs=1e-6)
         wanted = (alpha[:, np.newaxis] * color).mean(axis=0) / alpha.mean()
         assert vdi.color[at] == pytest.approx(wanted, abs=2e-3)
         at += 1
     assert at == vdi.n_supersegments
+    assert kinds == {(False, False), (True, False), (False, True)}
     assert vdi.metadata["transfer_function"] == LOOKS.to_dict()
+
+
+def test_of_any_mean_and_spread_that_a_file_may_have_the_mean_is_kept():
+    mean, spread = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 101), np.linspace(0, 0.5, 51)))
+    low, high, even, above = spread_of_values(mean, spread)
+    assert (low >= 0).all()
+    assert (high >= low).all()
+    assert (high <= 1).all()
+    assert ((even >= 0) & (above >= 0) & (even + above <= 1 + 1e-12)).all()
+    assert (even * (low + high) + above * (high + 1)) / 2 == pytest.approx(mean)
 
 
 def test_what_is_opaque_is_opaque_and_what_is_transparent_left_out():
