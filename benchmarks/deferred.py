@@ -178,10 +178,10 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     """Yield the tables: by group, look and volume, and bytes."""
     rows = [row for row in results.rows() if "refused" not in row]
     yield f"{LISTS['max_supersegments']} supersegments of 8 bytes, everything in the range kept,"
-    yield "between points. SSIM to volume rendering at V_O, in brackets that of volume rendering with"
-    yield "steps an eighth as long; turned, less the baked VDI's. Brightness: |ratio - 1| of pictures"
-    yield "over 2/255. Silhouettes: pixels that change sides of an alpha of 1/2, per pixel of outline."
-    yield "In brackets those of the baked VDI. Bold: what misses its reach."
+    yield "between points. SSIM to volume rendering at V_O, in brackets that of volume rendering"
+    yield "with steps an eighth as long; turned, less the baked VDI's. Brightness: |ratio - 1| of"
+    yield "pictures over 2/255. Silhouettes: pixels that change sides of an alpha of 1/2, per pixel"
+    yield "of outline. In brackets those of the baked VDI. Bold: what misses its reach."
     yield ""
     groups = {
         "**wide**": [row for row in rows if row["case"]["look"] in WIDE],
