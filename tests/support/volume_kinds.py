@@ -991,6 +991,34 @@ def netcdf_4(folder):
 
 
 @kind
+def netcdf_units(folder):
+    """Kilometres along x and y, metres along z, which falls."""
+    xarray = pytest.importorskip("xarray")
+    coordinates = {}
+    for k, (axis, unit) in enumerate((("z", "m"), ("y", "km"), ("x", "km"))):
+        places = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
+        places = places[::-1] * 1000 if axis == "z" else places
+        coordinates[axis] = (axis, places, {"units": unit})
+    data = xarray.DataArray(scan(), dims=("z", "y", "x"), coords=coordinates, name="T")
+    data.to_netcdf(folder / "a.nc", engine="h5netcdf")
+    place = affine(direction=np.diag([1, 1, -1]), origin=ORIGIN + np.array([0, 0, 4 * SPACING[2]]))
+    return Kind(folder / "a.nc", to_world=place, unit="km")
+
+
+@kind
+def hdf5_emd(folder):
+    """Of electron microscopy: coordinates are called dim1, dim2, dim3, and units like [n_m]."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.emd", "w") as file:
+        group = file.create_group("data/tomogram")
+        group.attrs["emd_group_type"], group["data"] = 1, scan()
+        for k in range(3):
+            group[f"dim{k + 1}"] = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
+            group[f"dim{k + 1}"].attrs.update(name="zyx"[k], units="[n_m]")
+    return Kind(folder / "a.emd", unit="nm")
+
+
+@kind
 def ome_zarr(folder):
     zarr = pytest.importorskip("zarr", minversion="3")
     group = zarr.open_group(str(folder / "a.ome.zarr"), mode="w", zarr_format=2)
