@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.io.axes import first_and_step, in_one_unit
 
 #: Attributes by which an array says itself how far apart its points are.
@@ -19,6 +20,15 @@ def attributes_of(array: Any, axes: Sequence[str]) -> dict[str, Any]:
     These are along z, y and x, and ``unit of length`` is theirs. ``axes``: of the array.
     """
     attributes = dict(array.attrs)
+    group: Any = getattr(array, "parent", {})
+    if {"VoxelData", "Directions", "Origin", "Spacing"} <= {*group}:  # of ITK
+        if array.ndim != 3 or not np.allclose(group["Directions"][:], np.eye(3)):
+            raise UnsupportedError(
+                f"{array.name}, as ITK writes HDF5, is turned by its Directions or has several "
+                "components, which is read of other formats: write it as NRRD"
+            )
+        said = {name.lower(): group[name][:][::-1] for name in ("Origin", "Spacing")}
+        return {**attributes, **said}
     along = _coordinates(array)
     found = [along[axes.index(axis)] for axis in "zyx"]
     if any(name in attributes for name in _SAID) or all(each is None for each in found):

@@ -649,6 +649,24 @@ def dicom_without_a_preamble(folder):
 
 
 @kind
+def dicom_modality_lut(folder):
+    """Values are those of a table, in place of a slope and an intercept."""
+    pydicom = pytest.importorskip("pydicom")
+
+    def edit(data):
+        table = pydicom.Dataset()
+        table.LUTDescriptor, table.ModalityLUTType = [256, 0, 16], "US"
+        table.add_new("LUTData", "US", [3 * i + 1 for i in range(256)])
+        data.ModalityLUTSequence, data.PixelRepresentation = [table], 0
+        for name in ("RescaleSlope", "RescaleIntercept"):
+            data.pop(name, None)
+
+    found = _edited(folder, edit)
+    found.values = scan() * 3 + 1
+    return found
+
+
+@kind
 def dicom_rle(folder):
     return _edited(folder, lambda data: data.compress("1.2.840.10008.1.2.5"))
 
@@ -1003,6 +1021,17 @@ def netcdf_units(folder):
     data.to_netcdf(folder / "a.nc", engine="h5netcdf")
     place = affine(direction=np.diag([1, 1, -1]), origin=ORIGIN + np.array([0, 0, 4 * SPACING[2]]))
     return Kind(folder / "a.nc", to_world=place, unit="km")
+
+
+@kind
+def hdf5_itk(folder):
+    """As ITK writes it: lengths along x, y and z beside the voxels."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.hdf5", "w") as file:
+        group = file.create_group("ITKImage/0")
+        group["VoxelData"], group["Directions"] = scan(), np.eye(3)
+        group["Spacing"], group["Origin"] = SPACING, ORIGIN
+    return Kind(folder / "a.hdf5")
 
 
 @kind

@@ -339,6 +339,9 @@ def _pixels(path: Path, *, rescaled: bool = True) -> NDArray[Any]:
             f"{path} holds pixels of {values.shape}, not one slice of grey values: convert colours "
             "to grey values"
         )
+    if data.get("ModalityLUTSequence"):  # in place of a line
+        found: NDArray[Any] = pydicom.pixels.apply_modality_lut(values, data)
+        return found
     return _rescaled(data, values, slope, intercept)
 
 
