@@ -42,7 +42,8 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
             array: Any = Lazy(shape, kind, partial(read, number, level, down))
             mapped = one.dataoffset is not None and one.keyframe.is_memmappable
             if mapped and kind == one.dtype != bool and not tiff.is_ome:
-                whole = tifffile.memmap(file, series=number, level=level, mode="r")
+                dtype = one.dtype.newbyteorder(tiff.byteorder)
+                whole = tiff.filehandle.memmap_array(dtype, shape, offset=one.dataoffset)
                 array = np.flip(whole, down)
             size, unit, channels = _described(tiff, number, one)
             coarser = [series.shape[axes.index(a)] / shape[axes.index(a)] for a in "xyz"]
