@@ -13,6 +13,30 @@ from pyvista_vdi.errors import UnsupportedError
 #: By how much of a step coordinates may differ from equal ones.
 _EVEN = 1e-4
 
+#: Units of length in metres, as OME-Zarr, OME-TIFF and the conventions of NetCDF write them.
+METRES = {
+    "km": 1e3,
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "µm": 1e-6,
+    "um": 1e-6,
+    "nm": 1e-9,
+    "pm": 1e-12,
+    "Å": 1e-10,
+    "angstrom": 1e-10,
+    "picometer": 1e-12,
+    "nanometer": 1e-9,
+    "micrometer": 1e-6,
+    "micron": 1e-6,
+    "millimeter": 1e-3,
+    "centimeter": 1e-2,
+    "decimeter": 1e-1,
+    "meter": 1.0,
+    "kilometer": 1e3,
+    "inch": 0.0254,
+}
+
 
 def to_world(steps: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[np.float64]:
     """Return the map from point index (x, y, z) to the world, (4, 4).
@@ -41,6 +65,14 @@ def first_and_step(coordinates: Any, what: str) -> tuple[float, float]:
             "interpolate it, for instance by xarray's data.interp"
         )
     return float(places[0]), float(step)
+
+
+def in_one_unit(lengths: Sequence[float], units: Sequence[str]) -> tuple[list[float], str]:
+    """Return lengths along x, y and z in the unit of the first, where all are of length."""
+    metres = [METRES.get(unit, 0.0) for unit in units]
+    if len({*units}) == 1 or not all(metres):
+        return [*lengths], one_unit(units)
+    return [n * m / metres[0] for n, m in zip(lengths, metres, strict=True)], units[0]
 
 
 def one_unit(units: Sequence[str]) -> str:

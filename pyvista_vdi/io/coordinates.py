@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.io.axes import first_and_step, one_unit
+from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.io.axes import first_and_step, in_one_unit
 
 #: Attributes by which an array says itself how far apart its points are.
 _SAID = ("spacing", "origin", "element_size_um")
@@ -19,6 +20,15 @@ def attributes_of(array: Any, axes: Sequence[str]) -> dict[str, Any]:
     These are along z, y and x, and ``unit of length`` is theirs. ``axes``: of the array.
     """
     attributes = dict(array.attrs)
+    group: Any = getattr(array, "parent", {})
+    if {"VoxelData", "Directions", "Origin", "Spacing"} <= {*group}:  # of ITK
+        if array.ndim != 3 or not np.allclose(group["Directions"][:], np.eye(3)):
+            raise UnsupportedError(
+                f"{array.name}, as ITK writes HDF5, is turned by its Directions or has several "
+                "components, which is read of other formats: write it as NRRD"
+            )
+        said = {name.lower(): group[name][:][::-1] for name in ("Origin", "Spacing")}
+        return {**attributes, **said}
     along = _coordinates(array)
     found = [along[axes.index(axis)] for axis in "zyx"]
     if any(name in attributes for name in _SAID) or all(each is None for each in found):
@@ -27,10 +37,12 @@ def attributes_of(array: Any, axes: Sequence[str]) -> dict[str, Any]:
         (0.0, 1.0) if each is None else first_and_step(each[:], f"{array.name} lies along {axis}")
         for each, axis in zip(found, "zyx", strict=True)
     ]
-    units = ["" if each is None else _text(each.attrs.get("units", "")) for each in found]
-    origin, spacing = zip(*places, strict=True)
-    unit = one_unit(units[::-1])
-    return {**attributes, "origin": origin, "spacing": spacing, "unit of length": unit}
+    units = ["" if each is None else _text(each.attrs.get("units", "")) for each in found[::-1]]
+    if any(unit.startswith("[") for unit in units):  # of EMD: "[n_m]"
+        units = [unit.strip("[]").replace("_", "") for unit in units]
+    along_xyz = (in_one_unit(n[::-1], units) for n in zip(*places, strict=True))
+    (origin, spacing), unit = zip(*((n[::-1], said) for n, said in along_xyz), strict=True)
+    return {**attributes, "origin": origin, "spacing": spacing, "unit of length": unit[0]}
 
 
 def _coordinates(array: Any) -> list[Any]:
@@ -42,6 +54,8 @@ def _coordinates(array: Any) -> list[Any]:
         said = array.attrs.get("axes", group.attrs.get("axes", ()))  # the former is of old NeXus
         said = _text(said).replace(",", ":").split(":") if isinstance(said, str | bytes) else said
         names = [_text(name).strip("[] ") for name in said]
+        if "emd_group_type" in group.attrs:  # of electron microscopy
+            names = [f"dim{i}" for i in range(1, array.ndim + 1)]
     else:
         names = getattr(getattr(array, "metadata", None), "dimension_names", None)
         names = [*(names or array.attrs.get("_ARRAY_DIMENSIONS", ()))]

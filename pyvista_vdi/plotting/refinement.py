@@ -100,7 +100,8 @@ class Refinement:
             self._worker.clear()
             if not self._show_or_warn(wanted, lambda: load(wanted)):
                 self._before_frame()  # a coarser one, which is still finer than what is shown
-        elif self._worker.job is None or self._worker.job.key != wanted.level:
+            return
+        if self._worker.job is None or self._worker.job.key != wanted.level:
             device = actor.GetMapper().GetDevice()
 
             def read(runtime: Runtime, _: Callable[[float], None]) -> Volume:
@@ -108,7 +109,8 @@ class Refinement:
                     return load(wanted)
 
             self._worker.put(Job(read, device, wanted.level))
-            self._timer.start(window.GetInteractor(), in_loop=True)
+        # In each frame anew: the hand that turns the view has stopped it
+        self._timer.start(window.GetInteractor(), in_loop=True)
 
     def _look(self) -> None:
         """Draw a level that was read, from the window's event loop."""

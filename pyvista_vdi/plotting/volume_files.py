@@ -90,6 +90,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         data.spacing = np.linalg.norm(steps, axis=1) * _BOHR
         data.direction_matrix = (steps / np.linalg.norm(steps, axis=1)[:, None]).T
         data.origin = cube[0, 1:4] * _BOHR
+    unit = "" if cube is None else "angstrom"
     active = data.active_scalars_info
     found = []
     for kind, arrays in (("point", data.point_data), ("cell", data.cell_data)):
@@ -100,7 +101,9 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
             meant = active.name == key and active.association.name.lower() == kind
 
             def taken(key: str = key, kind: str = kind) -> Any:
-                return volume_from_vtk(data, key, kind)
+                volume = volume_from_vtk(data, key, kind)
+                volume.unit = unit
+                return volume
 
             place = np.eye(4)
             place[:3, :3] = data.direction_matrix * np.array(data.spacing)
@@ -109,7 +112,9 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
             lazy = Lazy(shape, values.dtype, lambda: None)
             found.append(
                 VolumeInFile(
-                    lazy, "zyx", place, f"{kind}:{key}" if both else key, meant=meant, taken=taken
+                    *(lazy, "zyx", place, f"{kind}:{key}" if both else key, unit),
+                    meant=meant,
+                    taken=taken,
                 )
             )
     return found
@@ -125,6 +130,11 @@ def _head_of_cube(file: Path) -> NDArray[np.float64]:
         rows = _numbers(itertools.islice(stream, 2, 6), 4)
         if rows.shape == (4, 4):
             n_atoms, points = abs(rows[0, 0]), rows[1:, 0]
+            if (points < 0).all():
+                raise UnsupportedError(
+                    f"{file} has negative numbers of points, by which its lengths are in angstrom, "
+                    "which is not read: write them positive, and lengths in Bohr (1 / 0.529177249)"
+                )
             why = (
                 f"its head says {n_atoms:g} atoms and {' x '.join(f'{n:g}' for n in points)} points"
             )

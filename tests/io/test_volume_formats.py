@@ -331,6 +331,43 @@ def test_what_cannot_be_opened_is_said(tmp_path):
         pvdi.read_volume(tmp_path / "enormous.nrrd")
 
 
+def test_sizes_that_are_not_said_are_warned_of(tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    said = {"axes": "ZYX", "PhysicalSizeX": 0.5, "PhysicalSizeY": 0.5}
+    how = {"photometric": "minisblack", "metadata": said}
+    tifffile.imwrite(tmp_path / "a.ome.tif", np.zeros((3, 4, 5), np.uint8), **how)
+    with pytest.warns(pvdi.VDIWarning, match=r"0\.5 x 0\.5, and not how far apart slices are"):
+        assert pvdi.read_volume(tmp_path / "a.ome.tif").spacing == (0.5, 0.5, 1)
+    pydicom, kind = pytest.importorskip("pydicom"), made("dicom", tmp_path)
+    for path in kind.path.iterdir():
+        data = pydicom.dcmread(path)
+        del data.PixelSpacing
+        data.save_as(path)
+    with pytest.warns(pvdi.VDIWarning, match="do not say how large pixels are, and 1 mm is taken"):
+        assert pvdi.read_volume(kind.path).spacing[:2] == pytest.approx((1, 1))
+
+
+def test_values_that_imagej_calibrates_by_a_curve_are_warned_of(tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    for function, c1 in ((0, 0.5), (4, 2.0)):
+        said = f"ImageJ=1.53t\nimages=3\nslices=3\ncf={function}\nc0=1.0\nc1={c1}\n"
+        how = {"photometric": "minisblack", "description": said, "metadata": None}
+        tifffile.imwrite(tmp_path / f"{function}.tif", np.full((3, 4, 5), 8, np.uint8), **how)
+    assert (pvdi.read_volume(tmp_path / "0.tif").array == 5).all()
+    with pytest.warns(pvdi.VDIWarning, match="ImageJ's function 4, which is not applied"):
+        assert (pvdi.read_volume(tmp_path / "4.tif").array == 8).all()
+
+
+def test_a_cube_in_angstrom_is_refused_for_that(tmp_path):
+    pytest.importorskip("pyvista")
+    kind = KINDS["cube"](tmp_path)
+    lines = kind.path.read_text().splitlines()
+    lines[3:6] = [f"-{line}" for line in lines[3:6]]
+    kind.path.write_text("\n".join(lines))
+    with pytest.raises(UnsupportedError, match="lengths are in angstrom"):
+        pvdi.read_volume(kind.path)
+
+
 def test_what_is_missing_is_named(tmp_path, monkeypatch):
     kind = KINDS["nifti"](tmp_path)
     monkeypatch.setitem(sys.modules, "nibabel", None)

@@ -31,6 +31,8 @@ def display():
 @pytest.mark.every(6)
 @pytest.mark.parametrize("case", [case.__name__ for case in plugin_on_screen.CASES])
 def test_on_screen(display, case):
+    if case == plugin_on_screen.a_finer_level_comes_by_itself.__name__:
+        pytest.importorskip("zarr", minversion="3")
     script = Path(plugin_on_screen.__file__)
     left_out = ("VTK_DEFAULT_OPENGL_WINDOW", "PYVISTA_OFF_SCREEN", "WAYLAND_DISPLAY")
     environment = {k: v for k, v in os.environ.items() if k not in left_out}

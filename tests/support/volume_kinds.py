@@ -490,6 +490,40 @@ def tiff_imagej(folder):
 
 
 @kind
+def tiff_imagej_signed(folder):
+    """ImageJ keeps signed values as unsigned ones, with a line that takes 32768 off."""
+    said = "ImageJ=1.53t\nimages=5\nslices=5\nunit=cm\nspacing=0.25\ncf=0\nc0=-32768.0\nc1=1.0\n"
+    how = {"description": said, "metadata": None, "resolution": (10, 5)}
+    stored = (scan(np.int32) - 100 + 32768).astype(np.uint16)
+    return _tiff(folder, stored, scan() - 100, spacing=(0.1, 0.2, 0.25), unit="cm", **how)
+
+
+@kind
+def tiff_lsm(folder):
+    """Zeiss': a thumbnail after each slice, and voxels' sizes in metres in a tag of its own."""
+    info = bytearray(512)
+    sizes = (*SHAPE[::-1], 1, 1, 2, 3, 3, *SPACING / 1e6, 0, 0, 0)
+    struct.pack_into("<I9i6d", info, 0, 0x0400494C, 512, *sizes)
+    tifffile = pytest.importorskip("tifffile")
+    with tifffile.TiffWriter(folder / "a.lsm") as file:
+        for picture in scan(np.uint16):
+            tags = [(34412, 1, 512, bytes(info), True)]
+            file.write(picture, extratags=tags, metadata=None)
+            file.write(picture[::2, ::2].astype(np.uint8), subfiletype=1, metadata=None)
+    place = affine(origin=(0, 0, 0))
+    return Kind(folder / "a.lsm", scan()[:, ::-1], place, unit="um")
+
+
+@kind
+def tiff_ome_units(folder):
+    """Of which one is another."""
+    said = {"axes": "ZYX", "PhysicalSizeX": 0.001, "PhysicalSizeXUnit": "mm"}
+    said |= {"PhysicalSizeY": 1.5, "PhysicalSizeZ": 2.5}
+    how = {"name": "a.ome.tif", "photometric": "minisblack", "metadata": said}
+    return _tiff(folder, scan(np.uint16), spacing=SPACING / 1000, unit="mm", **how)
+
+
+@kind
 def tiff_ome(folder):
     said = {"axes": "ZYX"} | {f"PhysicalSize{a}": s for a, s in zip("XYZ", SPACING, strict=True)}
     how = {"name": "a.ome.tif", "photometric": "minisblack", "metadata": said}
@@ -571,7 +605,12 @@ def tiff_levels(folder):
     fine = np.arange(4 * 32 * 32, dtype=np.uint16).reshape(4, 32, 32)
     with tifffile.TiffWriter(folder / "a.ome.tif") as file:
         how = {"photometric": "minisblack", "tile": (16, 16)}
-        file.write(fine, subifds=1, metadata={"axes": "ZYX", "PhysicalSizeX": 2.0}, **how)
+        file.write(
+            fine,
+            subifds=1,
+            metadata={"axes": "ZYX", "PhysicalSizeX": 2.0, "PhysicalSizeZ": 1.0},
+            **how,
+        )
         file.write(fine[:, ::2, ::2], subfiletype=1, **how)
     world = affine((4, 2, 1), (0, 0, 0))
     return Kind(folder / "a.ome.tif", fine[:, ::2, ::2][:, ::-1], world, "µm", {"level": 1})
@@ -595,6 +634,36 @@ def _edited(folder, edit):
 @kind
 def dicom(folder):
     return _edited(folder, lambda data: None)
+
+
+@kind
+def dicom_without_a_preamble(folder):
+    """As before 1993: no 128 bytes and no DICM, implicit."""
+    found = _edited(folder, lambda data: None)
+    pydicom = pytest.importorskip("pydicom")
+    for path in found.path.iterdir():
+        data = pydicom.Dataset()
+        data.update(pydicom.dcmread(path))
+        pydicom.dcmwrite(path, data, implicit_vr=True, little_endian=True)
+    return found
+
+
+@kind
+def dicom_modality_lut(folder):
+    """Values are those of a table, in place of a slope and an intercept."""
+    pydicom = pytest.importorskip("pydicom")
+
+    def edit(data):
+        table = pydicom.Dataset()
+        table.LUTDescriptor, table.ModalityLUTType = [256, 0, 16], "US"
+        table.add_new("LUTData", "US", [3 * i + 1 for i in range(256)])
+        data.ModalityLUTSequence, data.PixelRepresentation = [table], 0
+        for name in ("RescaleSlope", "RescaleIntercept"):
+            data.pop(name, None)
+
+    found = _edited(folder, edit)
+    found.values = scan() * 3 + 1
+    return found
 
 
 @kind
@@ -940,6 +1009,45 @@ def netcdf_4(folder):
 
 
 @kind
+def netcdf_units(folder):
+    """Kilometres along x and y, metres along z, which falls."""
+    xarray = pytest.importorskip("xarray")
+    coordinates = {}
+    for k, (axis, unit) in enumerate((("z", "m"), ("y", "km"), ("x", "km"))):
+        places = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
+        places = places[::-1] * 1000 if axis == "z" else places
+        coordinates[axis] = (axis, places, {"units": unit})
+    data = xarray.DataArray(scan(), dims=("z", "y", "x"), coords=coordinates, name="T")
+    data.to_netcdf(folder / "a.nc", engine="h5netcdf")
+    place = affine(direction=np.diag([1, 1, -1]), origin=ORIGIN + np.array([0, 0, 4 * SPACING[2]]))
+    return Kind(folder / "a.nc", to_world=place, unit="km")
+
+
+@kind
+def hdf5_itk(folder):
+    """As ITK writes it: lengths along x, y and z beside the voxels."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.hdf5", "w") as file:
+        group = file.create_group("ITKImage/0")
+        group["VoxelData"], group["Directions"] = scan(), np.eye(3)
+        group["Spacing"], group["Origin"] = SPACING, ORIGIN
+    return Kind(folder / "a.hdf5")
+
+
+@kind
+def hdf5_emd(folder):
+    """Of electron microscopy: coordinates are called dim1, dim2, dim3, and units like [n_m]."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "a.emd", "w") as file:
+        group = file.create_group("data/tomogram")
+        group.attrs["emd_group_type"], group["data"] = 1, scan()
+        for k in range(3):
+            group[f"dim{k + 1}"] = ORIGIN[2 - k] + SPACING[2 - k] * np.arange(SHAPE[k])
+            group[f"dim{k + 1}"].attrs.update(name="zyx"[k], units="[n_m]")
+    return Kind(folder / "a.emd", unit="nm")
+
+
+@kind
 def ome_zarr(folder):
     zarr = pytest.importorskip("zarr", minversion="3")
     group = zarr.open_group(str(folder / "a.ome.zarr"), mode="w", zarr_format=2)
@@ -1133,7 +1241,11 @@ def cube(folder):
         lines.append(f"{SHAPE[2 - i]} {step[0]} {step[1]} {step[2]}")
     lines += ["6 6.0 0.0 0.0 0.0", *(f"{v}.0" for v in scan().transpose(2, 1, 0).ravel())]
     (folder / "a.cube").write_text("\n".join(lines) + "\n")
-    return Kind(folder / "a.cube", to_world=affine(SPACING * 0.529177249, ORIGIN * 0.529177249))
+    return Kind(
+        folder / "a.cube",
+        to_world=affine(SPACING * 0.529177249, ORIGIN * 0.529177249),
+        unit="angstrom",
+    )
 
 
 #: What SimpleITK reads, too, and places likewise.

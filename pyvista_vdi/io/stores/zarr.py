@@ -10,23 +10,9 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidVolumeError, MissingDependencyError, UnsupportedError
+from pyvista_vdi.io.axes import METRES
 from pyvista_vdi.io.stores.arrays import BROKEN, array_store, check_axes, grid_of, only_array
 from pyvista_vdi.io.stores.record import Level, Store
-
-#: Lengths in metres, by the names that OME-Zarr takes of UDUNITS-2.
-_UNITS = {
-    "angstrom": 1e-10,
-    "picometer": 1e-12,
-    "nanometer": 1e-9,
-    "micrometer": 1e-6,
-    "micron": 1e-6,
-    "millimeter": 1e-3,
-    "centimeter": 1e-2,
-    "decimeter": 1e-1,
-    "meter": 1.0,
-    "kilometer": 1e3,
-    "inch": 0.0254,
-}
 
 
 def open_zarr(path: str, inner: str) -> Store:
@@ -92,12 +78,12 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
     units = [axis.get("unit") for axis in image["axes"][-3:]]
     factors = np.ones(3)
     if len(set(units)) > 1:
-        if any(name not in _UNITS for name in units):
+        if any(name not in METRES for name in units):
             raise UnsupportedError(
                 f"{path} has lengths in {', '.join(map(str, units))} along z, y, x, of which one "
                 "is not known: write them in one unit"
             )
-        lengths = np.array([_UNITS[str(name)] for name in units])
+        lengths = np.array([METRES[str(name)] for name in units])
         factors = lengths / lengths[-1]
     levels, clock = [], (1.0, 0.0)
     for entry in image["datasets"]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, warn_external
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, stack
+from pyvista_vdi.io.volumes.table import BARE_DICOM
 
 #: What is read of a header, by DICOM's keywords.
 _WANTED = (
@@ -104,6 +105,18 @@ def _slices_of(folder: Path) -> list[Slice]:
     return found
 
 
+def _dataset(path: Path, **how: Any) -> Any:
+    """Read a file, also one as before 1993, which begins at once with its first element."""
+    import pydicom
+
+    with path.open("rb") as stream:
+        bare = stream.read(4) in BARE_DICOM
+    data = pydicom.dcmread(path, force=bare, **how)
+    if bare:
+        data.file_meta.TransferSyntaxUID = pydicom.uid.ImplicitVRLittleEndian
+    return data
+
+
 def _header(path: Path) -> Slice | None:
     """Return what a file says of its slice, or None where it is no DICOM image.
 
@@ -112,7 +125,7 @@ def _header(path: Path) -> Slice | None:
     import pydicom
 
     try:
-        header = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_WANTED.split())
+        header = _dataset(path, stop_before_pixels=True, specific_tags=_WANTED.split())
         if "Rows" not in header:  # a directory, a report, a plan ...
             uid = pydicom.uid.UID(_text(header, "SOPClassUID"), pydicom.config.IGNORE)
             if uid.name.endswith("Image Storage"):
@@ -167,7 +180,13 @@ def _placed(folder: Path, slices: list[Slice]) -> tuple[NDArray[np.float64], Seq
             f"slices in the folder {folder} have pixels of several sizes, "
             f"{sorted({tuple(s.tolist()) for s in known})}: put those of one into a folder"
         )
-    rows, columns = known[0] if known and (known[0] > 0).all() else (1.0, 1.0)
+    sized = bool(known) and bool((known[0] > 0).all())
+    rows, columns = known[0] if sized else (1.0, 1.0)
+    if not sized:
+        warn_external(
+            f"slices in the folder {folder} do not say how large pixels are, and 1 mm is taken: "
+            "give spacing=(x, y, z)"
+        )
     positions, turns = [s.position for s in slices], [s.orientation for s in slices]
     if any(p is None for p in positions) or any(t is None for t in turns):
         apart = slices[0].thickness or columns
@@ -215,7 +234,7 @@ def _of_frames(path: Path) -> list[VolumeInFile]:
     """Return what a file of several frames holds: a volume, or one for each segment."""
     import pydicom
 
-    data = pydicom.dcmread(path, stop_before_pixels=True)
+    data = _dataset(path, stop_before_pixels=True)
     count = int(data.NumberOfFrames)
     shared = (data.get("SharedFunctionalGroupsSequence") or [pydicom.Dataset()])[0]
     frames = list(data.get("PerFrameFunctionalGroupsSequence") or [])[:count]
@@ -294,7 +313,7 @@ def _pixels(path: Path, *, rescaled: bool = True) -> NDArray[Any]:
     import pydicom
 
     try:
-        data = pydicom.dcmread(path)
+        data = _dataset(path)
         syntax = data.file_meta.get("TransferSyntaxUID", pydicom.uid.ImplicitVRLittleEndian)
         try:
             values: NDArray[Any] = data.pixel_array
@@ -320,6 +339,9 @@ def _pixels(path: Path, *, rescaled: bool = True) -> NDArray[Any]:
             f"{path} holds pixels of {values.shape}, not one slice of grey values: convert colours "
             "to grey values"
         )
+    if data.get("ModalityLUTSequence"):  # in place of a line
+        found: NDArray[Any] = pydicom.pixels.apply_modality_lut(values, data)
+        return found
     return _rescaled(data, values, slope, intercept)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import UnsupportedError
-from pyvista_vdi.io.axes import first_and_step, one_unit, to_world
+from pyvista_vdi.io.axes import first_and_step, in_one_unit, to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
 
 #: What axes are called, in standard names or by their dimensions, by the letters of ours.
@@ -60,9 +60,9 @@ def _volume(file: Path, data: Any, name: str, variable: Any, options: Any) -> Vo
         with xr.open_dataset(file, **options) as again:
             return np.asarray(again[name][index].values)
 
-    origin, step = zip(*places, strict=True)
+    (origin, unit), (step, _) = (in_one_unit(n, units) for n in zip(*places, strict=True))
     array = Lazy(variable.shape, variable.dtype, read, in_parts=True)
-    return VolumeInFile(array, axes, to_world(step, origin), name, one_unit(units))
+    return VolumeInFile(array, axes, to_world(step, origin), name, unit)
 
 
 def _letter(data: Any, dim: str) -> str:

@@ -14,6 +14,8 @@ from pyvista_vdi.errors import UnsupportedError
 _HEAD = 4096
 
 _NIFTI = re.compile(rb"(?s)^.{344}(n\+1|ni1)\0|^.{4}(n\+2|ni2)\0")
+#: First elements of DICOM files as before 1993, without a preamble.
+BARE_DICOM = (b"\x08\0\0\0", b"\x08\0\x05\0", b"\x08\0\x08\0", b"\x08\0\x16\0")
 _SIZE_OF_ANALYZE = (b"\x5c\x01\0\0", b"\0\0\x01\x5c")
 
 
@@ -84,7 +86,7 @@ FORMATS = (
         "DICOM",
         (".dcm", ".ima"),
         "dicom",
-        lambda head: head[128:132] == b"DICM",
+        lambda head: head[128:132] == b"DICM" or head[:4] in BARE_DICOM,
         "pydicom",
         ("pydicom",),
         _MEDICAL,
