@@ -204,6 +204,13 @@ class VDISeries(VDICollection):
         """
         return registry.method("VDISeries.save")(self, path, **options)  # type: ignore[no-any-return]
 
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Return what a notebook shows: a viewer, or a picture."""
+        text = {"text/plain": repr(self)}
+        return registry.method("VDISeries._repr_mimebundle_", lambda *_: text)(
+            self, include, exclude
+        )
+
     def __repr__(self) -> str:
         width, height = self.window_size
         return (

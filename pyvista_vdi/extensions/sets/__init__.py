@@ -31,7 +31,7 @@ EXTENSION = Extension(
         ),
     ),
     methods={
-        "VDISet.save": "pyvista_vdi.extensions.sets.files:write",
+        "VDISet.save": "pyvista_vdi.extensions.sets.files:save",
         "VDISet.save_cinema": "pyvista_vdi.extensions.sets.cinema:write",
     },
     requires=("series",),  # whose files theirs are but for the head

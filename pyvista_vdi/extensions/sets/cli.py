@@ -24,6 +24,7 @@ from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.extensions.series.cli import OF_READ_IMAGES, OF_WRITTEN_IMAGES, write_each
 from pyvista_vdi.extensions.sets import cinema, files
 from pyvista_vdi.extensions.sets.generate import generate_set
+from pyvista_vdi.io.files import format_named
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
@@ -96,11 +97,13 @@ def info(options: argparse.Namespace) -> int:
 
 
 def convert(options: argparse.Namespace) -> int:
-    """Write a set anew, as a Cinema database, or each of its VDIs to a file of its own."""
+    """Write a set anew, as a page or a Cinema database, or each VDI to a file of its own."""
     refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a set")
     vdi_set, target = files.read(options.file), Path(options.output)
     suffix, arguments = target.suffix.lower(), of_the_file(options)
-    if suffix not in (files.SUFFIX, cinema.SUFFIX):
+    found = format_named(target)
+    page = found is not None and found.page
+    if suffix not in (files.SUFFIX, cinema.SUFFIX) and not page:
         return write_each(vdi_set, target, arguments)
     refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {suffix}")
     if suffix == cinema.SUFFIX:

@@ -14,6 +14,7 @@ from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
 from pyvista_vdi.extensions.series.steps_writer import StepsWriter
 from pyvista_vdi.extensions.series.steps_writer import write_all as write_parts
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
+from pyvista_vdi.io.files import format_named
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
@@ -64,6 +65,14 @@ class SetReader(StepsReader):
         if vdi.bounds != self.all_bounds:
             self._refuse(f"view {self._frames[i][1].number} is of another scene")
         return vdi
+
+
+def save(vdi_set: VDISet, path: str | os.PathLike[str], **options: Any) -> Path:
+    """Write a file of a set, or a page that shows it: see :meth:`VDISet.save`."""
+    found = format_named(path)
+    if found is not None and found.page:
+        return found.load().write_set(vdi_set, path, **options)  # type: ignore[no-any-return]
+    return write(vdi_set, path, **options)
 
 
 def write(

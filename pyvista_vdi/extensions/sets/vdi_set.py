@@ -326,16 +326,18 @@ class VDISet(VDICollection):
         self._places = np.concatenate([self._places, self._places_of([vdi.camera])])
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdiset`` file that :func:`pyvista_vdi.read` opens; whole or not at all.
+        """Write a ``.vdiset`` file, or a page that shows it; it appears whole or not at all.
+
+        :func:`pyvista_vdi.read` opens both.
 
         Parameters
         ----------
         path : path-like
-            The target; its name ends in ``.vdiset``.
+            The target; its name ends in ``.vdiset``, or in ``.html``.
         **options
             ``precision`` (``"8-byte"``), ``tolerance`` (0), ``compression`` (``"zstd"``) and
             ``level`` (1) as for :class:`pyvista_vdi.SeriesWriter`; ``progress``, called with the
-            finished fraction.
+            finished fraction. For pages ``title``, ``background`` and ``controls`` as well.
 
         Returns
         -------
@@ -357,6 +359,11 @@ class VDISet(VDICollection):
         See :func:`pyvista_vdi.extensions.sets.cinema.write`.
         """
         return registry.method("VDISet.save_cinema")(self, path, **options)  # type: ignore[no-any-return]
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Return what a notebook shows: a viewer, or a picture."""
+        text = {"text/plain": repr(self)}
+        return registry.method("VDISet._repr_mimebundle_", lambda *_: text)(self, include, exclude)
 
     def __repr__(self) -> str:
         width, height = self.window_size

@@ -8,6 +8,8 @@ from collections.abc import Collection
 from typing import Any
 
 from pyvista_vdi.errors import MissingDependencyError, warn_external
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.still import still
 from pyvista_vdi.model.vdi import VDI
 
@@ -16,9 +18,14 @@ _THUMBNAIL = 240
 
 
 def mime_bundle(
-    vdi: VDI, include: Collection[str] | None = None, exclude: Collection[str] | None = None
+    vdi: VDI | VDISeries | VDISet,
+    include: Collection[str] | None = None,
+    exclude: Collection[str] | None = None,
 ) -> Any:
-    """Return what IPython shows of a VDI: a viewer and a picture, or what there can be of it."""
+    """Return what IPython shows of a VDI, a series or a set: a viewer and a picture.
+
+    Or what there can be of it.
+    """
     if _in_a_terminal():
         return {}
     try:
@@ -38,7 +45,7 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     Parameters
     ----------
     plotter : pyvista.Plotter
-        Its active renderer is shown.
+        All of its renderers are shown.
     screenshot : path-like or file-like, optional
         Where a picture is saved besides.
     **options
@@ -46,39 +53,40 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
 
     Returns
     -------
-    PlotterWidget
-        The viewer; or what another backend returns.
+    PlotterWidget or SubplotsWidget
+        The viewer, or a box with one for each renderer; or what another backend returns.
     """
     from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 
     plotter.render()  # VDIs are made in the first frame
-    renderer = plotter.renderer
-    shown = [actor for actor in renderer.actors.values() if actor.GetVisibility()]
+    actors = [actor for renderer in plotter.renderers for actor in renderer.actors.values()]
+    shown = [actor for actor in actors if actor.GetVisibility()]
     if not any(isinstance(actor, VDIActorMethods) for actor in shown):
         return _shown_by_pyvista(plotter, screenshot, options)
     try:
-        from pyvista_vdi.extensions.web.plotter_widget import PlotterWidget
+        from pyvista_vdi.extensions.web.plotter_widget import PlotterWidget, SubplotsWidget
     except MissingDependencyError as error:
         warn_external(str(error))
         return _shown_by_pyvista(plotter, screenshot, options)
-    from pyvista_vdi.extensions.web.scenes.export import around, several_of
+    from pyvista_vdi.extensions.web.scenes.export import not_played
     from pyvista_vdi.extensions.web.scenes.scene import scene_of
 
-    scene = scene_of(renderer, renderer.actors, camera=False)
-    without = [*scene.left_out, *around(plotter)]
+    scenes, without = [], []
+    for renderer in plotter.renderers:
+        scene = scene_of(renderer, renderer.actors, camera=False, needs_vdi=False)
+        without += scene.left_out
+        without += [f"all but one of {what}" for what in not_played(renderer, scene.actors)]
+        scenes.append(scene)
     if without:
+        words = ", ".join(dict.fromkeys(without))
         warn_external(
-            f"the notebook's viewer shows the scene without {', '.join(without)}: see all by "
+            f"the notebook's viewer shows the scene without {words}: see all by "
             'jupyter_backend="server"'
         )
-    steps = several_of(renderer, [actor for actor in scene.actors if actor.series is not None])
-    if steps:
-        warn_external(
-            f"the notebook's viewer shows one of {', '.join(steps)}, and has no controls: set "
-            "actor.time and call plotter.render() for another, or have a page that plays written "
-            "by plotter.vdi.export_html"
-        )
-    return PlotterWidget(plotter, scene, plotter.screenshot(screenshot, return_img=True))
+    picture = plotter.screenshot(screenshot, return_img=True)
+    if len(scenes) > 1:
+        return SubplotsWidget(plotter, scenes, picture)
+    return PlotterWidget(plotter, plotter.renderer, scenes[0], picture)
 
 
 def _shown_by_pyvista(plotter: Any, screenshot: Any, options: dict[str, Any]) -> Any:
@@ -98,9 +106,10 @@ def _in_a_terminal() -> bool:
     return shell is not None and not hasattr(shell, "kernel")
 
 
-def _without_a_viewer(vdi: VDI, why: str) -> dict[str, str]:
+def _without_a_viewer(vdi: VDI | VDISeries | VDISet, why: str) -> dict[str, str]:
     text = {"text/plain": f"{vdi!r}\n{why}"}
-    picture = still(vdi)
+    first = vdi[vdi.nearest(vdi.camera)] if isinstance(vdi, VDISet) else vdi
+    picture = still(first[0] if isinstance(first, VDISeries) else first)
     if picture is None:
         return text
     shown = f"{_html(vdi, picture)}<br>{html.escape(why)}"
@@ -112,6 +121,6 @@ def html_of(vdi: VDI) -> str | None:
     return None if _in_a_terminal() else _html(vdi, still(vdi, longest=_THUMBNAIL))
 
 
-def _html(vdi: VDI, picture: str | None) -> str:
+def _html(vdi: VDI | VDISeries | VDISet, picture: str | None) -> str:
     words = f"<code>{html.escape(repr(vdi))}</code>"
     return words if picture is None else f'<img src="data:image/png;base64,{picture}"><br>{words}'

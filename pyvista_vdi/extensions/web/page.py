@@ -21,6 +21,8 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter, write_all
+from pyvista_vdi.extensions.sets.files import write_all as write_all_views
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
@@ -236,6 +238,33 @@ def write_series(
     view.attributes = {"autoplay": ""} if autoplay else {}
     writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
     cut = write_all(stream, writer, series, series.times, progress)
+    view.series = in_parts(stream.getvalue(), cut)
+    content = assembled([view], title=target.stem if title is None else title, controls=controls)
+    with whole_file(target) as out:
+        out.write(content)
+    return target
+
+
+def write_set(
+    vdi_set: VDISet,
+    path: str | os.PathLike[str],
+    *,
+    precision: str = "8-byte",
+    tolerance: float = 0.0,
+    compression: str = "zstd",
+    level: int = 1,
+    title: str | None = None,
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    controls: str = "all",
+    progress: Progress | None = None,
+) -> Path:
+    """Write a page that shows a set: see :meth:`pyvista_vdi.VDISet.save`, and :func:`page`."""
+    target = Path(os.path.realpath(check_writable(Path(path))))
+    check_controls(controls)
+    view = _view_of(vdi_set[vdi_set.nearest(vdi_set.camera)], background)
+    view.still_size = vdi_set.window_size
+    writer, stream = StepsWriter(precision, tolerance, 1, compression, level), io.BytesIO()
+    cut = write_all_views(stream, writer, vdi_set, progress)
     view.series = in_parts(stream.getvalue(), cut)
     content = assembled([view], title=target.stem if title is None else title, controls=controls)
     with whole_file(target) as out:

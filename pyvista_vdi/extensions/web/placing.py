@@ -9,6 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.extensions.series.series import Called, VDISeries
+from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
+from pyvista_vdi.extensions.series.steps_writer import write_all as write_series
+from pyvista_vdi.extensions.sets.files import write_all as write_set
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.vdi import VDI
 
@@ -100,3 +105,29 @@ def encoded(vdi: VDI, *, coarse: bool = False) -> bytes:
     stream = io.BytesIO()
     write_to(stream, bare, "deflate", _EFFORT, coarse=coarse)
     return stream.getvalue()
+
+
+def several_of(actor: Any) -> VDISeries | VDISet | None:
+    """Return the series or the set that an actor shows, as it shows it; ``None`` of one VDI."""
+    shown, multiplier = (actor.series or actor.vdi_set), actor.opacity_multiplier
+    if shown is None or multiplier == 1:
+        return shown
+    vdis = Called(lambda i: thinned(shown[i], multiplier), range(len(shown)))
+    if actor.series is not None:
+        return VDISeries(vdis, shown.times)
+    size, bounds = shown.window_size, shown.bounds
+    return VDISet(vdis, shown.cameras, window_size=size, bounds=bounds, about=shown.about)
+
+
+def encoded_many(shown: VDISeries | VDISet) -> tuple[bytes, int]:
+    """Return the file of a series or a set, and how many bytes of it show its first VDI.
+
+    In the 8-byte form, by zstd.
+    """
+    stream = io.BytesIO()
+    if isinstance(shown, VDISeries):
+        writer = StepsWriter("8-byte", 0.0, KEY_EVERY, "zstd", None)
+        cut = write_series(stream, writer, shown, shown.times, None)
+    else:
+        cut = write_set(stream, StepsWriter("8-byte", 0.0, 1, "zstd", None), shown)
+    return stream.getvalue(), cut

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import secrets
 import weakref
+from collections.abc import Sequence
 from contextlib import suppress
+from itertools import pairwise
 from typing import Any
 
+import ipywidgets
 import numpy as np
 
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
-from pyvista_vdi.extensions.web.placing import as_shown, look_of, planes_of
-from pyvista_vdi.extensions.web.still import png
+from pyvista_vdi.extensions.web.placing import as_shown, look_of, planes_of, several_of
+from pyvista_vdi.extensions.web.still import part_of, png, stand_in
 from pyvista_vdi.extensions.web.widget import RENDER, VDIWidget
 from pyvista_vdi.vtk_pipeline.interaction import browser
 
@@ -21,18 +25,19 @@ _REST = 0.2
 
 
 class PlotterWidget(VDIWidget):
-    """What ``plotter.show(jupyter_backend="vdi")`` shows: the plotter's active renderer.
+    """What ``plotter.show(jupyter_backend="vdi")`` shows of one renderer.
 
     What is turned in the browser turns its camera; after each ``plotter.render()`` the browser has
     its camera and background, its VDIs with their clipping planes, opacity multipliers and places,
     and its meshes, lines, points and texts. When a view rests the plotter is rendered in the
-    kernel's event loop: its VDIs are kept up to date as in a window on a screen.
+    kernel's event loop: its VDIs are kept up to date as in a window on a screen. A series plays in
+    the browser; the step at which it is paused is the actor's, and the other way round.
     """
 
-    _esm = viewer_script(scene=True, module=True) + RENDER
+    _esm = viewer_script(scene=True, series=True, module=True) + RENDER
 
-    def __init__(self, plotter: Any, scene: Any, picture: Any) -> None:
-        self._plotter, renderer = weakref.ref(plotter), plotter.renderer
+    def __init__(self, plotter: Any, renderer: Any, scene: Any, picture: Any) -> None:
+        self._plotter = weakref.ref(plotter)
         self._renderer = weakref.ref(renderer)  # another one may be active later
         self._actor = actor = scene.actor
         self._picture = picture
@@ -40,13 +45,16 @@ class PlotterWidget(VDIWidget):
         self._loop: asyncio.AbstractEventLoop | None = None
         with suppress(RuntimeError):  # none runs: then the plotter is rendered by who holds it
             self._loop = asyncio.get_running_loop()
-        self._look = look_of(actor)
-        shown = as_shown(actor)
-        super().__init__(shown, camera=renderer.camera, background=renderer.background_color)
-        self.clipping_planes = planes_of(actor)[:MOST_PLANES]
+        self._look = _look_of(actor)
+        super().__init__(
+            _shown_of(actor), camera=renderer.camera, background=renderer.background_color
+        )
+        self._take_planes()
+        self._take_time()
         self._take(scene)
         self._picture_size = list(renderer.GetSize())
         self.observe(self._turn, "camera")
+        self.observe(self._play, "time")
         me = weakref.ref(self)
 
         def rendered(*_: Any) -> None:
@@ -96,6 +104,16 @@ class PlotterWidget(VDIWidget):
         if self._loop is not None:  # messages may come in a thread of their own
             self._loop.call_soon_threadsafe(self._wait_for_rest)
 
+    def _play(self, change: Any) -> None:
+        """Set the actor's time to the one that has changed in the browser, or here."""
+        series = None if self._actor is None else self._actor.series
+        if series is None or change.new is None or self._open_renderer() is None:
+            return
+        if series.nearest(change.new) != series.nearest(self._actor.time):
+            self._actor.time = change.new
+            if self._loop is not None:
+                self._loop.call_soon_threadsafe(self._wait_for_rest)
+
     def _wait_for_rest(self) -> None:
         if self._rest is not None:
             self._rest.cancel()
@@ -112,16 +130,29 @@ class PlotterWidget(VDIWidget):
             self.camera = camera
         self.background = renderer.background_color
         self._take_if_new(renderer)
-        self.clipping_planes = planes_of(self._actor)[:MOST_PLANES]
-        if self._actor.vdi is not None and look_of(self._actor) != self._look:
-            self._look = look_of(self._actor)
-            self.vdi = as_shown(self._actor)
+        self._take_planes()
+        self._take_time()
+        look = _look_of(self._actor)
+        if look is not None and look != self._look:
+            self._look = look
+            self.vdi = _shown_of(self._actor)
+
+    def _accept(self, vdi: Any) -> Any:
+        return None if vdi is None else super()._accept(vdi)  # subplots may have no VDI
+
+    def _take_time(self) -> None:
+        if self._actor is not None and self._actor.series is not None:
+            self.time = self._actor.time
+
+    def _take_planes(self) -> None:
+        planes = [] if self._actor is None else planes_of(self._actor)
+        self.clipping_planes = planes[:MOST_PLANES]
 
     def _take_if_new(self, renderer: Any) -> None:
         from pyvista_vdi.extensions.web.scenes.scene import scene_of, state_of
 
         if self._known != state_of(renderer):
-            self._take(scene_of(renderer, camera=False))
+            self._take(scene_of(renderer, camera=False, needs_vdi=False))
 
     def _take(self, scene: Any) -> None:
         self._known, self._actor = scene.state, scene.actor
@@ -131,6 +162,68 @@ class PlotterWidget(VDIWidget):
 
     def _still(self) -> str:
         return png(self._picture)
+
+
+class SubplotsWidget(ipywidgets.GridBox):
+    """What ``plotter.show(jupyter_backend="vdi")`` shows of several renderers, all of a plotter's.
+
+    Attributes
+    ----------
+    children : tuple of PlotterWidget
+        In the order of ``plotter.renderers``, each where its renderer is in the window. Linked
+        ones turn together.
+    """
+
+    def __init__(self, plotter: Any, scenes: Sequence[Any], picture: Any) -> None:
+        self._picture, self._key = picture, secrets.token_hex(8)
+        width = plotter.render_window.GetSize()[0]
+        places = [renderer.GetViewport() for renderer in plotter.renderers]
+        # Lines of the grid: all edges, from the left, and from the top
+        columns = sorted({edge for place in places for edge in place[::2]})
+        rows = sorted({edge for place in places for edge in place[1::2]}, reverse=True)
+        children = []
+        for renderer, scene in zip(plotter.renderers, scenes, strict=True):
+            child = PlotterWidget(plotter, renderer, scene, part_of(picture, renderer))
+            camera = renderer.GetActiveCamera().GetAddressAsString("")
+            child._key, child._link = self._key, f"{self._key}-{camera}"
+            left, bottom, right, top = renderer.GetViewport()
+            child.layout.grid_column = f"{columns.index(left) + 1} / {columns.index(right) + 1}"
+            child.layout.grid_row = f"{rows.index(top) + 1} / {rows.index(bottom) + 1}"
+            child.layout.margin = "0"
+            children.append(child)
+        widths = [f"{right - left:g}fr" for left, right in pairwise(columns)]
+        layout = ipywidgets.Layout(
+            grid_template_columns=" ".join(f"minmax(0, {each})" for each in widths),
+            grid_gap="0",
+            width="100%",
+            max_width=f"{width}px",
+        )
+        super().__init__(children, layout=layout)
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        """Return the view, and a picture for where there can be no view."""
+        data = super()._repr_mimebundle_(**kwargs)
+        shown = png(self._picture)
+        stand_in(shown, self._key, self.model_id)
+        return {**data, "image/png": shown}
+
+
+def _look_of(actor: Any) -> Any:
+    """Return what :func:`_shown_of` depends on; ``None`` where there is no VDI."""
+    if actor is None or actor.vdi is None:
+        return None
+    several = actor.series or actor.vdi_set
+    if several is None:
+        return look_of(actor)
+    return several, len(several), actor.opacity_multiplier  # sets may grow
+
+
+def _shown_of(actor: Any) -> Any:
+    """Return what the browser is sent of an actor: a VDI, a series or a set; ``None`` for none."""
+    if _look_of(actor) is None:
+        return None
+    several = several_of(actor)
+    return as_shown(actor) if several is None else several
 
 
 def _camera_of(renderer: Any) -> dict[str, Any]:

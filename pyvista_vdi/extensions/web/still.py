@@ -80,6 +80,14 @@ def still(
         return None
 
 
+def part_of(picture: Any, renderer: Any) -> Any:
+    """Return the part of a window's picture that a renderer has drawn."""
+    left, bottom, right, top = renderer.GetViewport()
+    height, width = picture.shape[:2]
+    rows = slice(round(height * (1 - top)), round(height * (1 - bottom)))
+    return picture[rows, round(width * left) : round(width * right)]
+
+
 def png(pixels: NDArray[np.uint8]) -> str:
     """Return an image, uint8 (H, W, 3) or (H, W, 4), as base64 PNG."""
     from PIL import Image

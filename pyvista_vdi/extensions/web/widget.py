@@ -11,10 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, MissingDependencyError
+from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
-from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
+from pyvista_vdi.extensions.web.camera import MOST_PLANES, camera_of, viewer_camera
 from pyvista_vdi.extensions.web.page import check_controls
+from pyvista_vdi.extensions.web.placing import encoded_many
 from pyvista_vdi.extensions.web.still import picture, stand_in, still
 from pyvista_vdi.io import write_png
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
@@ -60,6 +63,21 @@ function render({ model, el }) {
   const onCamera = () => {
     told = told || requestAnimationFrame(tellCamera);
   };
+  let timed = false; // whether there is a series, which begins at the kernel's time
+  const takeTime = () => {
+    const time = model.get("time");
+    if (timed && time !== null && viewer.time !== time) viewer.time = time;
+  };
+  const onStep = () => {
+    if (timed) return;
+    timed = true;
+    takeTime();
+  };
+  const tellTime = ({ detail }) => { // of a step that stays
+    if (!timed || !detail.full || viewer.playing || viewer.time === model.get("time")) return;
+    model.set("time", viewer.time);
+    model.save_changes();
+  };
   const takeBackground = () => {
     viewer.background = model.get("_gradient") || (model.get("background") ?? "transparent");
   };
@@ -77,7 +95,9 @@ function render({ model, el }) {
     if (packed?.byteLength) viewer.scene = new Scene(bytesOf(packed));
   };
   const takeFile = () => {
-    viewer.showBytes(bytesOf(model.get("_file"))).catch(() => {}); // the viewer says what is wrong
+    const file = bytesOf(model.get("_file")); // of a subplot without VDIs there is none
+    timed = false;
+    if (file.length) viewer.showBytes(file).catch(() => {}); // the viewer says what is wrong
   };
   el.replaceChildren(viewer);
   const key = model.get("_key"); // what stands in for the viewer has it, too: still.py
@@ -85,13 +105,20 @@ function render({ model, el }) {
   document.querySelectorAll(`img[data-vdi="${key}"]`).forEach((picture) => picture.remove());
   const taken = {
     background: takeBackground, _gradient: takeBackground, clipping_planes: takePlanes,
-    controls: takeControls, _scene: takeScene, _file: takeFile, camera: takeCamera,
+    controls: takeControls, _scene: takeScene, _file: takeFile, camera: takeCamera, time: takeTime,
   };
   for (const [name, take] of Object.entries(taken)) {
     take();
     model.on(`change:${name}`, take);
   }
   viewer.addEventListener("camerachange", onCamera);
+  viewer.addEventListener("vditime", onStep);
+  viewer.addEventListener("framedrawn", tellTime);
+  const link = model.get("_link");
+  if (link) {
+    viewer.dataset.link = link;
+    turnTogether(viewer);
+  }
   return () => {
     cancelAnimationFrame(told);
     for (const [name, take] of Object.entries(taken)) model.off(`change:${name}`, take);
@@ -130,7 +157,7 @@ class _PlanesTrait(traitlets.TraitType[list[list[float]], Any]):
 
 
 class VDIWidget(anywidget.AnyWidget):
-    """A VDI in a notebook's output, turned in the browser.
+    """A VDI, a series or a set in a notebook's output, turned in the browser, where it plays.
 
     Its camera is one with the browser's: what is turned there is read here in another cell, and
     what is set here is seen there. Nothing is fetched from elsewhere: viewer and VDI are in the
@@ -139,16 +166,17 @@ class VDIWidget(anywidget.AnyWidget):
 
     Parameters
     ----------
-    vdi : VDI or vtkImageData
-        What to show, or its VTK form (``pyvista.read("x.vdi")``).
+    vdi : VDI, VDISeries, VDISet or vtkImageData
+        What to show, or a VDI's VTK form (``pyvista.read("x.vdi")``). All of a series or a set is
+        sent to the browser.
     camera : Camera or pyvista.Camera or vtkCamera or dict, optional
         The first view; by default the VDI's own.
     background : str or (float, float, float), optional
         ``"white"``, ``"#204060"`` or RGB from 0 to 1; by default the page shows through.
     precision : {"8-byte", "16-byte", "exact"}, optional
-        What a supersegment takes on its way to the browser, see
+        What a supersegment of a VDI takes on its way to the browser, see
         :meth:`pyvista_vdi.VDI.with_precision`; by default 8 bytes, or what it has where lists are
-        too long for that.
+        too long for that. Series and sets take 8 bytes.
     controls : {"all", "none"}
         Whether there is a bar of buttons over the picture, which fades.
 
@@ -164,6 +192,9 @@ class VDIWidget(anywidget.AnyWidget):
     clipping_planes : list of list of float
         Origin and normal of each plane, world coordinates; the side that the normal points to is
         kept. Anything of the shape (k, 6) can be set, or ``None``. A traitlet.
+    time : float or None
+        Of a series the time that is shown: that of the step at which it was paused in the browser,
+        and the nearest to what is set here. A traitlet.
     controls : str
         As the argument. A traitlet.
 
@@ -179,12 +210,14 @@ class VDIWidget(anywidget.AnyWidget):
     >>> widget  # doctest: +SKIP
     """
 
-    _esm = viewer_script(module=True) + RENDER
+    _esm = viewer_script(series=True, module=True) + RENDER
     _file = traitlets.Bytes().tag(sync=True)
     _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
     _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
     _picture_size = traitlets.List(traitlets.Int(), [1, 1]).tag(sync=True)
     _key = traitlets.Unicode("").tag(sync=True)
+    _link = traitlets.Unicode("").tag(sync=True)  # of those that turn together
+    time = traitlets.Float(None, allow_none=True).tag(sync=True)
     camera = _CameraTrait(allow_none=False).tag(sync=True)
     background = _ColorTrait(None, allow_none=True).tag(sync=True)
     clipping_planes = _PlanesTrait([]).tag(sync=True)
@@ -201,26 +234,29 @@ class VDIWidget(anywidget.AnyWidget):
     ) -> None:
         check_controls(controls)
         self._precision = precision
-        self._vdi = as_vdi(vdi)
+        self._vdi = shown = self._accept(vdi)
         super().__init__(
-            _file=self._encoded(self._vdi),
-            _picture_size=list(self._vdi.picture_size),
+            _file=self._encoded(shown),
+            _picture_size=_size_of(shown),
             _key=secrets.token_hex(8),
-            camera=self._vdi.camera if camera is None else camera,
+            camera=shown.camera if camera is None else camera,
+            time=shown.times[0] if isinstance(shown, VDISeries) else None,
             background=background,
             controls=controls,
         )
 
     @property
-    def vdi(self) -> VDI:
-        """What is shown. Another one that is set takes its place whole; the camera stays."""
+    def vdi(self) -> Any:
+        """The VDI, series or set that is shown; another takes its place whole, the camera stays."""
         return self._vdi
 
     @vdi.setter
     def vdi(self, vdi: Any) -> None:
-        vdi = as_vdi(vdi)
-        self._file = self._encoded(vdi, coarse=False)  # the one before is better meanwhile
-        self._vdi = vdi
+        shown = self._accept(vdi)
+        self._file = self._encoded(shown, coarse=False)  # the one before is better meanwhile
+        self._vdi = shown
+        series = isinstance(shown, VDISeries)
+        self.time = shown.times[shown.nearest(self.time or 0.0)] if series else None
 
     def screenshot(
         self,
@@ -252,7 +288,7 @@ class VDIWidget(anywidget.AnyWidget):
             If the file cannot be written.
         """
         background = _rgb(self.background)
-        pixels = picture(self.vdi, self.camera, window_size, background, self.clipping_planes)
+        pixels = picture(self._now(), self.camera, window_size, background, self.clipping_planes)
         if filename is not None:
             write_png(pixels, filename)
         return pixels
@@ -260,7 +296,24 @@ class VDIWidget(anywidget.AnyWidget):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vdi!r})"
 
-    def _encoded(self, vdi: VDI, *, coarse: bool = True) -> bytes:
+    def _accept(self, vdi: Any) -> Any:
+        """Return what can be shown, or raise InvalidVDIError."""
+        return vdi if isinstance(vdi, VDISeries | VDISet) else as_vdi(vdi)
+
+    def _now(self) -> VDI:
+        """Return the VDI that is seen: of a series the present step, of a set the nearest one."""
+        shown = self._vdi
+        if shown is None:
+            raise InvalidVDIError("there is no VDI here: plotter.screenshot() is the picture")
+        if isinstance(shown, VDISeries):
+            return shown[shown.nearest(shown.times[0] if self.time is None else self.time)]
+        return shown[shown.nearest(camera_of(self.camera))] if isinstance(shown, VDISet) else shown
+
+    def _encoded(self, vdi: Any, *, coarse: bool = True) -> bytes:
+        if vdi is None:
+            return b""
+        if not isinstance(vdi, VDI):
+            return encoded_many(vdi)[0]
         fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
         sent = vdi.with_precision(self._precision or "8-byte") if fits else vdi
         stream = io.BytesIO()
@@ -279,7 +332,13 @@ class VDIWidget(anywidget.AnyWidget):
 
     def _still(self) -> str | None:
         """Return that picture as base64 PNG, if it can be had."""
-        return still(self.vdi, self.camera, _rgb(self.background), self.clipping_planes)
+        return still(self._now(), self.camera, _rgb(self.background), self.clipping_planes)
+
+
+def _size_of(shown: Any) -> list[int]:
+    """Return width and height of what the viewer is made for."""
+    first = shown[0] if isinstance(shown, VDISeries) else shown
+    return [1, 1] if first is None else list(first.picture_size)
 
 
 def _hex(color: Any) -> str:

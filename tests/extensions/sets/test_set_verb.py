@@ -75,6 +75,8 @@ def test_it_is_converted(saved, capsys, tmp_path):
     again = tmp_path / "b.vdiset"
     run(capsys, "convert", saved, "-o", again, "--compression", "deflate")
     assert all(one.equals(two) for one, two in zip(pvdi.read(again), vdis, strict=True))
+    run(capsys, "convert", saved, "-o", tmp_path / "a.html")
+    assert len(pvdi.read(tmp_path / "a.html")) == len(vdis)
     assert f"{len(vdis)} files" in run(capsys, "convert", saved, "-o", tmp_path / "v.vdi")
     assert pvdi.read(tmp_path / "v_0001.vdi").equals(vdis[1])
 

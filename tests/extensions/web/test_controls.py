@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browsers import file_of, picture
+from browsers import picture
 from PIL import Image
-from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.extensions.web.page import page as page_of
 from pyvista_vdi.extensions.web.placing import thinned
-from pyvista_vdi.model.standard_cases import filling_camera
 
 #: Of pictures that are compared, and of viewers: large enough for a bar.
 SIZE, ROOM = (161, 91), (420, 340)
@@ -38,18 +36,6 @@ FOCUSED = """(() => {
   const at = viewer.shadowRoot.activeElement;
   return at && (at.getAttribute("aria-label") ?? at.closest("label")?.textContent ?? "");
 })()"""
-
-
-@pytest.fixture(scope="module")
-def vdi(default_runtime):
-    volume = soft_ball()
-    camera = filling_camera(volume.bounds, SIZE)
-    return pvdi.generate(volume, camera, SIZE, cmap="viridis", clim=(0, 1))
-
-
-@pytest.fixture(scope="module")
-def data(vdi):
-    return file_of(vdi)
 
 
 @pytest.fixture

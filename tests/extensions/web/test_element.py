@@ -5,13 +5,11 @@ from io import BytesIO
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import COUNTING, file_of, in_base64
-from plugin_scenes import soft_ball
+from browsers import COUNTING, in_base64
 from rewriting import described
 from skimage.io import imread
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.model.standard_cases import filling_camera
 
 #: Odd, so that no ray of a smaller picture runs along a border of lists.
 SIZE = (161, 91)
@@ -25,18 +23,6 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
   return kind === "webgl2" ? null : getContext.call(this, kind, ...rest);
 };
 """
-
-
-@pytest.fixture(scope="module")
-def vdi(default_runtime):
-    volume = soft_ball()
-    camera = filling_camera(volume.bounds, SIZE)
-    return pvdi.generate(volume, camera, SIZE, cmap="viridis", clim=(0, 1))
-
-
-@pytest.fixture(scope="module")
-def data(vdi):
-    return file_of(vdi)
 
 
 @pytest.fixture

@@ -20,13 +20,6 @@ console.info = (text) => infos.push(text);
 SETTLED = "viewer.ready.then(() => new Promise((next) => setTimeout(next, 500)))"
 
 
-@pytest.fixture(scope="module")
-def vdi(default_runtime):
-    volume = soft_ball()
-    camera = filling_camera(volume.bounds, SIZE)
-    return pvdi.generate(volume, camera, SIZE, cmap="viridis", clim=(0, 1))
-
-
 @pytest.fixture
 def address(vdi, tmp_path):
     (tmp_path / "a.html").write_bytes(page_of(vdi))

@@ -20,6 +20,7 @@ from web_client import soft_ball
 import pyvista_vdi as pvdi
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.extensions.web.notebook import mime_bundle, show_plotter
+from pyvista_vdi.extensions.web.placing import thinned
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 anywidget = pytest.importorskip("anywidget", reason="needs the extra notebook")
@@ -301,18 +302,14 @@ def test_what_the_viewer_leaves_out_is_named(plotter):
 def test_a_viewer_keeps_its_subplot(linked):
     """Whichever is active later; others turn with it if they are linked."""
     plotter = pv.Plotter(shape=(1, 2), off_screen=True, window_size=SIZE, notebook=True)
-    widgets = []
     for k, color in enumerate(("navy", "white")):
         plotter.subplot(0, k)
         plotter.set_background(color, all_renderers=False)
         add_ball(plotter)
     if linked:
         plotter.link_views()
-    plotter.screenshot()
-    for k in range(2):
-        plotter.subplot(0, k)
-        with pytest.warns(UserWarning, match="without the other subplots"):
-            widgets.append(show_plotter(plotter))
+    widgets = show(plotter).children
+    assert (widgets[0]._link == widgets[1]._link) == linked
     before = widgets[1].camera
     turned = viewer_camera(pvdi.Camera((9, 1, 1), (1, 1, 1), (0, 1, 0), view_angle=20))
     widgets[0].set_state({"camera": turned})
@@ -325,17 +322,48 @@ def test_a_viewer_keeps_its_subplot(linked):
     plotter.close()
 
 
+@pytest.fixture(scope="module")
+def series(vdi):
+    dense = thinned(vdi, 4.0)
+    return pvdi.VDISeries.of([vdi.with_precision("8-byte"), dense], [0.0, 1.5])
+
+
+def test_series_and_sets_are_sent_whole(series, vdi, tmp_path):
+    made = pvdi.VDISet.of([vdi, pvdi.generate(BALL, vdi.camera.azimuth(90), SIZE, cmap="bone")])
+    for shown, suffix in ((series, ".vdis"), (made, ".vdiset")):
+        data, _ = shown._repr_mimebundle_()
+        assert WIDGET_VIEW in data
+        assert data["text/plain"] == repr(shown)
+        widget = VDIWidget(shown)
+        (tmp_path / f"sent{suffix}").write_bytes(bytes(widget._file))
+        again = pvdi.read(tmp_path / f"sent{suffix}")
+        sent = [each.with_precision("8-byte") for each in shown]
+        assert all(one.equals(two) for one, two in zip(again, sent, strict=True))
+    turned = vdi.camera.azimuth(80)
+    widget.camera = turned
+    expected = pvdi.render(made[1], turned, SIZE)
+    assert np.abs(widget.screenshot()[..., 3] / 255 - expected[..., 3]).max() <= 1 / 255
+
+
 @pytest.mark.gl
-def test_a_series_in_a_notebook_is_said_to_be_one_step(plotter, vdi):
-    series = pvdi.VDISeries.of([vdi, vdi.with_precision("8-byte")], [0.0, 1.5])
+def test_a_plotter_s_series_plays_and_has_the_plotter_s_time(plotter, series):
     actor = plotter.add_vdi(series, name="of two", show_scalar_bar=False)
-    plotter.screenshot()
-    words = r"one of the 2 steps of a series \(of two\).*actor.time.*plotter.vdi.export_html"
-    with pytest.warns(UserWarning, match=words):
-        widget = show_plotter(plotter)
+    widget = show(plotter)
+    assert (widget.vdi, widget.time) == (series, 0.0)
+    file = widget._file
     actor.time = 1.5
     plotter.render()
-    assert widget.vdi is series[1]
+    assert widget.time == 1.5
+    widget.set_state({"time": 0.0})  # somebody has paused it there
+    assert actor.time == 0
+    assert widget._file is file
+    actor.opacity_multiplier = 0.5
+    plotter.render()
+    assert widget._file != file
+    assert (widget.time, actor.time) == (0, 0)
+    plotter.add_vdi(pvdi.VDISeries.of(list(series), [0, 1]), name="another", show_scalar_bar=False)
+    with pytest.warns(UserWarning, match=r"without all but one of the 2 steps .*\(another\)"):
+        show_plotter(plotter)
 
 
 @pytest.mark.gl
@@ -536,6 +564,43 @@ def test_the_view_shows_a_plotter_s_scene_and_another_in_its_place(open_widget, 
         [list(binaries(widget))[1], in_base64(scene_of(widget))],
     )
     assert not is_red(picture(page, SIZE, "viewers[0]")).any()
+
+
+@pytest.mark.gl
+def test_subplots_are_where_they_are_in_the_window(open_widget):
+    """One without a VDI as well; what spans two rows spans both."""
+    plotter = pv.Plotter(shape="1|2", off_screen=True, window_size=SIZE, notebook=True)
+    plotter.subplot(0)
+    add_ball(plotter)
+    plotter.subplot(1)
+    plotter.add_mesh(pv.Sphere(), color="red")
+    grid = show(plotter)
+    places = [(one.layout.grid_column, one.layout.grid_row) for one in grid.children]
+    assert places == [("1 / 2", "1 / 3"), ("2 / 3", "1 / 2"), ("2 / 3", "2 / 3")]
+    assert [one.vdi is None for one in grid.children] == [False, True, True]
+    with pytest.raises(pvdi.InvalidVDIError, match="there is no VDI here"):
+        grid.children[1].screenshot()
+    np.testing.assert_array_equal(png(grid._repr_mimebundle_()), plotter.screenshot())
+    page = open_widget(grid.children[1])
+    assert picture(page, (48, 32), "viewers[0]")[16, 24, 0] > 100
+    plotter.close()
+
+
+def test_a_series_in_a_notebook_has_one_time(open_widget, series):
+    widget = VDIWidget(series)
+    assert widget.time == 0
+    first = widget.screenshot()
+    widget.time = 1.4
+    assert np.abs(widget.screenshot() - first.astype(float)).max() > 20
+    page = open_widget(widget)
+    page.wait_for("viewers.every(({ time }) => time === 1.5) && model.get('time') === 1.5")
+    seen = picture(page, SIZE, "viewers[0]") / 255
+    assert (
+        np.abs(seen - pvdi.render(series[1].with_precision("8-byte"), series.camera)).max()
+        <= 2 / 255
+    )
+    page.evaluate("viewers[0].time = 0")
+    page.wait_for("model.get('time') === 0 && viewers[1].time === 0")
 
 
 #: As nbconvert writes outputs: what an output's script does, and then the view, or the picture.

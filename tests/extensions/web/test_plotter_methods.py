@@ -12,8 +12,8 @@ from PIL import Image
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.web.scenes.export import part_of
 from pyvista_vdi.extensions.web.scenes.scene import scene_of
+from pyvista_vdi.extensions.web.still import part_of
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 slow = pytest.mark.slow

@@ -77,6 +77,22 @@ def test_each_view_is_drawn_by_the_vdi_nearest_to_it(vdis, turning):
         page.evaluate("viewer.play()")
 
 
+def test_a_page_from_disk_has_the_set_in_it(vdis, path, open_page, tmp_path):
+    page = pvdi.read(path).save(tmp_path / "lumps.html", title="Lumps", background=(1, 1, 1))
+    again = pvdi.read(page)
+    assert isinstance(again, pvdi.VDISet)
+    assert all(one.equals(other) for one, other in zip(again, vdis, strict=True))
+    assert again.camera == vdis.camera
+    shown = open_page(url=page.as_uri())
+    shown.ready()
+    shown.wait_for("viewer.set.length === 14")  # the rest is read behind the first
+    for view in [vdis.camera, vdis.camera.azimuth(100)]:
+        shown.assert_shows(vdis, SIZE, view)
+    with pytest.raises(pvdi.InvalidArgumentError, match="controls"):
+        pvdi.read(path).save(tmp_path / "b.html", controls="some")
+    assert [each.name for each in tmp_path.iterdir()] == ["lumps.html"]
+
+
 @pytest.mark.slow
 def test_views_are_fetched_as_it_turns(vdis, data, turning):
     page = turning(in_parts=("lumps.vdiset",))

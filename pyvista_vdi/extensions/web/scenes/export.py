@@ -9,14 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import warn_external
-from pyvista_vdi.extensions.series.series import Called
-from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
-from pyvista_vdi.extensions.series.steps_writer import write_all as write_series
-from pyvista_vdi.extensions.sets.files import write_all as write_set
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.page import View, assembled, check_controls, in_parts
-from pyvista_vdi.extensions.web.placing import thinned
+from pyvista_vdi.extensions.web.placing import encoded_many, several_of
 from pyvista_vdi.extensions.web.scenes.scene import css, scene_of
+from pyvista_vdi.extensions.web.still import part_of
 from pyvista_vdi.model.whole_file import whole_file
 
 
@@ -37,7 +33,7 @@ def export_html(
     for renderer, camera in zip(plotter.renderers, cameras, strict=True):
         scene = scene_of(renderer, renderer.actors, needs_vdi=False)
         left_out += scene.left_out
-        left_out += [f"all but one of {what}" for what in several_of(renderer, scene.actors[1:])]
+        left_out += [f"all but one of {what}" for what in not_played(renderer, scene.actors)]
         series = [] if scene.actor is None else _series_of(scene.actor)
         view = View(
             None if series or scene.vdi is None else scene.vdi.with_precision("8-byte"),
@@ -67,12 +63,12 @@ def export_html(
     return None
 
 
-def several_of(renderer: Any, actors: Sequence[Any]) -> list[str]:
-    """Name the series and sets that actors show one VDI of."""
+def not_played(renderer: Any, actors: Sequence[Any]) -> list[str]:
+    """Name the series and sets of which one VDI is shown: all but the first actor's."""
     called = {actor: name for name, actor in renderer.actors.items() if "(Addr" not in name}
     return [
         f"the {len(shown)} {kind} ({called.get(actor, type(actor).__name__)})"
-        for actor in actors
+        for actor in actors[1:]
         for shown, kind in ((actor.series, "steps of a series"), (actor.vdi_set, "VDIs of a set"))
         if shown is not None
     ]
@@ -80,19 +76,8 @@ def several_of(renderer: Any, actors: Sequence[Any]) -> list[str]:
 
 def _series_of(actor: Any) -> list[bytes]:
     """Return the series or the set that an actor shows as a page holds it; none of one VDI."""
-    series, stream = actor.series, io.BytesIO()
-    shown = actor.vdi_set if series is None else series
-    if shown is None:
-        return []
-    vdis = Called(lambda i: thinned(shown[i], actor.opacity_multiplier), range(len(shown)))
-    if series is None:
-        size, bounds = shown.window_size, shown.bounds
-        same = VDISet(vdis, shown.cameras, window_size=size, bounds=bounds, about=shown.about)
-        cut = write_set(stream, StepsWriter("8-byte", 0.0, 1, "zstd", None), same)
-    else:
-        writer = StepsWriter("8-byte", 0.0, KEY_EVERY, "zstd", None)
-        cut = write_series(stream, writer, vdis, series.times, None)
-    return in_parts(stream.getvalue(), cut)
+    shown = several_of(actor)
+    return [] if shown is None else in_parts(*encoded_many(shown))
 
 
 def drawn(plotter: Any) -> Any:
@@ -114,14 +99,6 @@ def drawn(plotter: Any) -> Any:
             window.SetOffScreenRendering(0)
 
 
-def part_of(picture: Any, renderer: Any) -> Any:
-    """Return the part of a window's picture that a renderer has drawn."""
-    left, bottom, right, top = renderer.GetViewport()
-    height, width = picture.shape[:2]
-    rows = slice(round(height * (1 - top)), round(height * (1 - bottom)))
-    return picture[rows, round(width * left) : round(width * right)]
-
-
 def _placed(renderer: Any) -> str:
     """Return where a renderer is in its window, as CSS."""
     left, bottom, right, top = (f"{100 * edge:g}%" for edge in renderer.GetViewport())
@@ -137,9 +114,3 @@ def _border(plotter: Any) -> str:
         return ""
     color = css(framed[0].border_color.float_rgb)
     return f"; outline: {framed[0].border_width / 2:g}px solid {color}"
-
-
-def around(plotter: Any) -> list[str]:
-    """Name what a plotter shows beside its active renderer."""
-    others = [r for r in plotter.renderers if r is not plotter.renderer]
-    return ["the other subplots"] * any(r.GetViewProps().GetNumberOfItems() for r in others)

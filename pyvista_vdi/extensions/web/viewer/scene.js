@@ -732,21 +732,22 @@ export function embeddedScene(viewer) {
   return new Scene(Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0)));
 }
 
-// Views with the same link turn together, as those of a plotter do.
+/** Have the views with the same `data-link` turn with one, as those of a plotter do. */
+export function turnTogether(viewer) {
+  viewer.addEventListener("camerachange", ({ detail }) => {
+    const text = JSON.stringify(detail.camera);
+    for (const other of document.querySelectorAll(`vdi-viewer[data-link="${viewer.dataset.link}"]`)) {
+      if (JSON.stringify(other.camera) !== text) other.camera = detail.camera;
+    }
+  });
+}
+
 function takeEmbedded() {
   for (const viewer of document.querySelectorAll("vdi-viewer")) {
     const scene = viewer.scene ? null : embeddedScene(viewer);
     if (!scene) continue;
     viewer.scene = scene;
-    const { link } = viewer.dataset;
-    if (link) {
-      viewer.addEventListener("camerachange", ({ detail }) => {
-        const text = JSON.stringify(detail.camera);
-        for (const other of document.querySelectorAll(`vdi-viewer[data-link="${link}"]`)) {
-          if (JSON.stringify(other.camera) !== text) other.camera = detail.camera;
-        }
-      });
-    }
+    if (viewer.dataset.link) turnTogether(viewer);
   }
 }
 
