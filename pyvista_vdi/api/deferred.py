@@ -31,6 +31,7 @@ def classified(deferred: DeferredVDI, look: Mapping[str, Any]) -> VDI:
                 "and leave it out here"
             )
     # The range of the values stands for those of the volume
-    values: Any = SimpleNamespace(array=np.array(deferred.value_range), rgba=False)
+    ends = deferred.value_range
+    values: Any = SimpleNamespace(array=np.array(ends), rgba=False, finite_range=lambda: ends)
     table = asked.transfer_function_of(values)
     return classify_on_device(deferred, table, look.get("device"))

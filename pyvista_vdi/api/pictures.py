@@ -156,7 +156,7 @@ def render(
 
 
 def render_depth(
-    vdi: Shown,
+    vdi: Shown | DeferredVDI,
     camera: CameraLike,
     window_size: WindowSize | None = None,
     *,
@@ -168,6 +168,7 @@ def render_depth(
     opacity_multiplier: float = 1.0,
     skip_empty: bool = True,
     device: DeviceLike | None = None,
+    **look: Any,
 ) -> NDArray[np.float32]:
     """Raycast a VDI for where it begins to be seen: :func:`pick` for every pixel of a view.
 
@@ -194,6 +195,10 @@ def render_depth(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
+    if isinstance(vdi, DeferredVDI) and look:
+        vdi = vdi.classified(**look, device=device)
+    else:
+        refuse_keywords(look, render_depth)
     seen = _seen(vdi, view)
     options = RenderOptions.checked(clipping_planes, cropping, opacity_multiplier, skip_empty)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size
@@ -204,7 +209,7 @@ def render_depth(
 
 
 def pick(
-    vdi: Shown,
+    vdi: Shown | DeferredVDI,
     camera: CameraLike,
     pixel: Sequence[float],
     window_size: WindowSize | None = None,
@@ -215,13 +220,15 @@ def pick(
     clipping_planes: ArrayLike | None = None,
     cropping: CroppingLike | None = None,
     opacity_multiplier: float = 1.0,
+    **look: Any,
 ) -> Pick | None:
     """Return what a pixel shows of a VDI: the first supersegment that reaches an opacity.
 
     Parameters
     ----------
     vdi : VDI or VDISet or vtkImageData
-        As for :func:`render`; of a set the hit is one of the VDI nearest to the view.
+        As for :func:`render`; of a set the hit is one of the VDI nearest to the view. Of a
+        :class:`DeferredVDI`, with the words of its look, the hit has a value.
     camera : pyvista.Camera or vtkCamera or Camera
         The view. Its model transform places the VDI's model frame in the world.
     pixel : (float, float)
@@ -258,13 +265,18 @@ def pick(
     A single ray, walked in float64 on the host: no device is needed.
     """
     view = Camera.from_any(camera)
+    kept = vdi if isinstance(vdi, DeferredVDI) else None
+    if kept is not None and look:
+        vdi = kept.classified(**look)
+    else:
+        refuse_keywords(look, pick)
     seen = _seen(vdi, view)
     options = RenderOptions.checked(clipping_planes, cropping, opacity_multiplier)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size
     from pyvista_vdi.raycasting.picking import pick_vdi
 
     request = FrameRequest(view, size, options, opaque_depth)
-    return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated))
+    return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated), kept)
 
 
 def render_volume(

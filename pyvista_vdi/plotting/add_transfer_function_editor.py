@@ -11,6 +11,7 @@ import pyvista.plotting  # whole: pv.Plotter is missing while another thread imp
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import ColorMapLike
 from pyvista_vdi.plotting.classify import Looks
 from pyvista_vdi.plotting.registration import Component
@@ -57,11 +58,13 @@ class AddTransferFunctionEditor(Component):
         Parameters
         ----------
         actor : pyvista.Volume or vtkVolume
-            Of ``add_volume``, or of ``add_vdi`` with a volume. Its property is what is edited,
-            and what is shown: changes from elsewhere are in the editor with the next frame.
+            Of ``add_volume``, or of ``add_vdi`` with a volume or a :class:`DeferredVDI`. Its
+            property is what is edited, and what is shown: changes from elsewhere are in the editor
+            with the next frame.
         histogram : (array_like, array_like) or False, optional
             Counts of the values and the edges between them, as ``numpy.histogram`` returns; by
-            default those of the actor's volume, counted once. ``False``: none.
+            default those of the actor's volume, counted once; of a deferred VDI the lengths that
+            have them. ``False``: none.
         cmap : list of colour maps
             What ``c`` goes through.
         color : ColorLike, optional
@@ -79,7 +82,7 @@ class AddTransferFunctionEditor(Component):
         ------
         UnsupportedError
             If there is nothing to edit: RGBA brings its colours, and so does a VDI without its
-            volume.
+            volume, unless it is a deferred one.
         InvalidArgumentError
             If the actor is no volume of this plotter, or another argument cannot be used.
 
@@ -106,16 +109,20 @@ class AddTransferFunctionEditor(Component):
                 "the volume's scalars are RGBA, which bring their colours: there is no transfer "
                 "function to edit"
             )
-        if isinstance(actor.GetMapper(), VDIMapperMethods) and not actor.GetMapper().GetSource():
+        mapper = actor.GetMapper()
+        shown = mapper.driver.input if isinstance(mapper, VDIMapperMethods) else None
+        kept = None if shown is None else shown.deferred
+        if isinstance(mapper, VDIMapperMethods) and not mapper.GetSource() and kept is None:
             raise UnsupportedError(
                 "this is a VDI without its volume, whose colours were fixed when it was generated: "
-                "add the volume (add_vdi(volume)) to edit its transfer function"
+                "add the volume (add_vdi(volume)), or a VDI of classification='deferred', to edit "
+                "its transfer function"
             )
         cmaps = [cmap] if isinstance(cmap, str) else [*cmap]
         for each in cmaps:
             Looks(cmap=each, clim=(0, 1)).lookup_table(np.empty(0))  # refused by name
         if histogram is None:
-            histogram = _histogram(_values(actor))
+            histogram = _histogram(_values(actor)) if kept is None else _lengths(kept)
         elif histogram is not False:
             counts, edges = (np.asarray(each, dtype=float) for each in histogram)
             if counts.ndim != 1 or edges.shape != (len(counts) + 1,) or (np.diff(edges) <= 0).any():
@@ -202,3 +209,21 @@ def _histogram(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]] | None
         numbers = int(high - low) + 1
         bars = max(1, numbers // -(-numbers // _BARS))
     return np.histogram(values, bars, (low, high) if low < high else (low - 0.5, low + 0.5))
+
+
+def _lengths(kept: DeferredVDI) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the length that has each value, in steps: spreads are those of even values."""
+    edges = np.linspace(0, 1, _BARS + 1)
+    mean, reach = kept.mean.astype(float), np.sqrt(3) * kept.spread.astype(float)
+    low = np.maximum(mean - reach, 0)
+    high = np.maximum(np.minimum(mean + reach, 1), low + 0.5 / _BARS)
+    density = kept.steps / (high - low)
+    # What is below a value: a ramp for each supersegment, which begins and ends within some bar
+    below = np.zeros(_BARS + 1)
+    for sign, ends in ((1, low), (-1, high)):
+        bar = np.minimum((ends * _BARS).astype(int) + 1, _BARS)  # the first edge that is above
+        slope, rest = (
+            np.cumsum(np.bincount(bar, weights, _BARS + 1)) for weights in (density, density * ends)
+        )
+        below += sign * (slope * edges - rest)
+    return np.maximum(np.diff(below), 0), np.interp(edges, (0, 1), kept.value_range)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, as_float, as_range
 from pyvista_vdi.model.compositing import opacity
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 
@@ -53,6 +54,8 @@ class Pick:
         tau of the length of it that the ray crosses.
     accumulated_optical_depth : float
         tau of the ray from its beginning up to where it leaves the supersegment.
+    value : float, optional
+        Mean of the values that it holds, where the VDI keeps them (:class:`DeferredVDI`).
     """
 
     position: tuple[float, float, float]
@@ -63,6 +66,7 @@ class Pick:
     color: tuple[float, float, float]
     optical_depth: float
     accumulated_optical_depth: float
+    value: float | None = None
 
     @property
     def opacity(self) -> float:
@@ -105,10 +109,17 @@ def checked_opacity(opacity_threshold: float) -> float:
     return threshold
 
 
-def pick_vdi(vdi: VDI, request: FrameRequest, pixel: Sequence[float], hit: FirstHit) -> Pick | None:
+def pick_vdi(
+    vdi: VDI,
+    request: FrameRequest,
+    pixel: Sequence[float],
+    hit: FirstHit,
+    deferred: DeferredVDI | None = None,
+) -> Pick | None:
     """Return the first supersegment on a pixel's ray that is hit: see :func:`pyvista_vdi.pick`.
 
-    The request's ``opaque_depth`` is that of this ray, a number.
+    The request's ``opaque_depth`` is that of this ray, a number. ``deferred``: what the VDI
+    was classified from.
     """
     if not isinstance(vdi, VDI):
         raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
@@ -137,6 +148,11 @@ def pick_vdi(vdi: VDI, request: FrameRequest, pixel: Sequence[float], hit: First
         color=_triple(vdi.color[supersegment]),
         optical_depth=float(met.optical_depth[k]),
         accumulated_optical_depth=float(met.optical_depth[: k + 1].sum()),
+        value=(
+            None
+            if deferred is None
+            else _value(deferred, int(met.list[k]), vdi.front[supersegment])
+        ),
     )
 
 
@@ -299,3 +315,11 @@ def _checked_pixel(pixel: Sequence[float], size: tuple[int, int]) -> tuple[float
 def _triple(values: ArrayLike) -> tuple[float, float, float]:
     x, y, z = np.asarray(values, dtype=np.float64).tolist()
     return x, y, z
+
+
+def _value(deferred: DeferredVDI, number: int, front: Any) -> float:
+    """Return the mean of the supersegment of a list that begins there: it has those left out."""
+    begin, end = map(int, deferred.offsets[number : number + 2])
+    place = begin + int(np.argmin(np.abs(deferred.front[begin:end] - front)))
+    low, high = deferred.value_range
+    return low + (high - low) * float(deferred.mean[place])

@@ -9,6 +9,7 @@ from plugin_scenes import LOOKS, soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.plotting.add_transfer_function_editor import _lengths
 from pyvista_vdi.plotting.edited_property import rows_of, simplified
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
 
@@ -459,3 +460,43 @@ def test_many_nodes_are_shown_by_few_points_near_the_curve():
         assert np.abs(np.interp(x, few[:, 0], few[:, 1]) - y).max() <= 0.01
         assert {*few[:, 0]} <= {*x}
     np.testing.assert_array_equal(simplified(rows[:20]), rows[:20])
+
+
+@pytest.fixture
+def kept(plotter):
+    """A deferred VDI of the ball, for the plotter's view."""
+    plotter.camera_position = [(0, 0, 5), (0, 0, 0), (0, 1, 0)]
+    ball = soft_ball()
+    size, camera = tuple(plotter.window_size), pvdi.Camera.from_any(plotter.camera)
+    return pvdi.generate(ball, camera, size, classification="deferred", value_range=(20, 220))
+
+
+def test_drags_classify_a_deferred_vdi_anew_and_nothing_is_generated(plotter, kept, monkeypatch):
+    actor = plotter.add_vdi(kept, cmap="bone", opacity=[0, 0.3], show_scalar_bar=False)
+    editor = plotter.add_transfer_function_editor(actor, size=(0.8, 0.6))
+    plotter.show(auto_close=False)
+    editor.points = [[20, 0], [120, 0.2], [220, 0.5]]
+    hand, before = Hand(plotter, editor), picture(plotter)
+    monkeypatch.setattr("pyvista_vdi.generation.deferred.generate_vdi", None)
+    hand.drag(hand.pixel(120, 0.2), hand.pixel(110, 0.5), hand.pixel(100, 0.8))
+    assert editor.points[1] == pytest.approx([100, 0.8], abs=1.5)
+    assert functions(actor)[0][:, :2] == pytest.approx(editor.points)
+    plotter.remove_transfer_function_editor(editor)
+    shown = picture(plotter)
+    assert np.abs(shown - before).mean() > 1
+    plotter.remove_actor(actor)
+    plotter.add_vdi(kept.classified(volume_property=actor.prop), show_scalar_bar=False)
+    assert np.abs(shown - picture(plotter)).max() <= 1
+
+
+def test_the_histogram_of_a_deferred_vdi_is_of_lengths(plotter, kept):
+    actor = plotter.add_vdi(kept, cmap="bone", show_scalar_bar=False)
+    counts, edges = _lengths(kept)
+    assert (edges[0], edges[-1], len(counts)) == (20, 220, 256)
+    assert counts.sum() == pytest.approx(kept.steps.sum(), rel=1e-3)
+    reach = np.sqrt(3) * kept.spread
+    low, high = np.maximum(kept.mean - reach, 0), np.minimum(kept.mean + reach, 1)
+    below = np.clip((0.25 - low) / np.maximum(high - low, 0.5 / 256), 0, 1)
+    assert counts[:64].sum() == pytest.approx((kept.steps * below).sum(), rel=1e-3)
+    _, heights = bars(plotter.add_transfer_function_editor(actor))
+    assert heights == pytest.approx(np.repeat(np.log1p(counts) / np.log1p(counts).max(), 2))

@@ -180,3 +180,37 @@ def test_depth_image_ends_rays_of_another_picture(runtime):
     # Mostly only the haze is left before it, tau 0.02; over a list's border something solid, too
     assert alone[seen].max() < 0.5
     assert np.median(alone[seen]) == pytest.approx(0.02, abs=1e-3)
+
+
+def test_a_deferred_vdi_says_the_value_that_is_hit():
+    slabs_of_values = slabs()
+    n = slabs_of_values.n_supersegments
+    rng = np.random.default_rng(3)
+    kept = pvdi.DeferredVDI(
+        slabs_of_values.camera,
+        slabs_of_values.window_size,
+        slabs_of_values.offsets,
+        slabs_of_values.front,
+        slabs_of_values.back,
+        rng.uniform(0, 1, n),
+        np.zeros(n),
+        np.ones(n),
+        slabs_of_values.bounds,
+        value_range=(100, 300),
+        unit_distance=1.0,
+        sample_distance=0.01,
+    )
+    # What is below 200 is transparent, and left out: the lists that are shown have other numbers
+    look = pvdi.TransferFunction([[1, 1, 1]] * 3, [0, 0, 1], (100, 300))
+    values = set()
+    for x, y in np.ndindex(8, 8):
+        hit = pvdi.pick(kept, FACING, (x, y), opacity_threshold=0, transfer_function=look)
+        opaque = kept.values[kept.lists.list_at(x, y)]
+        opaque = opaque[opaque > 200]  # nearest to the eye first
+        assert (hit is None) == (len(opaque) == 0)
+        if hit is not None:
+            assert hit.value == pytest.approx(opaque[0])
+            values.add(hit.value)
+            seen = (x, y)
+    assert len(values) > 8
+    assert pvdi.pick(kept.classified(transfer_function=look), FACING, seen).value is None

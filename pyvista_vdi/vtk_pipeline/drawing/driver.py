@@ -378,7 +378,8 @@ class Driver(Deciding):
 
     def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
         """Return what of an actor's VDI a renderer shows at a place of the window, in pixels."""
-        return self._selection.pick(actor, renderer, x, y, self._first_hit)
+        kept = None if self.input is None else self.input.deferred
+        return self._selection.pick(actor, renderer, x, y, self._first_hit, kept)
 
     @property
     def _first_hit(self) -> FirstHit:

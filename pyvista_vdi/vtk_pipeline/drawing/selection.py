@@ -77,10 +77,13 @@ class Selection:
         self.texture.release()
         self._drawn = None
 
-    def pick(self, actor: Any, renderer: Any, x: float, y: float, hit: FirstHit) -> Pick | None:
+    def pick(
+        self, actor: Any, renderer: Any, x: float, y: float, hit: FirstHit, kept: Any = None
+    ) -> Pick | None:
         """Return what a renderer shows of an actor's VDI at (x, y) of the window, in pixels.
 
-        ``None`` where nothing of it is hit, or something else is in front.
+        ``None`` where nothing of it is hit, or something else is in front. ``kept``: the values
+        that it was classified from.
         """
         # VTK's hardware selection sees nothing through render passes (SSAA, eye-dome lighting ...)
         render_pass = renderer.GetPass()
@@ -102,6 +105,7 @@ class Selection:
             FrameRequest(seen.camera, seen.size, seen.options),
             (int(x) - left, int(y) - bottom),
             hit,
+            kept,
         )
         if picked is None:  # at the threshold, by rounding
             return None

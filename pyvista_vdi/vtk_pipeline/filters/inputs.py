@@ -31,6 +31,8 @@ class Input:
     collection: VDICollection | None = None
     #: What chooses among the steps of a series and plays them: see ``extensions.series.player``.
     player: Any = None
+    #: The values that the VDI is classified from; ``None`` where none are kept.
+    deferred: DeferredVDI | None = None
     #: What remedies a view that the VDI does not serve, where there is no source.
     remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
@@ -277,6 +279,8 @@ class ImageInput(Input):
 
 class DeferredInput(Input):
     """Values that a volume property classifies, anew when it has changed; no volume is needed."""
+
+    deferred: DeferredVDI
 
     def __init__(self, deferred: DeferredVDI, prop: Any) -> None:
         super().__init__()
