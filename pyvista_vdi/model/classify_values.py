@@ -1,11 +1,12 @@
 """What a transfer function makes of a deferred VDI, in float64 (docs/conventions.md).
 
-On a device: ``generation/classify_values.cl``.
+On a device: ``lib/values.cl``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,8 @@ def classify(
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
     values from mean - sqrt(3) spread to mean + sqrt(3) spread, within the range: those of values
-    that are spread evenly. ``media``: does what :func:`media_of_values` does, which is the default.
+    that are spread evenly. Its arrays are made when they are asked for, by ``media``, which does
+    what :func:`media_of_values` does, the default; a raycast asks for none.
     Errors and warnings: :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
@@ -57,49 +59,73 @@ def classify(
     with np.errstate(divide="ignore"):
         of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
     of_cells = np.column_stack([of_step[:, np.newaxis] * color, of_step])
-    straight, optical_depth = (media or media_of_values)(deferred, of_cells)
-
-    # What is transparent is left out
-    lists = deferred.lists
-    rows: Any = np.flatnonzero(optical_depth > 0)
-    offsets = lists.offsets
-    if len(rows) == len(optical_depth):
-        rows = slice(None)
-    else:
-        offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
-    return VDI(
-        lists.camera,
-        lists.window_size,
-        offsets,
-        lists.front[rows],
-        lists.back[rows],
-        straight[rows],
-        optical_depth[rows],
-        lists.bounds,
-        depth_origin=lists.depth_origin,
-        metadata={
-            **lists.metadata,
-            "opacity_unit_distance": unit,
-            "transfer_function": transfer_function.to_dict(),
-            "deferred": deferred.about,
-        },
-    )
+    metadata = {
+        **deferred.metadata,
+        "opacity_unit_distance": unit,
+        "transfer_function": transfer_function.to_dict(),
+        "deferred": deferred.about,
+    }
+    return VDI._of_values(ValuesLook(deferred, of_cells, media or media_of_values), metadata)
 
 
-def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
+@dataclass(frozen=True, eq=False)
+class ValuesLook:
+    """Values and the transfer function that a VDI shows of them.
+
+    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, float64 (CELLS,
+    4). ``media``: makes straight colours and optical depths, and may take a device for it.
+    """
+
+    deferred: DeferredVDI
+    of_cells: Floats
+    media: Callable[[DeferredVDI, Floats], Media]
+
+    @property
+    def lists(self) -> VDI:
+        """The lists of all that is kept."""
+        return self.deferred.lists
+
+    def made(self) -> VDI:
+        """Return the arrays: what is transparent is left out."""
+        straight, optical_depth = self.media(self.deferred, self.of_cells)
+        lists = self.lists
+        rows: Any = np.flatnonzero(optical_depth > 0)
+        offsets = lists.offsets
+        if len(rows) == len(optical_depth):
+            rows = slice(None)
+        else:
+            offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
+        return VDI(
+            lists.camera,
+            lists.window_size,
+            offsets,
+            lists.front[rows],
+            lists.back[rows],
+            straight[rows],
+            optical_depth[rows],
+            lists.bounds,
+            depth_origin=lists.depth_origin,
+        )
+
+    def optical_depths(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return the optical depths of some of all supersegments, float32, by float64."""
+        return media_of_values(self.deferred, self.of_cells, rows)[1]
+
+
+def media_of_values(deferred: DeferredVDI, of_cells: Floats, rows: Any = slice(None)) -> Media:
     """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
 
-    ``of_cells``: (step opacity times colour, step opacity) of cells of the range, (CELLS, 4).
+    ``of_cells``: as for :class:`ValuesLook`. ``rows``: the supersegments; all by default.
     """
     integrals = np.zeros((CELLS + 1, 4))
     np.cumsum(of_cells, axis=0, out=integrals[1:])
-    mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
+    mean, spread = (a[rows].astype(np.float64) for a in (deferred.mean, deferred.spread))
     reach = np.maximum(np.sqrt(3) * spread, 0.5 / CELLS)  # at least a cell
     first, last = (np.clip(mean + sign * reach, 0, 1) * CELLS for sign in (-1, 1))
     means = _integral(integrals, last) - _integral(integrals, first)
     means /= (last - first)[:, np.newaxis]
     of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
-    optical_depth = (-np.log1p(-of_step) * deferred.steps).astype(np.float32)
+    optical_depth = (-np.log1p(-of_step) * deferred.steps[rows]).astype(np.float32)
     straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
     return np.clip(straight, 0, 1).astype(np.float32), optical_depth
 
