@@ -14,6 +14,21 @@ inline float length_per_depth(__global const float *centre_ray, int i, int j, in
         fma(b, vload3(2, centre_ray), fma(a, vload3(1, centre_ray), vload3(0, centre_ray))));
 }
 
+// A supersegment's faces in list space, of offsets from depth_origin. A face on the eye's plane has
+// no list coordinate; nothing nearer than `nearest` is ever looked up.
+inline float2 prepared_face(float front, float back, float depth_origin, float nearest)
+{
+    const float least = DEPTH == PARALLEL ? -INFINITY : nearest - depth_origin;
+    return (float2)(KEPT_FACE(fmax(front, least), depth_origin),
+                    KEPT_FACE(fmax(back, least), depth_origin));
+}
+
+// Its extinction, finite however thin: nothing or everything of such a supersegment is crossed.
+inline float prepared_extinction(float front, float back, float optical_depth, float per_depth)
+{
+    return fmin(optical_depth / fmax((back - front) * per_depth, FLT_MIN), FLT_MAX);
+}
+
 // One work-item per list.
 __kernel void prepare_lists(
     __global const OFFSET_T *starts,  // of the lists in the arrays, width * height + 1
@@ -46,14 +61,8 @@ __kernel void prepare_lists(
         float extinction = 0.0f;
         uint packed_color = 0;
         if (n < count) {
-            // A face on the eye's plane has no list coordinate; nothing nearer than `nearest` is
-            // ever looked up
-            const float least = DEPTH == PARALLEL ? -INFINITY : nearest - depth_origin;
-            const float front = fmax(fronts[k], least), back = fmax(backs[k], least);
-            face = (float2)(KEPT_FACE(front, depth_origin), KEPT_FACE(back, depth_origin));
-            // Finite however thin: nothing or everything of such a supersegment is crossed
-            const float thickness = fmax((backs[k] - fronts[k]) * per_depth, FLT_MIN);
-            extinction = fmin(optical_depths[k] / thickness, FLT_MAX);
+            face = prepared_face(fronts[k], backs[k], depth_origin, nearest);
+            extinction = prepared_extinction(fronts[k], backs[k], optical_depths[k], per_depth);
             if (PACKED)
                 packed_color = ((__global const uint *)colors)[k];
             else

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.generation.classified_values import classify_on_device
 from pyvista_vdi.model.classification import Classification, refuse_unknown
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.classified_values import classify_on_device
 
 #: What says which scalars were seen, and how: that was said where they were kept.
 _SAID_BEFORE = ("scalars", "preference", "interpolation")

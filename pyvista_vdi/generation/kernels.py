@@ -72,18 +72,6 @@ LIST_OFFSETS = KernelDeclaration(
     made="uint",
     all_offsets="ulong*",
 )
-CLASSIFY_VALUES = KernelDeclaration(
-    "generation/classify_values.cl",
-    "classify_values",
-    count="uint",
-    cells="int",
-    means="float*",
-    spreads="float*",
-    steps="float*",
-    integrals="long4*",
-    colors="float*",
-    optical_depths="float*",
-)
 PACK_LISTS = KernelDeclaration(
     "generation/pack_lists.cl",
     "pack_lists",

@@ -1,11 +1,12 @@
 """What a transfer function makes of a deferred VDI, in float64 (docs/conventions.md).
 
-On a device: ``generation/classify_values.cl``.
+On a device: ``lib/values.cl``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,9 @@ def classify(
     """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
-    values of :func:`spread_of_values`. ``media``: does what :func:`media_of_values` does, which is
-    the default. Errors and warnings: :meth:`DeferredVDI.classified`.
+    values of :func:`spread_of_values`. The VDI's arrays are made when they are asked for, by
+    ``media``, which does what :func:`media_of_values` does, the default; a raycast asks for none.
+    Errors and warnings: :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
         ("shading", transfer_function.shading),
@@ -56,44 +58,68 @@ def classify(
     with np.errstate(divide="ignore"):
         of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
     of_cells = np.column_stack([of_step[:, np.newaxis] * color, of_step])
-    straight, optical_depth = (media or media_of_values)(deferred, of_cells)
-
-    # What is transparent is left out
-    lists = deferred.lists
-    rows: Any = np.flatnonzero(optical_depth > 0)
-    offsets = lists.offsets
-    if len(rows) == len(optical_depth):
-        rows = slice(None)
-    else:
-        offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
-    return VDI(
-        lists.camera,
-        lists.window_size,
-        offsets,
-        lists.front[rows],
-        lists.back[rows],
-        straight[rows],
-        optical_depth[rows],
-        lists.bounds,
-        depth_origin=lists.depth_origin,
-        metadata={
-            **lists.metadata,
-            "opacity_unit_distance": unit,
-            "transfer_function": transfer_function.to_dict(),
-            "deferred": deferred.about,
-        },
-    )
+    metadata = {
+        **deferred.metadata,
+        "opacity_unit_distance": unit,
+        "transfer_function": transfer_function.to_dict(),
+        "deferred": deferred.about,
+    }
+    return VDI._of_values(ValuesLook(deferred, of_cells, media or media_of_values), metadata)
 
 
-def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
-    """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
+@dataclass(frozen=True, eq=False)
+class ValuesLook:
+    """Values and the transfer function that a VDI shows of them.
 
     ``of_cells``: (step opacity times colour, step opacity) at the low end of the range, and of
-    cells of it: (1 + CELLS, 4).
+    cells of it, float64 (1 + CELLS, 4). ``media``: makes straight colours and optical depths, and
+    may take a device for it.
+    """
+
+    deferred: DeferredVDI
+    of_cells: Floats
+    media: Callable[[DeferredVDI, Floats], Media]
+
+    @property
+    def lists(self) -> VDI:
+        """The lists of all that is kept."""
+        return self.deferred.lists
+
+    def made(self) -> VDI:
+        """Return the arrays: what is transparent is left out."""
+        straight, optical_depth = self.media(self.deferred, self.of_cells)
+        lists = self.lists
+        rows: Any = np.flatnonzero(optical_depth > 0)
+        offsets = lists.offsets
+        if len(rows) == len(optical_depth):
+            rows = slice(None)
+        else:
+            offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
+        return VDI(
+            lists.camera,
+            lists.window_size,
+            offsets,
+            lists.front[rows],
+            lists.back[rows],
+            straight[rows],
+            optical_depth[rows],
+            lists.bounds,
+            depth_origin=lists.depth_origin,
+        )
+
+    def optical_depths(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return the optical depths of some of all supersegments, float32, by float64."""
+        return media_of_values(self.deferred, self.of_cells, rows)[1]
+
+
+def media_of_values(deferred: DeferredVDI, of_cells: Floats, rows: Any = slice(None)) -> Media:
+    """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
+
+    ``of_cells``: as for :class:`ValuesLook`. ``rows``: the supersegments; all by default.
     """
     integrals = np.zeros((CELLS + 1, 4))
     np.cumsum(of_cells[1:], axis=0, out=integrals[1:])
-    mean, spread = deferred.mean.astype(np.float64), deferred.spread.astype(np.float64)
+    mean, spread = (a[rows].astype(np.float64) for a in (deferred.mean, deferred.spread))
     low, high, even, above = spread_of_values(mean, spread)
     means = (1 - even - above)[:, np.newaxis] * of_cells[0]
     for first, last, share in ((low, high, even), (high, np.ones_like(high), above)):
@@ -103,7 +129,7 @@ def media_of_values(deferred: DeferredVDI, of_cells: Floats) -> Media:
         between = _integral(integrals, ends[1]) - _integral(integrals, ends[0])
         means += between * (share / (ends[1] - ends[0]))[:, np.newaxis]
     of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
-    optical_depth = (-np.log1p(-of_step) * deferred.steps).astype(np.float32)
+    optical_depth = (-np.log1p(-of_step) * deferred.steps[rows]).astype(np.float32)
     straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
     return np.clip(straight, 0, 1).astype(np.float32), optical_depth
 

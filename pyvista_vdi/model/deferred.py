@@ -205,7 +205,7 @@ class DeferredVDI:
         """View depth of the back faces less ``depth_origin``, float32 (n,)."""
         return self._lists.back
 
-    @property
+    @cached_property
     def mean(self) -> NDArray[np.float32]:
         """Mean by length, as a share of the range of values, float32 (n,)."""
         color = self._lists.color

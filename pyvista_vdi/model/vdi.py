@@ -6,7 +6,7 @@ import math
 import reprlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,17 @@ if TYPE_CHECKING:
 
 #: The arrays of supersegments.
 _MEDIA = ("front", "back", "color", "optical_depth")
+
+
+class ClassifiedValues(Protocol):
+    """Values and a transfer function (``model/classify_values.py``)."""
+
+    @property
+    def lists(self) -> VDI:
+        """Lists of all that is kept, transparent or not."""
+
+    def made(self) -> VDI:
+        """Return the arrays, checked."""
 
 
 class VDI:
@@ -73,6 +84,8 @@ class VDI:
     metadata: dict[str, Any]
     #: The packed form of the arrays, not public; ``None`` where they are exact.
     packing: Packing | None
+    #: What a classified deferred VDI is made of, not public: its arrays are made when asked for.
+    values: ClassifiedValues | None = None
 
     def __init__(
         self,
@@ -148,6 +161,15 @@ class VDI:
                 vdi._check_media()  # says which
         return vdi
 
+    @classmethod
+    def _of_values(cls, values: ClassifiedValues, metadata: Mapping[str, Any]) -> VDI:
+        """Return the VDI that a transfer function makes of values; arrays are made later."""
+        vdi, lists = cls.__new__(cls), values.lists
+        vdi.camera, vdi.window_size = lists.camera, lists.window_size
+        vdi._set_frame(lists.bounds, lists.depth_origin, metadata)
+        vdi.packing, vdi.values = None, values
+        return vdi
+
     def _set_frame(self, bounds: ArrayLike, depth_origin: Any, metadata: Any) -> None:
         origin, box = as_number(depth_origin), as_floats(bounds)
         if not math.isfinite(origin):
@@ -163,7 +185,12 @@ class VDI:
         self.metadata = dict(metadata or {})
 
     def __getattr__(self, name: str) -> Any:
-        """Make the arrays of a packed VDI."""
+        """Make the arrays of a packed VDI, or of a classified one."""
+        if name in ("offsets", *_MEDIA) and self.values is not None:
+            made = self.values.made()
+            for array in ("offsets", *_MEDIA):
+                setattr(self, array, getattr(made, array))
+            return vars(self)[name]
         if name not in _MEDIA or "packing" not in vars(self):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         assert isinstance(self.packing, Packed8)
@@ -171,6 +198,11 @@ class VDI:
             values.setflags(write=False)
             setattr(self, array, values)
         return vars(self)[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and other processes are given: arrays, not what they are made of."""
+        arrays = {} if self.values is None else {"offsets": self.offsets}
+        return {**vars(self), **arrays, "values": None}
 
     def _media_at(
         self, rows: NDArray[np.int64], lists: NDArray[np.int64], *names: str

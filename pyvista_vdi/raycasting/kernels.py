@@ -144,6 +144,38 @@ PREPARE_PACKED = KernelDeclaration(
     centre_ray="float*",
     words="uint2*",
 )
+CLASSIFY_VALUES = KernelDeclaration(
+    "raycasting/classify_values.cl",
+    "classify_values",
+    count="uint",
+    cells="int",
+    means="float*",
+    spreads="float*",
+    steps="float*",
+    integrals="float4*",
+    colors="float*",
+    optical_depths="float*",
+)
+PREPARE_VALUES = KernelDeclaration(
+    "raycasting/prepare_values.cl",
+    "prepare_values",
+    starts="OFFSET_T*",
+    places="ulong*",
+    fronts="float*",
+    backs="float*",
+    means="float*",
+    spreads="float*",
+    steps="float*",
+    integrals="float4*",
+    cells="int",
+    depth_origin="float",
+    nearest="float",
+    centre_ray="float*",
+    **_COUNTS,
+    headers="ulong*",
+    faces="float2*",
+    media="float4*",
+)
 COUNT_SUPERSEGMENTS = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_supersegments",

@@ -6,6 +6,7 @@ do not, a CPU follows them one by one, in blocks.
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +29,8 @@ LEAST_IN_COMMON = 4.5
 LEAST_IN_COMMON_WITHOUT_BLOCKS = 1.8
 #: Pixels along the shorter edge of what is drawn from which packets are faster.
 LEAST_PIXELS = 200
-#: Lists of a VDI that are asked how far light gets in them.
-_SAMPLED_LISTS = 4096
+#: Lists of a VDI that are asked how far light gets in them; of values, which are classified for it.
+_SAMPLED_LISTS, _SAMPLED_LISTS_OF_VALUES = 4096, 1024
 #: Optical depth behind which nothing is left of light: -log(1e-6), where rays end by default.
 _DARK = 13.8
 #: Rays along each edge of the window that are asked how many lists they cross.
@@ -98,14 +99,21 @@ def epipole_of(generating: Camera, view: Camera, size: tuple[int, int]) -> NDArr
     return np.array([u * size[0] / 2, v * size[1] / 2, denominator])
 
 
-def share_lit(vdi: VDI, near: float, far: float) -> float:
+def share_lit(
+    vdi: VDI,
+    near: float,
+    far: float,
+    optical_depths: Callable[[NDArray[np.int64]], NDArray[np.float32]] | None = None,
+) -> float:
     """Return how much of the depths from ``near`` to ``far`` light gets through, the lists' mean.
 
     Of some of the lists that are not empty; 1 in a list through which it gets. View depths of V_O.
+    ``optical_depths``: those of some supersegments, where others are shown than the VDI's.
     """
     offsets = vdi.offsets.view(np.int64)
     lists = np.flatnonzero(np.diff(offsets))
-    lists = lists[:: -(-len(lists) // _SAMPLED_LISTS) or 1]
+    sampled = _SAMPLED_LISTS if optical_depths is None else _SAMPLED_LISTS_OF_VALUES
+    lists = lists[:: -(-len(lists) // sampled) or 1]
     if not len(lists):
         return 1.0
     counts = offsets[lists + 1] - offsets[lists]
@@ -113,6 +121,8 @@ def share_lit(vdi: VDI, near: float, far: float) -> float:
     places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
     own = np.repeat(lists, counts)
     media = vdi._media_at(places, own, "optical_depth", "front", "back")
+    if optical_depths is not None:
+        media = {**media, "optical_depth": optical_depths(places)}
     optical_depth = media["optical_depth"].astype(np.float64)
     before = np.cumsum(optical_depth) - optical_depth
     before -= np.repeat(before[begins], counts)
@@ -122,7 +132,9 @@ def share_lit(vdi: VDI, near: float, far: float) -> float:
     depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
     through = np.add.reduceat(optical_depth, begins) < _DARK
     shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))
-    return float(np.clip(shares, 0.0, 1.0).mean())
+    if optical_depths is not None:  # lists of which nothing is shown are empty
+        shares = shares[np.add.reduceat(optical_depth, begins) > 0]
+    return float(np.clip(shares, 0.0, 1.0).mean()) if len(shares) else 1.0
 
 
 def _lists_crossed(

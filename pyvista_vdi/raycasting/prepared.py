@@ -1,9 +1,11 @@
 """A VDI on a device, in the form that the raycaster reads: uploaded once, kept while it lives."""
 
 import contextlib
+import copy
 import functools
 import threading
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,9 +15,12 @@ from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
 from pyvista_vdi.device.constants import BUNDLE, FIRST_BITS, GROUP, LIST_HEADER, SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classify_values import CELLS, ValuesLook
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.float32_limits import lists_are_far
 from pyvista_vdi.model.packing import Packed8, Packed16
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.raycasting.classified_values import integrals, values_on_device
 from pyvista_vdi.raycasting.kernels import (
     COUNT_PACKED,
     COUNT_SUPERSEGMENTS,
@@ -23,6 +28,7 @@ from pyvista_vdi.raycasting.kernels import (
     OCCUPIED_SLABS,
     PREPARE_LISTS,
     PREPARE_PACKED,
+    PREPARE_VALUES,
 )
 from pyvista_vdi.raycasting.packets import share_lit
 
@@ -46,10 +52,9 @@ class OccupancyGrid:
     span the depth range of the VDI's bounds. Built on the device, from the VDI's arrays alone, so
     that a file need not carry it.
 
-    ``lists`` are the kernel's arguments: buffers of offsets, which take 64 bits if
-    ``long_offsets``, and of fronts and backs, or of 8-byte lists their origins, strides, words and
-    step. ``nearest`` is the least view depth in front of V_O's eye, and ``shifted`` says whether
-    the depth coordinate is that of a long lens.
+    ``count`` enqueues the kernel that counts, which takes the grid and its counts as ``grid`` and
+    ``changes``. Offsets take 64 bits if ``long_offsets``. ``nearest`` is the least view depth in
+    front of V_O's eye, and ``shifted`` says whether the depth coordinate is that of a long lens.
     """
 
     #: uint32 (stacks high, stacks wide, slabs); uint64 per stack: bit s is set where slab s is
@@ -61,7 +66,7 @@ class OccupancyGrid:
         self,
         runtime: Runtime,
         vdi: VDI,
-        lists: dict[str, Any],
+        count: Callable[..., None],
         *,
         nearest: float,
         shifted: bool,
@@ -84,31 +89,23 @@ class OccupancyGrid:
             self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
             self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
             # Count, and sum up by stacks
-            offset_type = {"OFFSET_T": "long" if long_offsets else "int"}
-            packed = isinstance(vdi.packing, Packed8)
-            count = runtime.bind(
-                COUNT_PACKED if packed else COUNT_SUPERSEGMENTS,
-                offset_type,
-                **lists,
-                grid=COUNTED(
-                    width=width,
-                    height=height,
-                    stacks_wide=wide,
-                    first_depth=self.first_depth,
-                    slabs_per_depth=self.slabs_per_depth,
-                    margin=self.margin,
-                ),
-                changes=self.counts,
-            )
             occupied = runtime.bind(
                 OCCUPIED_SLABS,
-                offset_type,
+                {"OFFSET_T": "long" if long_offsets else "int"},
                 counts=self.counts,
                 stacks=wide * high,
                 masks=self.masks,
             )
+            grid = COUNTED(
+                width=width,
+                height=height,
+                stacks_wide=wide,
+                first_depth=self.first_depth,
+                slabs_per_depth=self.slabs_per_depth,
+                margin=self.margin,
+            )
             runtime.fill(self.counts, np.uint32(0))
-            count(padded(width * height, GROUP), GROUP)
+            count(grid=grid, changes=self.counts)
             occupied(padded(wide * high, GROUP), GROUP)
             masks = runtime.download(self.masks)
         #: Model points, (n, 3), whose convex hull holds all occupied cells that rays meet, and a
@@ -220,7 +217,11 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> "PreparedVDI":
         place = places.get(runtime) or places.setdefault(runtime, _Preparation())
     with runtime.holding(place.lock):
         if place.prepared is None:
-            place.prepared = PreparedVDI(runtime, vdi)
+            values: Any = vdi.values
+            if isinstance(values, ValuesLook) and values.lists.n_supersegments:
+                place.prepared = kept_values(runtime, values.deferred).shown(values)
+            else:
+                place.prepared = PreparedVDI(runtime, vdi)
         return place.prepared
 
 
@@ -316,10 +317,8 @@ class PreparedVDI:
             coordinate = np.array([0.0, 0.0, 0.0, -1.0])  # -1 / Z
         return np.stack([half[0] * u, half[1] * v, coordinate, denominator])
 
-    def _upload(self, vdi: VDI) -> None:
-        """Bring the lists to the device, exact or packed, and build the occupancy grid."""
-        runtime, packing = self.runtime, vdi.packing
-        # Where lists begin: by their bundles or, of 8-byte supersegments, each
+    def _headers(self, vdi: VDI) -> tuple[NDArray[Any], int]:
+        """Return where lists begin, by their bundles or, of 8-byte supersegments, each; the end."""
         if self.packed == 8:
             lengths = vdi.counts + LIST_HEADER * (vdi.counts > 0)
         else:
@@ -335,8 +334,13 @@ class PreparedVDI:
         else:
             longest = lengths.reshape(-1) // BUNDLE**2
             headers = (begins[:-1] | longest << FIRST_BITS).view(np.uint64)
-        # Direction of a centre ray per unit of view depth, in the model frame
-        centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
+        return headers, entries
+
+    def _upload(self, vdi: VDI) -> None:
+        """Bring the lists to the device, exact or packed, and build the occupancy grid."""
+        runtime, packing = self.runtime, vdi.packing
+        headers, entries = self._headers(vdi)
+        offset_type = np.int64 if self.long_offsets else np.int32
         with kept_together() as keep, contextlib.ExitStack() as stack:
 
             def upload(array: NDArray[Any], name: str) -> DeviceBuffer:
@@ -355,7 +359,7 @@ class PreparedVDI:
                 "headers": self.headers,
                 "width": self.window[0],
                 "height": self.window[1],
-                "centre_ray": upload(centre.astype(np.float32), "centre rays"),
+                "centre_ray": upload(_centre_ray(vdi), "centre rays"),
             }
             if isinstance(packing, Packed8):
                 # Lists begin with their scales
@@ -395,10 +399,17 @@ class PreparedVDI:
                     faces=self.faces,
                     media=self.media,
                 )
+
+            def count(**grid: Any) -> None:
+                kernel = COUNT_PACKED if self.packed == 8 else COUNT_SUPERSEGMENTS
+                lists = {"OFFSET_T": self.switches["OFFSET_T"]}
+                counting = runtime.bind(kernel, lists, offsets=starts, **faces, **grid)
+                counting(padded(self.window[0] * self.window[1], GROUP), GROUP)
+
             self.occupancy = OccupancyGrid(
                 runtime,
                 vdi,
-                {"offsets": starts, **faces},
+                count,
                 nearest=self.nearest,
                 shifted=self.shifted,
                 long_offsets=self.long_offsets,
@@ -406,6 +417,88 @@ class PreparedVDI:
             keep(self.occupancy.counts), keep(self.occupancy.masks)
             prepare(padded(self.window[0] * self.window[1], GROUP), GROUP)
             runtime.finish()  # the buffers above may be host memory in use
+
+
+class KeptValues(PreparedVDI):
+    """A deferred VDI's lists on a device: what each of its looks is made of, in one pass."""
+
+    def _upload(self, vdi: VDI) -> None:
+        """Bring offsets and faces to the device, and where the lists of a look may lie."""
+        runtime, self.packed = self.runtime, 0
+        headers, self._entries = self._headers(vdi)
+        offsets = vdi.offsets.astype(np.int64 if self.long_offsets else np.int32)
+        self._lists = vdi
+        with kept_together() as keep:
+            self._kept = {
+                "starts": keep(runtime.upload(offsets, "list offsets")),
+                "places": keep(runtime.upload(headers, "places of lists")),
+                "fronts": keep(runtime.upload(vdi.front, "front depths")),
+                "backs": keep(runtime.upload(vdi.back, "back depths")),
+                "centre_ray": keep(runtime.upload(_centre_ray(vdi), "centre rays")),
+            }
+            runtime.finish()  # a thread with another queue may use them next
+
+    def shown(self, values: ValuesLook) -> PreparedVDI:
+        """Return what a transfer function shows: what is transparent is left out."""
+        runtime, lists = self.runtime, self._lists
+        look = copy.copy(self)
+        near, far = rays.depth_range(self.camera, self.bounds)
+        look.lit = share_lit(lists, near, far, values.optical_depths)
+        with kept_together() as keep, contextlib.ExitStack() as stack:
+
+            def made(shape: tuple[int, ...], dtype: type[np.generic], name: str) -> DeviceBuffer:
+                return keep(runtime.result(shape, dtype, name, lasting=True))
+
+            look.headers = made((self._kept["places"].shape[0],), np.uint64, "list headers")
+            look.faces = made((self._entries, 2), np.float32, "supersegment faces")
+            look.media = made((self._entries, 4), np.float32, "supersegment media")
+            table = stack.enter_context(runtime.upload(integrals(values.of_cells), "integrals"))
+            prepare = runtime.bind(
+                PREPARE_VALUES,
+                self.switches,
+                **self._kept,
+                **values_on_device(runtime, values.deferred),
+                integrals=table,
+                cells=CELLS,
+                depth_origin=self.depth_origin,
+                nearest=self.nearest,
+                headers=look.headers,
+                faces=look.faces,
+                media=look.media,
+            )
+
+            def count(**grid: Any) -> None:
+                prepare(padded(look.headers.shape[0], GROUP), GROUP, **grid)
+
+            look.occupancy = OccupancyGrid(
+                runtime,
+                lists,
+                count,
+                nearest=self.nearest,
+                shifted=self.shifted,
+                long_offsets=self.long_offsets,
+            )
+            keep(look.occupancy.counts), keep(look.occupancy.masks)
+        return look
+
+
+_kept: "weakref.WeakKeyDictionary[DeferredVDI, dict[Runtime, KeptValues]]" = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def kept_values(runtime: Runtime, deferred: DeferredVDI) -> KeptValues:
+    """Return the lists of a deferred VDI on the device, made once and kept as long as it lives."""
+    with runtime.holding(_lock):
+        kept = _kept.setdefault(deferred, {})
+        if runtime not in kept:
+            kept[runtime] = KeptValues(runtime, deferred.lists)
+        return kept[runtime]
+
+
+def _centre_ray(vdi: VDI) -> NDArray[np.float32]:
+    """Return the direction of a centre ray per unit of view depth, in the model frame."""
+    return rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction.astype(np.float32)
 
 
 def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -7,11 +7,11 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
-from pyvista_vdi.generation.classified_values import classify_on_device
 from pyvista_vdi.generation.deferred import generate_deferred
 from pyvista_vdi.model.classify_values import classify
 from pyvista_vdi.model.deferred import lengths_of
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
+from pyvista_vdi.raycasting.classified_values import classify_on_device
 
 EDGES = NX, NY, NZ = 7, 6, 33
 #: Lengths of a column's voxels: the first and the last reach half as far into the grid.
