@@ -302,8 +302,8 @@ KERNEL_MUTANTS = (
     _m(
         "prepare: thickness in view depth, not along the ray",
         "opencl/raycasting/prepare.cl",
-        "(backs[k] - fronts[k]) * per_depth",
-        "(backs[k] - fronts[k])",
+        "(back - front) * per_depth",
+        "(back - front)",
     ),
     _m(
         "multi_vdi: the last medium's optical depth only",
