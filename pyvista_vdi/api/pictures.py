@@ -45,7 +45,7 @@ Shown: TypeAlias = VDILike | VDICollection
 
 
 def render(
-    vdi: Shown | DeferredVDI | Sequence[Shown],
+    vdi: Shown | DeferredVDI | Sequence[Shown | DeferredVDI],
     camera: CameraLike,
     window_size: WindowSize | None = None,
     *,
@@ -70,7 +70,7 @@ def render(
         about as near.
         Several are merged by depth along each ray; their order does not matter, to the last bit.
         A :class:`DeferredVDI` takes the words of :meth:`DeferredVDI.classified` (``cmap``,
-        ``opacity``, ``clim`` ...) as well.
+        ``opacity``, ``clim`` ...) as well; of several, those that keep values take them.
     camera : pyvista.Camera or vtkCamera or Camera
         The new view V_N. Its model transform places the VDI's model frame in the world.
     window_size : (int, int), optional
@@ -121,8 +121,13 @@ def render(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
-    if isinstance(vdi, DeferredVDI) and look:
-        vdi = vdi.classified(**look, device=device)
+    given: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
+    if look and any(isinstance(each, DeferredVDI) for each in given):
+        given = [
+            each.classified(**look, device=device) if isinstance(each, DeferredVDI) else each
+            for each in given
+        ]
+        vdi = given if isinstance(vdi, list | tuple) else given[0]
     else:
         refuse_keywords(look, render)
     how = (clipping_planes, cropping, opacity_multiplier, skip_empty)

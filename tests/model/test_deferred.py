@@ -199,6 +199,17 @@ def test_render_takes_the_look(default_runtime):
     assert np.array_equal(picture, pvdi.render(vdi, made.camera))
     wanted = reference.render(vdi, made.camera, vdi.window_size)
     assert np.abs(picture - wanted).max() < 1e-3
+    # Of several, those that keep values take it
+    both = pvdi.render([made, vdi], made.camera, transfer_function=LOOKS)
+    assert np.array_equal(both, pvdi.render([vdi, vdi], made.camera))
+
+
+@pytest.mark.parametrize("generate", [pvdi.generate_set, pvdi.generate_series])
+def test_sets_and_series_of_values_are_refused_by_name(generate):
+    volume = pvdi.Volume(np.zeros((4, 4, 4), np.float32))
+    given = (volume,) if generate is pvdi.generate_set else ([volume], deferred().camera, (8, 8))
+    with pytest.raises(TypeError, match="'classification': values in place of colours are kept by"):
+        generate(*given, classification="deferred", cmap="bone")
 
 
 @pytest.mark.parametrize("compression", ["lz4", "zstd", "deflate", "none"])
