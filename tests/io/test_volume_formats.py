@@ -81,6 +81,8 @@ def test_the_page_lists_what_is_tried(tmp_path):
         pytest.importorskip(library)
     pytest.importorskip("zarr", minversion="3")
     page = Path(__file__).parents[2] / "docs" / "files.md"
+    if not page.is_file():
+        pytest.skip("the documentation is not beside the tests")
     rows = [
         "| format | kinds of files that the tests make |",
         "|---|---|",
