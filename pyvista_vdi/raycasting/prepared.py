@@ -406,17 +406,21 @@ class PreparedVDI:
                 counting = runtime.bind(kernel, lists, offsets=starts, **faces, **grid)
                 counting(padded(self.window[0] * self.window[1], GROUP), GROUP)
 
-            self.occupancy = OccupancyGrid(
-                runtime,
-                vdi,
-                count,
-                nearest=self.nearest,
-                shifted=self.shifted,
-                long_offsets=self.long_offsets,
-            )
+            self.occupancy = self._occupancy(vdi, count)
             keep(self.occupancy.counts), keep(self.occupancy.masks)
             prepare(padded(self.window[0] * self.window[1], GROUP), GROUP)
             runtime.finish()  # the buffers above may be host memory in use
+
+    def _occupancy(self, lists: VDI, count: Callable[..., None]) -> OccupancyGrid:
+        """Return the occupancy grid that ``count`` counts in."""
+        return OccupancyGrid(
+            self.runtime,
+            lists,
+            count,
+            nearest=self.nearest,
+            shifted=self.shifted,
+            long_offsets=self.long_offsets,
+        )
 
 
 class KeptValues(PreparedVDI):
@@ -470,14 +474,7 @@ class KeptValues(PreparedVDI):
             def count(**grid: Any) -> None:
                 prepare(padded(look.headers.shape[0], GROUP), GROUP, **grid)
 
-            look.occupancy = OccupancyGrid(
-                runtime,
-                lists,
-                count,
-                nearest=self.nearest,
-                shifted=self.shifted,
-                long_offsets=self.long_offsets,
-            )
+            look.occupancy = self._occupancy(lists, count)
             keep(look.occupancy.counts), keep(look.occupancy.masks)
         return look
 
