@@ -83,7 +83,7 @@ def javascript(session: nox.Session) -> None:
         session.run("npm", "test", external=True)
     env = {"PYVISTA_VDI_AXE": str(folder / "node_modules" / "axe-core" / "axe.min.js")}
     axe = ("-q", "-n", "0", "-m", "slow or not slow", "-k", "axe")
-    session.run("pytest", *axe, "tests/extensions/web/test_controls.py", env=env)
+    session.run("pytest", *axe, "tests/extensions/web", env=env)
 
 
 @nox.session

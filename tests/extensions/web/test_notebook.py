@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import in_base64, picture
+from browsers import assert_axe_finds_nothing, in_base64, picture
 from PIL import Image
 from web_client import soft_ball
 
@@ -601,6 +601,16 @@ def test_a_series_in_a_notebook_has_one_time(open_widget, series):
     )
     page.evaluate("viewers[0].time = 0")
     page.wait_for("model.get('time') === 0 && viewers[1].time === 0")
+
+
+@pytest.mark.slow
+def test_axe_finds_nothing_in_our_part_of_an_output(open_widget, series):
+    """With the bar and a panel, and below the picture a series' button and slider."""
+    page = open_widget(VDIWidget(series))
+    page.evaluate("viewers[0].style.cssText = 'display: block; width: 420px; height: 340px'")
+    page.page.get_by_role("button", name="View and marks").first.click()
+    page.wait_for("viewers.every(({ series }) => series.complete)")
+    assert_axe_finds_nothing(page, "viewers[0]")
 
 
 #: As nbconvert writes outputs: what an output's script does, and then the view, or the picture.
