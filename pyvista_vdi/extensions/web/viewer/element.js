@@ -100,10 +100,7 @@ export class VDIViewer extends HTMLElement {
   constructor() {
     super();
     const root = this.attachShadow({ mode: "open" });
-    // No markup in text: pages may forbid what is not in a file of theirs
-    const style = new CSSStyleSheet();
-    style.replaceSync(STYLE);
-    root.adoptedStyleSheets = [style];
+    root.adoptedStyleSheets = [styleSheet()];
     const make = (name, className, more) => htmlElement(name, { className, hidden: true, ...more });
     const parts = this.#parts = {
       img: make("img", "without", { alt: "" }),
@@ -936,6 +933,16 @@ export class VDIViewer extends HTMLElement {
     this.#ready = resolvers();
     this.#ready.promise.then(resolve, reject);
   }
+}
+
+// One for all viewers of a page. No markup in text: pages may forbid what is not in a file of theirs
+let sheet = null;
+function styleSheet() {
+  if (!sheet) {
+    sheet = new CSSStyleSheet();
+    sheet.replaceSync(STYLE);
+  }
+  return sheet;
 }
 
 function resolvers() {
