@@ -173,6 +173,7 @@ def added(
     thing = shown.thing if several is None else several
     if isinstance(thing, VDI | VDICollection | DeferredInput):
         mapper.SetInputData(thing)
+        mapper.driver.input.prop = shown.prop  # which classifies what keeps values
     else:
         mapper.SetInputConnection(thing.GetOutputPort())
     actor.mapper = mapper

@@ -308,7 +308,10 @@ class VDIWidget(anywidget.AnyWidget):
 
     def _accept(self, vdi: Any) -> Any:
         """Return what can be shown, or raise InvalidVDIError."""
-        return vdi if isinstance(vdi, VDISeries | VDISet) else as_vdi(vdi)
+        if isinstance(vdi, VDISeries | VDISet):
+            as_vdi(vdi[0])  # refuses what has no colours
+            return vdi
+        return as_vdi(vdi)
 
     def _now(self) -> VDI:
         """Return the VDI that is seen: of a series the present step, of a set the nearest one."""
