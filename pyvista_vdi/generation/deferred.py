@@ -17,7 +17,6 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
 #: whatever lies before it: 1 - 2^-36 n is 1 for the voxels n of any ray.
@@ -61,13 +60,14 @@ class _LengthOptions(GenerationOptions):
 def generate_deferred(
     request: GenerationRequest,
     deferral: Deferral,
-    generate: Callable[[GenerationRequest], VDI] = generate_vdi,
-) -> DeferredVDI:
+    generate: Callable[[GenerationRequest], Any] = generate_vdi,
+) -> Any:
     """Make a deferred VDI; of the request's transfer function the interpolation counts.
 
-    ``generate`` makes the VDI of a request: here, in blocks, or by workers. InvalidArgumentError if
-    the range or the importance cannot be used, UnsupportedError for what cannot be deferred, and
-    what ``generate`` raises.
+    ``generate`` makes the VDI of a request: here, in blocks, or by workers; where it makes none, as
+    on all of MPI's ranks but one, there is no deferred one either, and None is returned.
+    InvalidArgumentError if the range or the importance cannot be used, UnsupportedError for what
+    cannot be deferred, and what ``generate`` raises.
     """
     volume, options = request.volume, request.options
     if volume.rgba:
@@ -95,6 +95,8 @@ def generate_deferred(
             options=_LengthOptions(**{**given, "precision": "exact"}),
         )
     )
+    if made is None:
+        return None
 
     # Take what the channels of the table have become, means by length, a piece at a time
     per_length = _PER_VOXEL / min(volume.spacing)
