@@ -125,6 +125,10 @@ class VDISource(Looking, Functions, RanksVDISource):
         """Choose when scalars are classified: as the VDI is made, or by what shows it."""
         self._change("_deferred", bool(deferred))
 
+    def _function_changed(self) -> None:
+        if not self._deferred:  # else it decides nothing here
+            super()._function_changed()
+
     def SetValueRange(self, low: float, high: float) -> None:
         """Set the scalars that a deferred VDI keeps; two that are equal mean all."""
         self._change("_value_range", (low, high) if low != high else None)
