@@ -107,7 +107,7 @@ class VDIReader(Algorithm):
         series: Any = read(self._path) if self._series is None else self._series
         time = wanted_time(outputs.GetInformationObject(0))
         step = 0 if time is None else series.nearest(time)
-        vdi = series[step]
+        vdi = as_any_vdi(series[step])
         announce(outputs, vdi.window_size)
         ask_for_all([outputs])
         image.ShallowCopy(vdi_to_image(vdi))
