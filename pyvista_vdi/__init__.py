@@ -59,6 +59,7 @@ registry.core = registry.Extension(
             "pyvista_vdi.io.vdi_file",
             write_options=("precision",),
             compressions=("lz4", "zstd", "deflate", "none"),
+            values=True,
         ),
         registry.FileFormat(
             ".vti",

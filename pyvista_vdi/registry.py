@@ -48,6 +48,8 @@ class FileFormat:
     page : bool
         Whether it is a page, which may hold a file of another format: its module has
         ``begins_with(path, magic)`` and ``data_in(path)``.
+    values : bool
+        Whether it holds deferred VDIs as well.
     shared : bool
         Whether other files have that suffix, too: its module has ``holds_vdi(path)``.
     reports_progress : bool
@@ -69,6 +71,7 @@ class FileFormat:
     compressions: tuple[str, ...] = ()
     magic: bytes = b""
     page: bool = False
+    values: bool = False
     shared: bool = False
     reports_progress: bool = True
     needs: str = ""

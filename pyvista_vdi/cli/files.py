@@ -51,6 +51,7 @@ def convert(options: argparse.Namespace) -> int:
     """Read a VDI and write it in the format of another name."""
     from pyvista_vdi.api import read
     from pyvista_vdi.cli.inputs import (
+        classification,
         file_options,
         given_camera,
         measuring,
@@ -59,6 +60,8 @@ def convert(options: argparse.Namespace) -> int:
         with_look,
     )
     from pyvista_vdi.io import checked_target
+    from pyvista_vdi.io.files import format_named
+    from pyvista_vdi.model.deferred import DeferredVDI
 
     if (own := _own_verbs(options.file)) is not None:
         return int(own.convert(options))
@@ -72,7 +75,11 @@ def convert(options: argparse.Namespace) -> int:
     given = {name: value for name, value in foreign.items() if value is not None}
     with measuring("converting") as bar:
         vdi = read(options.file, progress=part(bar, 0.0, 0.5, "reading"), **given)
-        vdi = with_look(options, vdi, options.file, colors=target.suffix != ".vdi")
+        written_as = format_named(target)
+        if written_as and written_as.page and isinstance(vdi, DeferredVDI):
+            file_arguments |= classification(options)  # that the page begins with
+        else:
+            vdi = with_look(options, vdi, options.file, colors=target.suffix != ".vdi")
         vdi.save(target, progress=part(bar, 0.5, 1.0, "writing"), **file_arguments)
     say_vdi(options, vdi)
     return 0

@@ -76,7 +76,7 @@ def write(
     Parameters
     ----------
     vdi : VDI or DeferredVDI
-        What to write; the second in ``.vdi`` files only.
+        What to write; the second in ``.vdi`` files and pages only.
     path : path-like
         The target; its name ends in ``.vdi``, ``.exr``, ``.vti`` or ``.html``.
     progress : callable, optional
@@ -84,7 +84,9 @@ def write(
         does not say how far it is: of ``.vti`` with 1 alone.
     **options
         ``compression`` and ``level`` for these; ``precision`` for ``.vdi`` and ``.html``, there
-        ``title``, ``background`` and ``controls`` as well; ``exact`` and ``linear`` for ``.exr``.
+        ``title``, ``background`` and ``controls`` as well, and of a DeferredVDI what its
+        transfer function begins with, as :meth:`DeferredVDI.classified` takes it: ``cmap``,
+        ``opacity``, ...; ``exact`` and ``linear`` for ``.exr``.
         See :func:`pyvista_vdi.io.vdi_file.writer.write`,
         :func:`pyvista_vdi.extensions.deep_exr.files.write`,
         :func:`pyvista_vdi.vtk_pipeline.filters.vti.write` and
@@ -111,15 +113,15 @@ def write(
     read : reads it again.
     """
     target = checked_target(path)
-    if isinstance(vdi, DeferredVDI) and format_named(target) is not _own():
+    found = format_named(target) or _own()
+    if isinstance(vdi, DeferredVDI) and not found.values:
         raise InvalidVDIError(
             f"{target.suffix} files hold colours, and a DeferredVDI keeps values: write "
-            "vdi.classified(cmap=..., opacity=...), or a .vdi file, which keeps them"
+            "vdi.classified(cmap=..., opacity=...), or a .vdi file or a page, which keep them"
         )
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
     check_write_options(target, options)
-    found = format_named(target) or _own()
     written: Path
     if found.reports_progress:
         written = found.load().write(vdi, target, progress=progress, **options)

@@ -352,7 +352,11 @@ class DeferredVDI:
         return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi`` file that `pyvista_vdi.read` opens; see :func:`pyvista_vdi.io.write`."""
+        """Write a ``.vdi`` file, or a page in which its transfer function is edited.
+
+        ``kept.save("brain.html", cmap="bone", opacity="sigmoid")``; see
+        :func:`pyvista_vdi.io.write`. `pyvista_vdi.read` opens both.
+        """
         return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:

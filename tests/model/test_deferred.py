@@ -183,7 +183,6 @@ def test_entrances_for_colours_name_the_remedy(tmp_path):
         lambda: pvdi.VDISeries.of([made]),
         lambda: pvdi.VDISet.of([made]),
         lambda: made.save(tmp_path / "a.exr"),
-        lambda: made.save(tmp_path / "a.html"),
     ):
         with pytest.raises(InvalidVDIError, match=r"classified\(cmap=..., opacity=...\)"):
             call()
@@ -257,12 +256,20 @@ def test_convert_classifies_and_info_says_which_kind(tmp_path, capsys):
     path = deferred().save(tmp_path / "kept.vdi")
     assert main(["info", str(path)]) == 0
     assert re.search(r"values from 100 to 300, classified afterwards", capsys.readouterr().out)
-    for suffix in (".vdi", ".exr", ".html"):
+    for suffix in (".vdi", ".exr"):
         target = tmp_path / f"seen{suffix}"
         assert main(["convert", str(path), "--cmap", "bone", "-o", str(target)]) == 0
         assert isinstance(pvdi.read(target), pvdi.VDI)
     assert main(["convert", str(path), "-o", str(tmp_path / "again.vdi")]) == 0
     assert pvdi.read(tmp_path / "again.vdi").equals(pvdi.read(path))
+    # A page keeps values, and begins with a look
+    page = tmp_path / "kept.html"
+    assert main(["convert", str(path), "--cmap", "bone", "-o", str(page)]) == 0
+    kept, first = pvdi.read(page), deferred().classified(cmap="bone")
+    assert np.array_equal(kept.mean, deferred().with_precision("8-byte").mean)
+    assert kept.metadata["transfer_function"] == first.metadata["transfer_function"]
+    with pytest.raises(UnsupportedError, match="in the colours that it has"):
+        first.save(tmp_path / "no.html", cmap="bone")
     capsys.readouterr()
     # A look for what has one, and none for what needs one
     assert main(["convert", str(tmp_path / "seen.vdi"), "--cmap", "bone", "-o", "x.vdi"]) != 0

@@ -16,14 +16,21 @@ _HOMES = {"Server": "server", "VDIWidget": "widget", "serve": "server"}
 
 __all__ = ["Server", "VDIWidget", "serve"]
 
+#: What the transfer function of a page that keeps values begins with: words of ``classified``.
+_LOOK = (
+    *("cmap", "opacity", "clim", "n_colors", "flip_scalars", "log_scale"),
+    *("opacity_unit_distance", "transfer_function", "volume_property"),
+)
+
 EXTENSION = Extension(
     formats=(
         FileFormat(
             ".html",
             "pyvista_vdi.extensions.web.page",
-            write_options=("precision", "title", "background", "controls"),
+            write_options=("precision", "title", "background", "controls", *_LOOK),
             compressions=("deflate",),
             page=True,
+            values=True,
         ),
     ),
     verbs=(

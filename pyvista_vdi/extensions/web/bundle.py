@@ -6,7 +6,9 @@ exports fall away, and what a module needs comes before it. What is written othe
 
 - ``import { a, b } from "./x.js";`` is the only form of an import; it ends with its semicolon;
 - ``export`` stands before ``function``, ``async function``, ``class``, ``const`` or ``let``;
-- no two modules have a name at top level in common, and none waits there by ``await``.
+- no two modules have a name at top level in common, and none waits there by ``await``;
+- templates at top level are shaders and style sheets: their comments (`` // ``) and indentation
+  fall away, too.
 
 What runs in a worker, ``worker.js`` and what it imports, stands in a function of its own: its text
 is the worker's program, and where no worker may be started the page calls it itself.
@@ -46,6 +48,9 @@ export const waysToSpawn = [() => {
 """
 
 _IMPORT = re.compile(r'import \{ ((?:[\w$]+ , )*[\w$]+ (?:, )?)\} from (["\'])\./([\w.]+)\2 ;')
+
+#: What falls away in a template: comments, indentation, lines without anything.
+_IN_TEMPLATES = re.compile(r"(?:[ \t]+|(?<=\n))//[ \t][^\n`]*(?=[\n`])|(?<=\n)[ \t\n]+")
 
 _DECLARE = ("async", "class", "const", "function", "let", "var")
 
@@ -168,7 +173,9 @@ def _module(name: str, text: str) -> _Module:
         if found or word == "export":
             gap = gap or token.gap  # now of what follows, which may begin a statement by it
             continue
-        parts.append((gap or token.gap) + token.text)
+        lasting = token.kind == "template" and token.depth == 0
+        shown = _IN_TEMPLATES.sub("", token.text) if lasting else token.text
+        parts.append((gap or token.gap) + shown)
         gap = ""
         first = k - (texts[k - 1] == "async")
         exported = texts[first - 1] == "export"

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import base64
 import binascii
+import copy
 import html
 import io
 import os
 import re
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter, write_all
 from pyvista_vdi.extensions.sets.files import write_all as write_all_views
@@ -30,7 +31,7 @@ from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.compositing import opacity, transmittance
-from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.metrics import over_background
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, whole_file
@@ -108,10 +109,11 @@ class View:
     attributes: dict[str, str] = field(default_factory=dict)  # of the element
     #: Parts of a .vdis file; the first shows its first step. Or those of a .vdiset file
     series: Sequence[bytes] = ()
+    deferred: Mapping[str, Any] | None = None  # what lists that keep values are about
 
 
 def page(
-    vdi: VDI,
+    vdi: VDI | DeferredVDI,
     *,
     title: str = "VDI",
     background: Sequence[float] = (0.0, 0.0, 0.0),
@@ -119,14 +121,30 @@ def page(
     precision: str | None = None,
     level: int | None = None,
     progress: Progress | None = None,
+    **look: Any,
 ) -> bytes:
     """Return an HTML page that shows a VDI, as large as the window, behind it an RGB from 0 to 1.
 
     ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6. ``controls="none"`` leaves
-    out the bar of buttons.
+    out the bar of buttons. A page of a :class:`DeferredVDI` holds its values, and its transfer
+    function is edited there; ``look``: what that begins with, the arguments of
+    :meth:`DeferredVDI.classified`.
     """
-    view = _view_of(vdi, background)
-    view.vdi = vdi.with_precision(precision or "8-byte")
+    if isinstance(vdi, DeferredVDI):
+        begun = vdi.classified(**look)
+        view = _view_of(begun, background)
+        kept = vdi.with_precision(precision or "8-byte")
+        view.vdi, view.deferred = copy.copy(kept.lists), kept.about
+        told = begun.metadata["transfer_function"]
+        view.vdi.metadata = {**kept.metadata, "transfer_function": told}
+    else:
+        if look:
+            raise UnsupportedError(
+                f"a page shows a VDI in the colours that it has: leave out {', '.join(look)}, or "
+                "generate with classification='deferred'"
+            )
+        view = _view_of(vdi, background)
+        view.vdi = vdi.with_precision(precision or "8-byte")
     return assembled([view], title=title, controls=controls, level=level, progress=progress)
 
 
@@ -148,7 +166,8 @@ def assembled(
         files = list(view.series)
         if view.vdi is not None:
             stream = io.BytesIO()
-            write_to(stream, view.vdi, DEFLATE, level, progress if number == 0 else None)
+            shown = progress if number == 0 else None
+            write_to(stream, view.vdi, DEFLATE, level, shown, deferred=view.deferred)
             data = stream.getvalue()
             cut = _end_of_coarse(stream)
             files = [data[:cut], data[cut:]]
@@ -182,7 +201,7 @@ def assembled(
 
 
 def write(
-    vdi: VDI,
+    vdi: VDI | DeferredVDI,
     path: str | os.PathLike[str],
     *,
     compression: str = DEFLATE,
@@ -192,6 +211,7 @@ def write(
     background: Sequence[float] = (0.0, 0.0, 0.0),
     controls: str = "all",
     progress: Progress | None = None,
+    **look: Any,
 ) -> Path:
     """Write a page with a VDI: see :func:`pyvista_vdi.io.write`, and :func:`page`.
 
@@ -207,6 +227,7 @@ def write(
         precision=precision,
         level=level,
         progress=progress,
+        **look,
     )
     with whole_file(target) as stream:
         stream.write(content)
@@ -288,9 +309,9 @@ def in_parts(data: bytes, cut: int) -> list[bytes]:
     return [data[:cut], *(data[k : k + _PART] for k in range(cut, len(data), _PART))]
 
 
-def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI:
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI | DeferredVDI:
     """Read the VDI that a page shows: see :func:`pyvista_vdi.io.read`."""
-    return as_vdi(reader.read(path, progress=progress, stream=data_in(path)))
+    return reader.read(path, progress=progress, stream=data_in(path))
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:

@@ -29,6 +29,13 @@ def test_constants_of_shaders_are_no_names():
     assert bundled({"a.js": glsl % "A", "b.js": glsl % "B"}, ["a.js", "b.js"])
 
 
+def test_comments_and_indentation_of_shaders_fall_away():
+    glsl = "const A = `\n// one\n  uniform vec2 a; // two\n\n  url(http://c) // ${1}`;\n"
+    assert bundled({"a.js": glsl}, ["a.js"]) == (
+        "const A = `\n\nuniform vec2 a;\nurl(http://c) // ${1}`;;\n"
+    )
+
+
 def test_without_a_worker_there_is_none():
     assert "workerPart" not in bundled(MODULES, ["b.js"])
 

@@ -1,5 +1,6 @@
 // What is done to a view beside turning it: a bar of buttons that fades, and panels that they open.
 import { lookingAt } from "./camera.js";
+import { EDITOR_STYLE, transferEditor } from "./editor.js";
 import { htmlElement, strokes } from "./html.js";
 import { AS_MADE } from "./look.js";
 import { drawMarks, inShort, viewAt } from "./marks.js";
@@ -37,6 +38,8 @@ const KEYS = [
   ["?", "this help"],
   ["Esc", "close"],
 ];
+const KEYS_OF_VALUES = [["arrow keys at a point of the curve", "move it"],
+  ["+, Delete there", "add a point, remove it"], ["Ctrl Z in the editor", "undo"]];
 const KEYS_OF_SERIES = [["space bar", "play, pause"], [", and .", "a step back, a step on"]];
 
 const ICONS = {
@@ -50,11 +53,14 @@ const ICONS = {
   help: "M7.5 7.5a2.5 2.5 0 1 1 3.6 2.2c-.8.4-1.1.9-1.1 1.8M10 14.5v.1",
 };
 
+/** What the panel of the look is called, of VDIs that have colours and of those that keep values. */
+const OF_COLORS = "Brightness, opacity and clipping", OF_VALUES = "Transfer function and clipping";
+
 /** In a viewer's sheet of styles. */
 export const CONTROLS_STYLE = `
-:host { --bar: #f8f8f8e0; --ink: #181818; --edge: #0003; --mark: #0b57d0; }
+:host { --bar: #f8f8f8e0; --ink: #181818; --edge: #0003; --mark: #0b57d0; --paper: #fff; }
 @media (prefers-color-scheme: dark) {
-  :host { --bar: #1c1c1ee0; --ink: #f2f2f2; --edge: #fff4; --mark: #a8c7fa; }
+  :host { --bar: #1c1c1ee0; --ink: #f2f2f2; --edge: #fff4; --mark: #a8c7fa; --paper: #2c2c2e; }
 }
 .frame { position: absolute; inset: 0; pointer-events: none; container-type: size;
   font: 14px/1.4 sans-serif; color: var(--ink); }
@@ -93,7 +99,8 @@ export const CONTROLS_STYLE = `
 @container (max-width: 479px) { .place { top: 48px; z-index: -1; } }
 @container (max-width: 279px) or (max-height: 139px) { .bar, .panel { display: none; } }
 @media (prefers-reduced-motion: reduce) { .bar { transition: none; } }
-@media print { .frame { display: none; } }`;
+@media print { .frame { display: none; } }
+${EDITOR_STYLE}`;
 
 /**
  * The bar of a viewer, its panels and its marks.
@@ -105,8 +112,9 @@ export const CONTROLS_STYLE = `
  * @param {object} host `background()` in CSS; `camera(width, height)` as it is drawn; `hasLink()`,
  *   whether the page's address shares what is seen, and that `link()`; `say(text)` for a while.
  * @param {AbortSignal} signal Ends it.
- * @returns {{show: function(), drawn: function(), key: function(KeyboardEvent, EventTarget): boolean}}
- *   `show` what has changed, `drawn`: a frame; whether a `key` is taken.
+ * @returns {{show: function(), drawn: function(), key: function(KeyboardEvent, EventTarget): boolean,
+ *   undo: function(KeyboardEvent, EventTarget): boolean}} `show` what has changed, `drawn`: a frame;
+ *   whether a `key` is taken, and one with Ctrl by `undo`.
  */
 export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   const shown = { axes: false, cube: false, bounds: false, colors: false, place: false };
@@ -199,12 +207,13 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
           return { ...look, clip };
         });
     }));
-  // An editor of the transfer function comes here for VDIs that keep values; theirs have colours
-  const lookPanel = panel("Brightness, opacity and clipping",
-    factor("brightness", "Brightness"), factor("opacity", "Opacity"), ...[0, 1, 2].map(cut),
+  const editor = transferEditor(viewer, button); // of VDIs that keep values; others have colours
+  const ofColors = [factor("brightness", "Brightness"), factor("opacity", "Opacity"),
     htmlElement("small", {}, "Colours and opacities were chosen when this picture's data was made: " +
       "the sliders make all of it brighter or denser."),
-    button("As it was made", () => (viewer.look = AS_MADE), "As it was made"));
+    button("As it was made", () => (viewer.look = AS_MADE), "As it was made")];
+  const lookPanel = panel(OF_COLORS, editor.element, ...ofColors.slice(0, 2), ...[0, 1, 2].map(cut),
+    ...ofColors.slice(2));
 
   const keysShown = htmlElement("dl");
   const helpPanel = panel("Keys and gestures", keysShown);
@@ -225,7 +234,7 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   };
   const openers = new Map([
     opens("View and marks", viewsPanel, ICONS.views),
-    opens("Brightness, opacity and clipping", lookPanel, ICONS.look),
+    opens(OF_COLORS, lookPanel, ICONS.look),
     opens("Keys and gestures", helpPanel, ICONS.help),
   ]);
   const linking = button(sharing, share, strokes(ICONS.link));
@@ -335,13 +344,19 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   const isOff = () => viewer.getAttribute("controls") === "none";
   const show = () => {
     sliders.forEach((take) => take());
+    editor.show();
+    ofColors.forEach((each) => (each.hidden = Boolean(viewer.values)));
+    const called = viewer.values ? OF_VALUES : OF_COLORS;
+    for (const each of [lookPanel, openers.get(lookPanel)]) each.setAttribute("aria-label", called);
+    openers.get(lookPanel).title = called;
     const { bounds, transferFunction, scene } = viewer;
     choices.forEach((each) => (each.disabled = !bounds));
     const known = { axes: true, cube: true, bounds, colors: transferFunction, place: !scene };
     checks.forEach(([name, label]) => (label.hidden = !known[name]));
     linking.hidden = entries[1].hidden = !host.hasLink();
     place.hidden = !shown.place || Boolean(scene);
-    keysShown.replaceChildren(...[...KEYS, ...(viewer.series ? KEYS_OF_SERIES : [])].flatMap(
+    keysShown.replaceChildren(...[...KEYS, ...(viewer.series ? KEYS_OF_SERIES : []),
+      ...(viewer.values ? KEYS_OF_VALUES : [])].flatMap(
       ([key, does]) => [htmlElement("dt", {}, key), htmlElement("dd", {}, does)]));
     drawn();
   };
@@ -353,15 +368,15 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
       if (event.key === "?") open(helpPanel.hidden ? helpPanel : null, canvas);
       else if (canFill && event.key.toLowerCase() === "f") goFull();
       else return false;
-    } else { // buttons and sliders do it by themselves
+    } else if (!editor.key(event, target)) { // buttons and sliders do it by themselves
       return frame.contains(target) && ([" ", "Enter"].includes(event.key) ||
-        (target.type === "range" && OF_SLIDER.test(event.key)));
+        (["range", "select-one"].includes(target.type) && OF_SLIDER.test(event.key)));
     }
     event.preventDefault();
     return true;
   };
   show();
-  return { show, drawn, key };
+  return { show, drawn, key, undo: (event, target) => !isOff() && editor.undo(event, target) };
 }
 
 // What is seen, over its background, as a PNG file.

@@ -15,13 +15,14 @@ export const GRID = 2 ** 24 - 2 ** 15;
 const MAX_EDGE = 65536;
 const DESCRIPTION = "vdi.json";
 const COARSE = "coarse.vdi";
+const WITH_VALUES = "pyvista-vdi-deferred";
 
 /**
  * Takes a .vdi file piece by piece; gives its coarse level as soon as that is there.
  *
  * @param {(vdi: object) => void} onLevel Called with the VDI of each level, "coarse" before "full".
- * @param {(vdi: object) => void} onBegin Called before a coarse level, which is in 8 bytes, with
- *   the camera, windowSize, bounds and depthOrigin.
+ * @param {(vdi: object) => void} onBegin Called before a level in 8 bytes, where that is known, with
+ *   the camera, windowSize, bounds, depthOrigin and values.
  */
 export class LevelDecoder {
   constructor(onLevel, onBegin) {
@@ -57,10 +58,12 @@ export class LevelDecoder {
     if (members.size < 2) return;
     this.beginning = false;
     const coarse = members.get(COARSE);
-    if (!coarse) return;
     const whole = described(members);
-    const { windowSize, camera, bounds, depthOrigin, metadata, pictureSize } = whole.view;
-    this.onBegin({ windowSize, camera, bounds, depthOrigin });
+    const { windowSize, camera, bounds, depthOrigin, metadata, pictureSize, values } = whole.view;
+    if (coarse || (values && whole.precision === "8-byte")) {
+      this.onBegin({ windowSize, camera, bounds, depthOrigin, values });
+    }
+    if (!coarse) return;
     const vdi = await decodeVDI(checkedMember(coarse), "coarse");
     this.onLevel({ ...vdi, metadata, pictureSize });
   }
@@ -72,7 +75,7 @@ export class LevelDecoder {
  * @param {Uint8Array} bytes The file.
  * @param {"coarse"|"full"} level What the VDI is said to be.
  * @returns {Promise<object>} windowSize [W, H], camera, bounds, depthOrigin, metadata, pictureSize,
- *   level, precision ("exact" or "8-byte"), offsets: Uint32Array(W H + 1). Exact: front, back,
+ *   values (of lists that keep them, in the places of colours and optical depths), level, precision ("exact" or "8-byte"), offsets: Uint32Array(W H + 1). Exact: front, back,
  *   opticalDepth: Float32Array(n), color: Float32Array(3 n). 8-byte: words: Uint32Array(2 n),
  *   origin: Int32Array(W H), stride: Uint16Array(W H), depthStep. Frames and units:
  *   docs/conventions.md, "The arrays of a VDI".
@@ -159,7 +162,7 @@ function described(members) {
     if (error instanceof VDIFileError) throw error;
     damaged(`its description is no JSON (${error.message})`);
   }
-  if (d?.format !== "pyvista-vdi") {
+  if (d?.format !== "pyvista-vdi" && d?.format !== WITH_VALUES) {
     throw new VDIFileError(`this is no VDI file: ${DESCRIPTION} does not name the format`);
   }
   if (!VERSIONS.includes(d.version)) {
@@ -182,7 +185,8 @@ function described(members) {
     precision: d.version === 2 || ["exact", "16-byte", "8-byte"].includes(d.precision),
     depth_step: d.precision !== "8-byte" || Number.isInteger(Math.log2(d.depth_step)),
   });
-  return { ...d, view: checkedView(d), n, precision: d.version === 2 ? "exact" : d.precision };
+  const view = { ...checkedView(d), ...(d.format === WITH_VALUES && { values: checkedValues(d) }) };
+  return { ...d, view, n, precision: d.version === 2 ? "exact" : d.precision };
 }
 
 const areNumbers = (x, length) =>
@@ -205,6 +209,22 @@ export function checkedView(d) {
     windowSize: d.window_size, camera: d.camera, bounds: d.bounds, depthOrigin: d.depth_origin,
     metadata: d.metadata, pictureSize: pictureSize(d),
   };
+}
+
+// What is known of lists that keep values: their range, and lengths in model units.
+function checkedValues({ precision, deferred }) {
+  if (deferred?.version !== 1) {
+    throw new VDIFileError(`the VDI file keeps values in version ${deferred?.version}; this viewer reads 1`);
+  }
+  const isLength = (x) => x > 0 && x < Infinity;
+  const { value_range: range, unit_distance: unitDistance, sample_distance: sampleDistance } = deferred;
+  requireAll({ precision, ...deferred }, {
+    precision: precision !== "16-byte",
+    value_range: areNumbers(range, 2) && range[0] < range[1],
+    unit_distance: isLength(unitDistance),
+    sample_distance: isLength(sampleDistance),
+  });
+  return { range, unitDistance, sampleDistance };
 }
 
 function requireAll(d, good) {

@@ -18,11 +18,27 @@ export interface ClippingPlane {
   normal: Vector;
 }
 
+/** Of a VDI that keeps values: opacities at shares of `clim`; a `cmap` of null has the file's colours. */
+export interface ViewerTransfer {
+  cmap: string | null;
+  clim: [number, number];
+  /** x, opacity, x, opacity, ...: 0 to 1. */
+  points: number[];
+}
+
+export interface ViewerValues {
+  range: [number, number];
+  /** By length, in bins of the range. */
+  histogram: Float32Array;
+  start: ViewerTransfer;
+}
+
 /** Factors of colours and of optical depths; shares of the bounds: x0, x1, y0, y1, z0, z1. */
 export interface ViewerLook {
   brightness: number;
   opacity: number;
   clip: [number, number, number, number, number, number];
+  transfer?: ViewerTransfer;
 }
 
 export interface ViewerStatus {
@@ -67,6 +83,7 @@ export class VDIViewer extends HTMLElement {
   scene: Scene | null;
   time: number | null;
   readonly bounds: number[] | null;
+  readonly values: ViewerValues | null;
   readonly transferFunction: { colors: Vector[]; scalar_range: [number, number] } | null;
   readonly status: ViewerStatus;
   readonly series: { times: number[]; length: number; nearest(time: number): number } | null;

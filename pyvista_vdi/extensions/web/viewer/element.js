@@ -14,6 +14,7 @@ import { Raycaster } from "./raycast.js";
 import { frameOf, isParallel } from "./rays.js";
 import { MOST_CLIPPING_PLANES } from "./shader.js";
 import { Surround } from "./surround.js";
+import { editedFrom, startOf, toldOf } from "./values.js";
 import { dot } from "./vectors.js";
 
 const STYLE = `
@@ -182,7 +183,7 @@ export class VDIViewer extends HTMLElement {
     this.invalidate();
   }
 
-  /** How it is shown: `{brightness, opacity, clip}`; what is not set is as the VDI was made. */
+  /** How it is shown: `{brightness, opacity, clip, transfer}`; what is not set is as the VDI was made. */
   get look() {
     return structuredClone(this.#look);
   }
@@ -218,8 +219,17 @@ export class VDIViewer extends HTMLElement {
     });
   }
 
+  /** Of a VDI that keeps values: their `range`, a `histogram` by length and the `start` of editing; or null. */
+  get values() {
+    const { values } = this.#prepared ?? {};
+    if (!values || this.#scene) return null;
+    values.start ??= editedFrom(startOf(this.#prepared));
+    return values;
+  }
+
   /** The transfer function of the VDI, as its file has it: `colors`, `scalar_range` and others; or null. */
   get transferFunction() {
+    if (this.#prepared?.values) return toldOf(this.#prepared, this.#look.transfer);
     const { transfer_function: told } = this.#prepared?.metadata ?? {};
     return told?.colors?.length && told.scalar_range ? told : null;
   }
@@ -686,7 +696,7 @@ export class VDIViewer extends HTMLElement {
 
   // Whether a key that is pressed in here is taken.
   #key(event, target) {
-    if (event.altKey || event.metaKey || event.ctrlKey) return false;
+    if (event.altKey || event.metaKey || event.ctrlKey) return this.#bar?.undo(event, target) ?? false;
     if (this.#bar?.key(event, target)) return true;
     if (this.#parts.frame.contains(target)) return false;
     if (target !== this.#parts.canvas || !this.#camera) {

@@ -6,13 +6,15 @@ export function htmlElement(name, { label, ...properties } = {}, ...children) {
   return made;
 }
 
+/** The same of SVG, with attributes. */
+export function svgElement(name, attributes, ...children) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
 /** Return a picture of strokes, as an SVG path in a square of 20 x 20, which takes the text's colour. */
-export function strokes(path) {
-  const [svg, line] = ["svg", "path"].map((name) =>
-    document.createElementNS("http://www.w3.org/2000/svg", name));
-  svg.setAttribute("viewBox", "0 0 20 20");
-  svg.setAttribute("aria-hidden", "true");
-  line.setAttribute("d", path);
-  svg.append(line);
-  return svg;
+export function strokes(d) {
+  return svgElement("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svgElement("path", { d }));
 }

@@ -6,6 +6,7 @@ import { AS_MADE, checkedLook } from "./look.js";
 const WRITTEN_AFTER = 300;
 
 const LISTS = { position: 3, focal_point: 3, view_up: 3, window_center: 2, clip: 6 };
+const OF_TRANSFER = { cmap: (x) => x, clim: numbersIn, points: numbersIn };
 const NUMBERS = ["view_angle", "parallel_scale", "brightness", "opacity", "time"];
 
 const keysTaken = new Set(); // by viewers of this page
@@ -17,12 +18,14 @@ const keysTaken = new Set(); // by viewers of this page
  * @returns {string} `position:80,40,90/focal_point:...`; what is as it was made is left out.
  */
 export function textOfView({ camera, look = AS_MADE, time = null }) {
-  const said = { ...camera };
-  for (const [name, value] of Object.entries(look)) {
+  const { transfer, ...rest } = look, said = { ...camera };
+  for (const [name, value] of Object.entries(rest)) {
     if (JSON.stringify(value) !== JSON.stringify(AS_MADE[name])) said[name] = value;
   }
   if (time !== null) said.time = time;
-  return Object.entries(said).filter(([name]) => name in LISTS || NUMBERS.includes(name))
+  for (const name of Object.keys(OF_TRANSFER)) if (transfer?.[name]) said[name] = transfer[name];
+  return Object.entries(said)
+    .filter(([name]) => name in LISTS || name in OF_TRANSFER || NUMBERS.includes(name))
     .map(([name, value]) => `${name}:${value}`).join("/");
 }
 
@@ -32,13 +35,17 @@ export function textOfView({ camera, look = AS_MADE, time = null }) {
  * @throws {TypeError} That names what is wrong.
  */
 export function viewOfText(text) {
-  const said = {};
+  const said = {}, transfer = {};
   for (const entry of text.split("/")) {
     const [name, value = ""] = entry.split(":");
+    if (Object.hasOwn(OF_TRANSFER, name)) {
+      transfer[name] = OF_TRANSFER[name](value);
+      continue;
+    }
     if (!Object.hasOwn(LISTS, name) && !NUMBERS.includes(name)) {
       throw new TypeError(`A view in an address has no "${name}".`);
     }
-    const numbers = value.split(",").map((part) => (part.trim() ? Number(part) : NaN));
+    const numbers = numbersIn(value);
     if (numbers.length !== (LISTS[name] ?? 1) || !numbers.every(Number.isFinite)) {
       throw new TypeError(`The ${name} of a view in an address is ${LISTS[name] ?? 1} numbers ` +
         `with commas; got "${value}".`);
@@ -46,7 +53,12 @@ export function viewOfText(text) {
     said[name] = name in LISTS ? numbers : numbers[0];
   }
   const { brightness = 1, opacity = 1, clip = AS_MADE.clip, time = null, ...camera } = said;
-  return { camera: checkedCamera(camera), look: checkedLook({ brightness, opacity, clip }), time };
+  const look = { brightness, opacity, clip, ...(Object.keys(transfer).length && { transfer }) };
+  return { camera: checkedCamera(camera), look: checkedLook(look), time };
+}
+
+function numbersIn(text) {
+  return text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
 }
 
 const partsOfHash = (hash) => hash.replace(/^#/, "").split("&").filter(Boolean);

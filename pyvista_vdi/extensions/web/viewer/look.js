@@ -1,5 +1,6 @@
 // How a VDI is shown beside its camera: brighter, denser, or a part of its box.
 import { checkedNumbers } from "./camera.js";
+import { checkedTransfer } from "./values.js";
 
 /** As it was made. */
 export const AS_MADE = Object.freeze({
@@ -14,10 +15,11 @@ export const MOST_FACTOR = 16;
  *
  * @param {object} look What is left out is as the VDI was made. `brightness` multiplies colours,
  *   `opacity` optical depths; `clip`: low and high of x, y and z, as shares of the VDI's bounds.
+ *   `transfer`: the transfer function of a VDI that keeps values, of values.js.
  * @throws {TypeError} That names what is wrong.
  */
 export function checkedLook(look) {
-  const { brightness, opacity, clip } = { ...AS_MADE, ...look };
+  const { brightness, opacity, clip, transfer } = { ...AS_MADE, ...look };
   for (const [name, value] of Object.entries({ brightness, opacity })) {
     if (!(value >= 1 / MOST_FACTOR && value <= MOST_FACTOR)) {
       throw new TypeError(`A look's ${name} is a factor from 1/${MOST_FACTOR} to ${MOST_FACTOR}; ` +
@@ -29,7 +31,8 @@ export function checkedLook(look) {
     throw new TypeError("A look's clip goes from a lower to a higher share of the bounds, 0 to 1, " +
       `along x, y and z; got ${ends}.`);
   }
-  return { brightness: Number(brightness), opacity: Number(opacity), clip: ends };
+  return { brightness: Number(brightness), opacity: Number(opacity), clip: ends,
+    ...(transfer && { transfer: checkedTransfer(transfer) }) };
 }
 
 /** Whether a look is the one that the VDI was made with. */

@@ -8,6 +8,8 @@ export const STACK_SHIFT = 4;
 const SLABS = 64;
 /** Squares of stacks along the grid's longer edge, with a box around what is occupied of each. */
 const SQUARES = 16;
+/** Bins of the histogram of values. */
+const BINS = 128;
 const LARGEST = 3.4028234663852886e38;
 const SMALLEST = 1.1754943508222875e-38;
 
@@ -28,6 +30,7 @@ export function prepare(vdi) {
     pictureSize: vdi.pictureSize, metadata: vdi.metadata, n, frame, space, packed, ...arrays,
     step: packed ? vdi.depthStep * frame.scale : 0,
     corners: occupiedBoxes(vdi, frame, space, arrays),
+    ...(vdi.values && { values: preparedValues(vdi, frame, space) }),
   };
 }
 
@@ -73,7 +76,7 @@ function exactLists(vdi, frame, space, n) {
       media[4 * k] = color[3 * k];
       media[4 * k + 1] = color[3 * k + 1];
       media[4 * k + 2] = color[3 * k + 2];
-      media[4 * k + 3] = Math.min(opticalDepth[k] / length, LARGEST);
+      media[4 * k + 3] = vdi.values ? opticalDepth[k] : Math.min(opticalDepth[k] / length, LARGEST);
       slabs.occupy(list, front[k], back[k]);
     }
   }
@@ -106,6 +109,37 @@ function packedLists(vdi, frame, space, n) {
     faces.set(words);
   }
   return { lists, faces, ...slabs.grid };
+}
+
+// How long the values are that lie in each bin of their range; and steps per model' length.
+function preparedValues(vdi, frame, space) {
+  const { offsets, windowSize, words, stride, bounds, values } = vdi;
+  const histogram = new Float32Array(BINS);
+  for (let list = 0; list + 1 < offsets.length; ++list) {
+    if (offsets[list] === offsets[list + 1]) continue;
+    const code = (words ? stride[list] * vdi.depthStep : 1) * centreRay(space, windowSize, list);
+    for (let k = offsets[list]; k < offsets[list + 1]; ++k) {
+      const [mean, spread, share, depth] = words ? valuesOfWords(words[2 * k], words[2 * k + 1])
+        : [vdi.color[3 * k] + vdi.color[3 * k + 1] / 255, vdi.opticalDepth[k], vdi.color[3 * k + 2],
+          vdi.back[k] - vdi.front[k]];
+      const bin = (x) => Math.min(Math.max(Math.floor(x * BINS), 0), BINS - 1);
+      const first = bin(mean - Math.sqrt(3) * spread), last = bin(mean + Math.sqrt(3) * spread);
+      const length = depth * code * share / (last - first + 1);
+      for (let b = first; b <= last; ++b) histogram[b] += length;
+    }
+  }
+  const diagonal = Math.hypot(...[0, 2, 4].map((k) => bounds[k + 1] - bounds[k])) || 1;
+  return { ...values, histogram, stepsPerLength: diagonal / values.sampleDistance };
+}
+
+const spreadRead = new Float32Array(1), spreadBits = new Uint32Array(spreadRead.buffer);
+
+// Mean, spread, share and thickness in codes, as mediumMet of shader.js has them.
+function valuesOfWords(first, second) {
+  const tau = (first >>> 28) | ((second & 255) << 4);
+  spreadBits[0] = tau ? (tau + (109 << 7) - 1) << 16 : 0;
+  return [((second >>> 8) & 255) / 255 + ((second >>> 16) & 255) / 65025, spreadRead[0], (second >>> 24) / 255,
+    ((first >>> 14) & 16383) - (first & 16383)];
 }
 
 // The occupancy grid (paper, section 4): one bit for each slab of equal view depth of each stack.

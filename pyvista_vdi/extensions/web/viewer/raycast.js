@@ -6,6 +6,7 @@ import {
   thinnedSpace,
 } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
+import { MEAN_STEPS, SPREADS, fillTable } from "./values.js";
 
 /** A ray ends where less transmittance than this is left. */
 const TRANSMITTANCE_CUTOFF = 1e-6;
@@ -53,12 +54,27 @@ export class Raycaster {
       faces: this.texture(prepared.faces, prepared.packed ? "RG32UI" : "RG32F", TEXTURE_WIDTH),
     };
     if (!prepared.packed) textures.media = this.texture(prepared.media, "RGBA32F", TEXTURE_WIDTH);
+    if (prepared.values) {
+      textures.table = this.texture(new Float32Array(4 * (MEAN_STEPS + 1) * SPREADS), "RGBA32F", MEAN_STEPS + 1);
+    }
     if (gl.getError() === gl.OUT_OF_MEMORY) {
       Object.values(textures).forEach((texture) => gl.deleteTexture(texture));
       throw new Error(`The graphics memory cannot hold ${prepared.n} supersegments.`);
     }
     this.free();
     this.vdi = { ...prepared, textures, lists: null, masks: null, faces: null, media: null };
+    this.transfer = undefined; // what the table is of
+  }
+
+  // Have the table that of a transfer function, null: of the one that the file starts with.
+  classify(transfer) {
+    if (transfer === this.transfer) return;
+    const { gl, vdi } = this;
+    vdi.table ??= new Float32Array(4 * (MEAN_STEPS + 1) * SPREADS);
+    fillTable(vdi, transfer, vdi.table);
+    gl.bindTexture(gl.TEXTURE_2D, vdi.textures.table);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, MEAN_STEPS + 1, SPREADS, gl.RGBA, gl.FLOAT, vdi.table);
+    this.transfer = transfer;
   }
 
   texture(array, format, width) {
@@ -99,6 +115,7 @@ export class Raycaster {
     few = false, look = AS_MADE, cutoff = TRANSMITTANCE_CUTOFF, finds = false }) {
     const { gl, vdi } = this;
     if (!vdi) return;
+    if (vdi.values) this.classify(look.transfer ?? null);
     const { bounds } = vdi;
     const thinned = few ? this.thinning(camera) : [0, 0];
     const { space, windowSize } = thinned.some(Boolean)
@@ -111,7 +128,7 @@ export class Raycaster {
       throw new Error(`A VDI is clipped to at most ${clippingPlanes.length - planes.length +
         MOST_PLANES} planes, not to ${clippingPlanes.length}.`);
     }
-    const { program, uniforms: u } = this.program(space, vdi.packed, depthTexture, planes);
+    const { program, uniforms: u } = this.program(space, vdi, depthTexture, planes);
     gl.useProgram(program);
     gl.viewport(...corner, width, height);
     const halves = (forms) => [0, 3].map((k) => forms.flatMap((form) => form.slice(k, k + 3)));
@@ -227,10 +244,11 @@ export class Raycaster {
     const rays = pixelRays(frame, camera, windowSize);
     const { planes } = frameForms(frame, space, windowSize, rays, space.parallel, []);
     const known = this.programs.size;
-    const { program, uniforms } = this.program(space, true, null, planes);
+    const { program, uniforms } = this.program(space, { packed: true, values: vdi.values }, null, planes);
     if (this.programs.size === known) return;
     gl.useProgram(program);
     gl.uniform3fv(uniforms.planeValue, new Float32Array(3 * planes.length).fill(-1));
+    if (uniforms.table) gl.uniform1i(uniforms.table, 1); // floats, and all others are whole numbers
     const everything = this.texture(new Uint32Array(4), "RGBA32UI", 1);
     gl.viewport(0, 0, 1, 1);
     gl.bindVertexArray(this.vertices);
@@ -239,10 +257,10 @@ export class Raycaster {
     gl.deleteTexture(everything);
   }
 
-  program({ parallel, shifted }, packed, opaque, { length }) {
+  program({ parallel, shifted }, { packed, values }, opaque, { length }) {
     const { gl } = this;
     const defines = [parallel && "PARALLEL", shifted && "SHIFTED", packed && "PACKED",
-      opaque && "OPAQUE"].filter(Boolean);
+      opaque && "OPAQUE", values && "VALUES"].filter(Boolean);
     const key = [...defines, length].join();
     if (!this.programs.has(key)) {
       const program = linked(gl, VERTEX_SHADER, fragmentShader(defines, length));

@@ -7,7 +7,9 @@
 // PARALLEL, SHIFTED    the depth coordinate: Z - Z_ref; (Z - Z_ref) / Z, for long lenses; else -1/Z
 // PACKED               8-byte supersegments
 // OPAQUE               rays end at the opaque depth of their pixel
+// VALUES               supersegments keep values, which a table makes media of
 import { STACK_SHIFT, TEXTURE_WIDTH } from "./prepare.js";
+import { FIRST_SPREAD, MEAN_STEPS, SPREADS } from "./values.js";
 
 /** Planes of the user's that a ray can be clipped to. */
 export const MOST_CLIPPING_PLANES = 24;
@@ -34,6 +36,9 @@ precision highp usampler2D;
 #define PLANES ${planes}
 #define WIDTH_SHIFT ${Math.log2(TEXTURE_WIDTH)}
 #define STACK_SHIFT ${STACK_SHIFT}
+#define MEAN_STEPS ${MEAN_STEPS}
+#define SPREADS ${SPREADS}
+#define FIRST_SPREAD ${FIRST_SPREAD}
 ${SOURCE.replace("CLIPPING", clipping.join("\n"))}`;
 }
 
@@ -55,6 +60,9 @@ uniform usampler2D faces;         // both words of a supersegment
 uniform float codeStep, nearest;  // world'; least offset in front of the eye
 #else
 uniform sampler2D faces, media;
+#endif
+#ifdef VALUES
+uniform sampler2D table;          // of values.js: media by mean and spread
 #endif
 #ifdef OPAQUE
 uniform sampler2D opaque;         // view depth, world units
@@ -132,6 +140,16 @@ vec2 facesMet(int n) {
   return away ? face : -face.yx;
 }
 
+#ifdef VALUES
+// The medium of a mean, a spread and the share of the length that holds them.
+vec4 classified(float mean, float spread, float share) {
+  int row = int(floatBitsToUint(spread) + (1u << 19) >> 20) - FIRST_SPREAD;
+  ivec2 at = ivec2(int(mean * float(MEAN_STEPS) + 0.5), clamp(row, 0, SPREADS - 1));
+  vec4 medium = texelFetch(table, min(at, ivec2(MEAN_STEPS, SPREADS - 1)), 0);
+  return vec4(medium.rgb, medium.a * share);
+}
+#endif
+
 // Straight colour, and extinction per model' length.
 vec4 mediumMet(int n) {
 #ifdef PACKED
@@ -139,10 +157,19 @@ vec4 mediumMet(int n) {
   uint tau = words.x >> 28 | (words.y & 255u) << 4;
   float thickness = float(int(words.x >> 14 & 16383u) - int(words.x & 16383u));
   float depth = tau > 0u ? uintBitsToFloat((tau + ((127u - 18u) << 7) - 1u) << 16) : 0.0;
+#ifdef VALUES
+  vec3 bytes = vec3(words.yyy >> uvec3(8, 16, 24) & 255u) / 255.0;
+  return classified(bytes.x + bytes.y / 255.0, depth, bytes.z);
+#else
   float extinction = min(depth * uintBitsToFloat(list.w) / thickness, 3.4e38);
   return vec4(vec3(words.yyy >> uvec3(8, 16, 24) & 255u) / 255.0, extinction);
+#endif
 #else
-  return texelFetch(media, place(n), 0);
+  vec4 medium = texelFetch(media, place(n), 0);
+#ifdef VALUES
+  medium = classified(medium.x + medium.y / 255.0, medium.w, medium.z);
+#endif
+  return medium;
 #endif
 }
 

@@ -13,6 +13,7 @@ const { checkedCamera, lookingAt } = await import(`${viewer}/camera.js`);
 const { textOfView, viewOfText } = await import(`${viewer}/link.js`);
 const { AS_MADE, checkedLook, isAsMade } = await import(`${viewer}/look.js`);
 const { inShort, viewAt } = await import(`${viewer}/marks.js`);
+const { checkedTransfer, editedFrom } = await import(`${viewer}/values.js`);
 
 const camera = checkedCamera({
   position: [2.1, 1 / 3, -1.7e-9], focal_point: [0, 0, 0], view_up: [0, 1, 0], view_angle: 30,
@@ -22,6 +23,32 @@ test("a view goes into text and comes back with every bit", () => {
   const look = checkedLook({ brightness: 2 ** 0.35, clip: [0.1, 1, 0, 1, 0, 0.7] });
   const state = { camera, look, time: -2.5 };
   assert.deepEqual(viewOfText(textOfView(state)), state);
+});
+
+test("a transfer function goes into text and comes back", () => {
+  for (const cmap of [null, "bone"]) {
+    const transfer = { cmap, clim: [-1 / 3, 1e6], points: [0, 0.125, 0.5, 1] };
+    const state = { camera, look: checkedLook({ transfer }), time: null };
+    assert.deepEqual(viewOfText(textOfView(state)), state);
+  }
+});
+
+test("what is no transfer function is refused by name", () => {
+  for (const [transfer, why] of [
+    [{ cmap: "no", clim: [0, 1], points: [0, 1] }, /colour map is one of gray/],
+    [{ clim: [1, 0], points: [0, 1] }, /clim is two numbers/],
+    [{ clim: [0, 1], points: [0.5, 1, 0.4, 1] }, /1 to 64 points/],
+    [{ clim: [0, 1], points: [0, 2] }, /1 to 64 points/], [{ clim: [0, 1], points: [] }, /1 to 64 points/],
+  ]) assert.throws(() => checkedTransfer(transfer), { name: "TypeError", message: why });
+});
+
+test("a curve becomes few points, which are on it", () => {
+  const opacities = Array.from({ length: 257 }, (_, k) => Math.max(0, 1 - Math.abs(k - 128) / 32));
+  const { points, clim } = editedFrom({ opacities, scalar_range: [2, 5] });
+  assert.deepEqual(clim, [2, 5]);
+  assert.deepEqual(points, [0, 0, 0.375, 0, 0.5, 1, 0.625, 0, 1, 0]);
+  assert.deepEqual(editedFrom({ opacities: [0.3], scalar_range: [4, 4] }),
+    { cmap: null, clim: [3.5, 4.5], points: [0, 0.3, 1, 0.3] });
 });
 
 test("what is as it was made is not said", () => {
