@@ -17,6 +17,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
 #: whatever lies before it: 1 - 2^-36 n is 1 for the voxels n of any ray.
