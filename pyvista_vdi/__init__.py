@@ -76,6 +76,7 @@ registry.core = registry.Extension(
     },
     methods={
         "DeferredVDI.classified": "pyvista_vdi.api.deferred:classified",
+        "VDICollection.classified": "pyvista_vdi.api.deferred:classified_each",
         "TransferFunction.from_arguments": (
             "pyvista_vdi.plotting.classify:transfer_function_from_arguments"
         ),

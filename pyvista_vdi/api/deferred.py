@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.classification import Classification, refuse_unknown
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import declared
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 
@@ -21,6 +23,24 @@ _SAID_BEFORE = ("scalars", "preference", "interpolation")
 
 def classified(deferred: DeferredVDI, look: Mapping[str, Any]) -> VDI:
     """Return what :meth:`DeferredVDI.classified` does."""
+    return classify_on_device(deferred, _table_of(look, deferred.value_range), look.get("device"))
+
+
+def classified_each(collection: VDICollection, look: Mapping[str, Any]) -> VDICollection:
+    """Return what :meth:`VDICollection.classified` does."""
+    ends = collection.value_range
+    if ends is None:
+        raise InvalidVDIError(
+            "these VDIs have colours already: a look is for those that keep values, which "
+            "classification='deferred' makes"
+        )
+    table, device = _table_of(look, ends), look.get("device")
+    made: Any = lambda vdi: classify_on_device(vdi, table, device)  # noqa: E731
+    return collection._mapped(made)
+
+
+def _table_of(look: Mapping[str, Any], ends: tuple[float, float]) -> TransferFunction:
+    """Return the transfer function of a look, for values of a range."""
     refuse_unknown(look, "classified", (*declared(Classification), "device"))
     asked = Classification(**{name: value for name, value in look.items() if name != "device"})
     asked.require_composite()
@@ -31,7 +51,5 @@ def classified(deferred: DeferredVDI, look: Mapping[str, Any]) -> VDI:
                 "and leave it out here"
             )
     # The range of the values stands for those of the volume
-    ends = deferred.value_range
     values: Any = SimpleNamespace(array=np.array(ends), rgba=False, finite_range=lambda: ends)
-    table = asked.transfer_function_of(values)
-    return classify_on_device(deferred, table, look.get("device"))
+    return asked.transfer_function_of(values)

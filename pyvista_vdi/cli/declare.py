@@ -376,7 +376,7 @@ def deferral(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "classified afterwards", "Values are kept: convert, render and view then take the look."
     )
-    known(group, "classification", default=..., choices=_DECLARED["classification"].choices)
+    known(group, "classification", choices=_DECLARED["classification"].choices)
     known(group, "value_range", ("LOW", "HIGH"), parse_number, nargs=2)
     known(group, "importance", "A,B,...", parse_numbers)
 

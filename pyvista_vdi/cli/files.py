@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -173,7 +174,7 @@ def _text(about: FileInfo) -> str:
         "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}",
         "written by": f"{about.written_by}, format version {about.format_version}",
         "lists": f"{width} x {height}",
-        **({} if about.deferred is None else _of_values(about.deferred)),
+        **({} if about.deferred is None else of_values(about.deferred["value_range"])),
         "supersegments": f"{about.n_supersegments}, "
         f"{about.n_supersegments / (width * height):.2f} per list",
         "precision": about.precision,
@@ -188,9 +189,9 @@ def _text(about: FileInfo) -> str:
     return table(rows)
 
 
-def _of_values(deferred: dict[str, Any]) -> dict[str, str]:
+def of_values(value_range: Sequence[float]) -> dict[str, str]:
     """Return what is known of lists that keep values."""
-    low, high = deferred["value_range"]
+    low, high = value_range
     return {"kind": f"values from {low:g} to {high:g}, classified afterwards"}
 
 

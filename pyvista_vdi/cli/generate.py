@@ -13,6 +13,7 @@ from pyvista_vdi.cli.inputs import (
     classification,
     file_options,
     has_own_place,
+    kept_values,
     measuring,
     read_volume,
     say_vdi,
@@ -38,7 +39,7 @@ def generate(options: argparse.Namespace) -> int:
     target = QualityTarget(**asked)  # refused before the volume is read, too
     arguments = classification(options)
     looks = Classification.composited(arguments, "generate")  # refused before the volume is read
-    kept = {name: getattr(options, name) for name in declared(Deferral)}
+    kept = kept_values(options)
     deferred = Deferral(**kept).deferred
     if deferred:
         looks.require_no_look()

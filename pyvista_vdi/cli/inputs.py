@@ -26,7 +26,7 @@ from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import declared
+from pyvista_vdi.model.options import Deferral, declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -172,6 +172,12 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
+def kept_values(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments that say what is kept where scalars are classified afterwards."""
+    given = {name: getattr(options, name) for name in declared(Deferral)}
+    return {name: value for name, value in given.items() if value is not None}
+
+
 def has_vtk(options: argparse.Namespace) -> bool:
     """Whether VTK's mappers take part; says so where they cannot."""
     if not options.no_vtk and find_spec(BACKEND) is None:
@@ -299,7 +305,7 @@ def with_look(options: argparse.Namespace, found: Any, file: str, *, colors: boo
 
     Where it does not, a look is refused, and where ``colors`` are needed the lack of one.
     """
-    if isinstance(found, DeferredVDI):
+    if getattr(found, "value_range", None) is not None:
         look = classification(options)
         if colors and not look:
             raise UnsupportedError(

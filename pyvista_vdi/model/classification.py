@@ -266,7 +266,7 @@ def refuse_unknown(given: Mapping[str, Any], function: str, known: tuple[str, ..
         suggestion = meant if meant in known else near[0] if near else None
         hint = f"did you mean {suggestion!r}?" if suggestion else f"known are {', '.join(known)}"
         if name in ("classification", "value_range", "importance"):
-            hint = "values in place of colours are kept by single VDIs of pyvista_vdi.generate"
+            hint = "values in place of colours are kept by generate, generate_series and InSitu"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
 
 

@@ -1,14 +1,18 @@
 """Several VDIs of one scene, shown as one: what extensions derive series and sets from."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
+from pyvista_vdi import registry
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI
 
 #: Steps per second at which those of several times are played.
 RATE = 24.0
+
+
+_Collection = TypeVar("_Collection", bound="VDICollection")
 
 
 class VDICollection(Sequence[VDI]):
@@ -28,3 +32,37 @@ class VDICollection(Sequence[VDI]):
     @abstractmethod
     def nearest(self, at: Any) -> int:
         """Return the index of the VDI that is nearest to a time, or to a view."""
+
+    @property
+    def value_range(self) -> tuple[float, float] | None:
+        """Least and largest value that its VDIs keep; ``None`` where they have colours."""
+        return getattr(self[0], "value_range", None)
+
+    def classified(self: _Collection, **look: Any) -> _Collection:
+        """Return it with the colours that a transfer function makes of the values that it keeps.
+
+        Parameters
+        ----------
+        **look
+            As for :meth:`DeferredVDI.classified`; what is not given follows from the range of the
+            first VDI's values, so that a colour stands for the same value in all of them.
+
+        Returns
+        -------
+        VDISeries or VDISet
+            Of ordinary VDIs, each of which is made when it is asked for.
+
+        Raises
+        ------
+        InvalidVDIError
+            If its VDIs have colours.
+
+        See Also
+        --------
+        DeferredVDI.classified : has the other errors, and the warning.
+        """
+        return registry.method("VDICollection.classified")(self, look)  # type: ignore[no-any-return]
+
+    def _mapped(self: _Collection, function: Callable[[VDI], VDI]) -> _Collection:
+        """Return it with what a function makes of each VDI, when that is asked for."""
+        raise NotImplementedError

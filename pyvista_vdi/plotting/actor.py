@@ -12,7 +12,6 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods, keep, let_go
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, weakly
 
 # PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
@@ -142,9 +141,10 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             mine.source.SetVolumeProperty(prop)
             if mine is not shown:
                 mapper.driver.set_input(mine)
-        elif mapper is not None and isinstance(mapper.driver.input, DeferredInput):
-            # Classified by the other one from now on
-            mapper.SetInputData(DeferredInput(mapper.driver.input.deferred, prop))
+        elif mapper is not None and (shown := mapper.driver.input) is not None:
+            mine = shown.classified_by(prop)
+            if mine is not shown:
+                mapper.SetInputData(mine)
         super().SetProperty(prop)
 
     def add_time_slider(self, plotter: Any, **options: Any) -> Any:

@@ -18,6 +18,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.io import is_vdi_file, read
+from pyvista_vdi.io.files import holds
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.model.camera import Camera
@@ -44,7 +45,8 @@ def prepared(
     """Return what can be shown of what is given, and the level of a store that this is."""
     stored, array = None, scalars if isinstance(scalars, str) else None
     if isinstance(volume, str | os.PathLike):
-        volume = read(volume) if is_vdi_file(volume) else read_volume(volume, array=array)
+        ours = is_vdi_file(volume) or holds(volume) in ("series", "set")
+        volume = read(volume) if ours else read_volume(volume, array=array)
     if isinstance(volume, StoredVolume):
         stored = volume.in_view(
             framing_camera(plotter, volume.bounds), window_size=plotter.window_size

@@ -17,16 +17,19 @@ from typing import Any
 
 from pyvista_vdi import registry
 from pyvista_vdi.cli import declare
+from pyvista_vdi.cli.files import of_values
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     OF_ANY_VOLUME,
     PLACE,
     classification,
+    kept_values,
     measuring,
     of_the_file,
     part,
     refuse,
     say_written,
+    with_look,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
@@ -40,6 +43,7 @@ from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import Deferral, declared
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE
 from pyvista_vdi.model.vdi import VDI
@@ -58,7 +62,7 @@ def series(options: argparse.Namespace) -> int:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
     if kinds[0] != "volume":
         of_volumes = (*OF_ANY_VOLUME, *PLACE, "view_angle", "sample_distance", "memory_limit")
-        refuse(options, (*of_volumes, "scheduler"), "volumes")
+        refuse(options, (*of_volumes, "scheduler", *declared(Deferral)), "volumes")
     if options.times is not None and kinds[0] == "series":
         raise InvalidArgumentError("the series have their own times: leave out --times")
     if kinds[0] == "volume":
@@ -68,7 +72,10 @@ def series(options: argparse.Namespace) -> int:
     if kinds[0] != "series":
         steps = _timed(steps, options.times)
     looks = classification(options)
-    Classification.composited(looks, "series")  # refused before a volume is read
+    asked = Classification.composited(looks, "series")  # refused before a volume is read
+    looks |= kept_values(options)
+    if Deferral(**kept_values(options)).deferred:
+        asked.require_no_look()
     target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
     # A writer's file grows step by step: it gets its name when it is whole, and all have been read
     with (
@@ -181,6 +188,7 @@ def info(options: argparse.Namespace) -> int:
                 "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}{state_of}",
                 "written by": f"{about.written_by}, format version {about.format_version}",
                 "steps": f"{len(about.times)}, times {about.times[0]:g} to {about.times[-1]:g}",
+                **({} if about.value_range is None else of_values(about.value_range)),
                 "keys": f"{len(about.keys)} steps need no other",
                 "bytes a step": f"{min(about.step_bytes)} to {max(about.step_bytes)}",
                 "precision": about.precision
@@ -198,9 +206,14 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Write a series anew, as a page, or each of its steps to a file of its own."""
     refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a series")
-    steps: VDISeries = of_series.read(options.file)
     target, arguments = Path(options.output), of_the_file(options)
     found = format_named(target)
+    steps: VDISeries = with_look(
+        options,
+        of_series.read(options.file),
+        options.file,
+        colors=found is not None and found.suffix not in (SUFFIX, ".vdi"),
+    )
     if found is not None and (found.suffix == SUFFIX or found.page):
         refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {target.suffix}")
         with measuring("converting") as bar:
@@ -259,4 +272,5 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     declare.scheduler(group)
     declare.camera(parser, "the view that the first volume fills")
     declare.classification(parser)
+    declare.deferral(parser)
     declare.device(parser)

@@ -9,6 +9,7 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.series import layout
 from pyvista_vdi.extensions.series.reader import StepsReader
+from pyvista_vdi.extensions.series.series import check_range, range_of
 from pyvista_vdi.io.vdi_file.description import to_json
 from pyvista_vdi.model.checks import as_flag
 
@@ -102,6 +103,7 @@ def check_goes_on(path: Any, first: Any, step: Any) -> None:
                 f"{path} cannot be gone on with: its {name} is {before}, and that of this step is "
                 f"{now}; give the same, or begin another file"
             )
+    check_range(step, range_of(first), "this step")
     for name in _SAME:
         before, now = (json.loads(to_json(vdi.metadata.get(name))) for vdi in (first, step))
         if before != now:

@@ -12,6 +12,7 @@ from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.series.steps_writer import write
 from pyvista_vdi.io.files import format_named
 from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 
 
@@ -19,6 +20,7 @@ def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Pat
     """Write a file of a series, or a page that plays it: see :meth:`VDISeries.save`."""
     found = format_named(path)
     if found is not None and found.page:
+        as_vdi(series[0])  # refuses what has no colours
         return found.load().write_series(series, path, **options)  # type: ignore[no-any-return]
     return write(series, series.times, path, **options)
 

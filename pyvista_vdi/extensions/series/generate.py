@@ -17,6 +17,7 @@ from pyvista_vdi.errors import (
     with_article,
 )
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
+from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import check_callback
@@ -24,6 +25,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import (
     GENERATION_NAMES,
+    Deferral,
     GenerationOptions,
     GenerationRequest,
     QualityTarget,
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
 
 _DIAL = tuple(declared(QualityTarget))
 _GRID = ("spacing", "origin")
+_DEFERRAL = tuple(declared(Deferral))
 
 
 def generate_series(
@@ -62,7 +65,7 @@ def generate_series(
 
     The transfer function is made once, of the first step, and so is what a dial chooses: a colour
     stands for the same value in all steps. Pass ``clim`` where the first step does not have the
-    range of the others.
+    range of the others, or ``value_range`` where ``classification`` is ``"deferred"``.
 
     Parameters
     ----------
@@ -164,17 +167,22 @@ class StepMaker:
         self._camera = Camera.from_any(camera)
         self._size = self._pictures = check_window_size(window_size)
         self._device, self._client = device, client
-        looks = {n: v for n, v in given.items() if n not in (*GENERATION_NAMES, *_DIAL, *_GRID)}
-        self._looks = Classification.composited(
-            looks, function, (*GENERATION_NAMES, *_DIAL, *_GRID)
-        )
+        others = (*GENERATION_NAMES, *_DIAL, *_GRID, *_DEFERRAL)
+        looks = {n: v for n, v in given.items() if n not in others}
+        self._looks = Classification.composited(looks, function, others)
         self._target = QualityTarget(**{n: given[n] for n in _DIAL if n in given})
+        self._deferral = Deferral(**{n: given[n] for n in _DEFERRAL if n in given})
+        if self._deferral.deferred:
+            self._looks.require_no_look()
+            self._deferral.refuse_target(self._target)
+            self._table: TransferFunction | None = unclassified(self._looks.interpolation)
+        else:
+            self._table = None
         options = {n: given[n] for n in GENERATION_NAMES if n in given}
         if not self._target:
             options.setdefault("precision", default_precision)
         self._options = GenerationOptions(**options)
         self._grid = {n: given[n] for n in _GRID if given.get(n) is not None}
-        self._table: TransferFunction | None = None
         self._chosen: dict[str, Any] = {}
         self._max_bytes = self._target.max_bytes
 
@@ -201,7 +209,11 @@ class StepMaker:
             progress,
             {"classification": self._looks.describe(), "scalars": volume.name, **self._chosen},
         )
-        vdi = generate_anywhere(request, self._target, self._client)
+        if self._deferral.deferred:
+            kept = generate_deferred(request, self._deferral, self._anywhere)
+            self._deferral = dataclasses.replace(self._deferral, value_range=kept.value_range)
+            return kept  # type: ignore[return-value]
+        vdi = self._anywhere(request)
         if self._target:
             self._keep_the_choice(vdi)
         elif self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
@@ -212,6 +224,9 @@ class StepMaker:
             )
             self._max_bytes = None  # told once
         return vdi
+
+    def _anywhere(self, request: GenerationRequest) -> VDI:
+        return generate_anywhere(request, self._target, self._client)
 
     def volume(self, volume: Any) -> Volume:
         """Return what a user calls a step's volume as a :class:`Volume`."""

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Union
 from pyvista_vdi.model.types import VTKObject
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from pyvista_vdi.model.transfer_function import TransferFunction
     from pyvista_vdi.model.types import (
         ClientLike,
@@ -52,6 +54,14 @@ class Look(TypedDict, total=False):
     transfer_function: TransferFunction | None
 
 
+class Deferral(TypedDict, total=False):
+    """What is kept, where scalars are classified afterwards."""
+
+    classification: str
+    value_range: RangeLike | None
+    importance: ArrayLike | None
+
+
 class SetOptions(Look, total=False):
     """What :func:`pyvista_vdi.generate_set` passes on."""
 
@@ -64,7 +74,7 @@ class SetOptions(Look, total=False):
     memory_limit: MemoryLike | None
 
 
-class InSituOptions(SetOptions, total=False):
+class InSituOptions(SetOptions, Deferral, total=False):
     """What :class:`pyvista_vdi.extensions.insitu.InSitu` passes on."""
 
     max_supersegments: int
@@ -83,7 +93,7 @@ class SeriesOptions(InSituOptions, _Dial, total=False):
     """What :func:`pyvista_vdi.generate_series` passes on."""
 
 
-class WriterOptions(Look, _Dial, total=False):
+class WriterOptions(Look, Deferral, _Dial, total=False):
     """What :class:`pyvista_vdi.SeriesWriter`, which has its own ``tolerance``, passes on."""
 
     max_supersegments: int

@@ -14,9 +14,10 @@ from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.collection import RATE
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.worker import Job, Worker
-from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 
 #: Steps that are decoded before their time comes: what takes longer than the others finds them.
 _AHEAD = 3
@@ -26,6 +27,14 @@ MEMORY = 1 << 30
 ON_DEVICE = 1.2
 #: Share of the last step's decoding in what the next one is expected to take.
 _LAST = 0.3
+
+
+def bring(runtime: Runtime, vdi: Any) -> None:
+    """Bring a VDI's lists to a device, with its colours or with the values that it keeps."""
+    if isinstance(vdi, DeferredVDI):
+        kept_values(runtime, vdi)
+    else:
+        prepared_vdi(runtime, vdi)
 
 
 class Decoding(Job):
@@ -246,7 +255,7 @@ class Player:
             began = self._clock()
             try:
                 vdi = self.series[step]
-                prepared_vdi(runtime, vdi)
+                bring(runtime, vdi)
             except Cancelled:
                 raise
             except Exception as error:  # advance() says it, and the next steps may be whole

@@ -41,7 +41,8 @@ from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.checks import as_range
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 
@@ -84,6 +85,12 @@ class SeriesInfo:
     tolerance: float
     closed: bool  # whether the writer came to its end: otherwise it is still at work, or was killed
     file_bytes: int
+    deferred: dict[str, Any] | None = None  # of steps that keep values, what the first one knows
+
+    @property
+    def value_range(self) -> tuple[float, float] | None:
+        """Least and largest value of steps that keep values."""
+        return None if self.deferred is None else as_range(self.deferred.get("value_range"))
 
 
 _Value = TypeVar("_Value")
@@ -120,6 +127,7 @@ class _Described(NamedTuple):
     bounds: tuple[float, ...]
     metadata: dict[str, Any]
     depth_origin: float
+    deferred: dict[str, Any] | None  # of steps that keep values, what is known of these
 
 
 class StepsReader(Sequence[VDI]):
@@ -219,6 +227,7 @@ class StepsReader(Sequence[VDI]):
             tolerance=float(self._head["tolerance"]),
             closed=self.closed,
             file_bytes=self._file_bytes,
+            deferred=first.deferred,
         )
 
     def _read_head(self) -> tuple[dict[str, Any], int]:
@@ -297,9 +306,10 @@ class StepsReader(Sequence[VDI]):
             of = self._described(i)
             if self._frames[source][1].kind == layout.VDI_FILE:
                 self.n_decoded += 1
-                vdi = as_vdi(vdi_reader.read(self._path, stream=self._file_in(source)))
+                found: Any = vdi_reader.read(self._path, stream=self._file_in(source))
                 if source == i:
-                    return vdi
+                    return found  # type: ignore[no-any-return]
+                vdi: VDI = found if of.deferred is None else found.lists
                 arrays = (vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth)
                 again = VDI(
                     *(of.camera, of.window_size, *arrays, of.bounds),
@@ -307,15 +317,18 @@ class StepsReader(Sequence[VDI]):
                     metadata=of.metadata,
                 )
                 again.packing = vdi.packing
+            else:
+                again = VDI._of_packing(
+                    of.camera,
+                    of.window_size,
+                    *self._step(source).packed(),
+                    of.bounds,
+                    depth_origin=of.depth_origin,
+                    metadata=of.metadata,
+                )
+            if of.deferred is None:
                 return again
-            return VDI._of_packing(
-                of.camera,
-                of.window_size,
-                *self._step(source).packed(),
-                of.bounds,
-                depth_origin=of.depth_origin,
-                metadata=of.metadata,
-            )
+            return DeferredVDI.of_lists(again, of.deferred)  # type: ignore[return-value]
         except (VDIFileError, Cancelled):
             raise
         except (*_CONTRADICTIONS, VDIError) as error:
@@ -391,6 +404,7 @@ class StepsReader(Sequence[VDI]):
                     self._descriptions[i] = _Described(
                         *(info.camera, info.window_size, info.bounds, info.metadata),
                         info.depth_origin,
+                        info.deferred,
                     )
                     break
                 found = layout.read_text(self._content(i))[0].get("description")
@@ -411,14 +425,18 @@ class StepsReader(Sequence[VDI]):
     def _checked(self, found: dict[str, Any], part: str) -> _Described:
         """Return a frame's description."""
         try:
-            if not isinstance(found["metadata"], dict):
-                raise TypeError("metadata are a dictionary")
+            deferred = found.get("deferred")
+            if deferred is not None:
+                found = found["lists"]
+            if not isinstance(found["metadata"], dict) or not isinstance(deferred, dict | None):
+                raise TypeError("metadata, and what is known of values, are dictionaries")
             return _Described(
                 Camera.from_dict(found["camera"]),
                 check_window_size(found["window_size"]),
                 tuple(number(bound) for bound in found["bounds"]),
                 found["metadata"],
                 number(found["depth_origin"]),
+                deferred,
             )
         except (VDIError, KeyError, TypeError, ValueError, OverflowError) as error:
             self._refuse(f"{part} is described wrongly: {error!r}")

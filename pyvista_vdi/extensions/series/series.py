@@ -6,6 +6,7 @@ import math
 import os
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, overload
@@ -16,12 +17,16 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, each_of
 from pyvista_vdi.model.vdi import VDI
 
+#: Steps with other colours that are kept, as those that were decoded last are.
+_KEPT = 4
+
 
 class VDISeries(VDICollection):
-    """The VDIs of one scene at several times: a sequence of :class:`VDI`.
+    """The VDIs of one scene at several times: a sequence of :class:`VDI` or :class:`DeferredVDI`.
 
     Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` from a ``.vdis`` file,
     whose steps are decoded when they are asked for, or by :meth:`of` from VDIs at hand. It can be
@@ -29,7 +34,7 @@ class VDISeries(VDICollection):
 
     Parameters
     ----------
-    steps : sequence of VDI
+    steps : sequence of VDI or DeferredVDI
         One per time; at least one.
     times : sequence of float
         Ascending, of any unit.
@@ -76,8 +81,8 @@ class VDISeries(VDICollection):
 
         Parameters
         ----------
-        vdis : iterable of VDI
-            One per time, or their VTK form.
+        vdis : iterable of VDI or DeferredVDI
+            One per time, or their VTK form; those that keep values all of one range.
         times : iterable of float, optional
             Ascending; 0, 1, 2 … by default.
 
@@ -86,11 +91,15 @@ class VDISeries(VDICollection):
         InvalidArgumentError
             See :class:`VDISeries`.
         InvalidVDIError
-            If one is no VDI.
+            If one is no VDI, or keeps values where another does not, or of another range.
         """
-        if isinstance(vdis, VDI):
+        if isinstance(vdis, VDI | DeferredVDI):
             raise InvalidVDIError("a series is made of several VDIs: pass them in a list")
-        steps = tuple(as_vdi(vdi) for vdi in each_of(vdis))
+        steps: Any = tuple(
+            vdi if isinstance(vdi, DeferredVDI) else as_vdi(vdi) for vdi in each_of(vdis)
+        )
+        for i, step in enumerate(steps):
+            check_range(step, range_of(steps[0]), f"step {i}")
         return cls(steps, range(len(steps)) if times is None else checked_times(times))
 
     @property
@@ -126,6 +135,11 @@ class VDISeries(VDICollection):
 
     def __iter__(self) -> Iterator[VDI]:
         return (self[i] for i in range(len(self)))
+
+    def _mapped(self, function: Callable[[VDI], VDI]) -> VDISeries:
+        """Return a series of what a function makes of each step, when that is asked for."""
+        make = lru_cache(_KEPT)(lambda i: function(self[i]))
+        return VDISeries(Called(make, range(len(self))), self.times)
 
     def nearest(self, time: float) -> int:
         """Return the index of the step whose time is nearest; of two, the earlier.
@@ -207,15 +221,19 @@ class VDISeries(VDICollection):
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         """Return what a notebook shows: a viewer, or a picture."""
         text = {"text/plain": repr(self)}
+        if self.value_range is not None:  # pages show colours
+            return text
         return registry.method("VDISeries._repr_mimebundle_", lambda *_: text)(
             self, include, exclude
         )
 
     def __repr__(self) -> str:
         width, height = self.window_size
+        ends = self.value_range
+        kept = "" if ends is None else f", values from {ends[0]:g} to {ends[1]:g}"
         return (
             f"VDISeries({len(self)} steps, times {self.times[0]:g} to {self.times[-1]:g}, "
-            f"{width} x {height} lists)"
+            f"{width} x {height} lists{kept})"
         )
 
 
@@ -232,6 +250,24 @@ class Called(Sequence[Any]):
         chosen = self._chosen[index]
         return (
             Called(self._function, chosen) if isinstance(index, slice) else self._function(chosen)
+        )
+
+
+def range_of(vdi: Any) -> tuple[float, float] | None:
+    """Return the range of the values that a VDI keeps, or is said to; None if it has colours."""
+    return getattr(vdi, "value_range", None)
+
+
+def check_range(vdi: Any, first: tuple[float, float] | None, which: str) -> None:
+    """Raise InvalidVDIError unless a VDI keeps values of the first one's range, or as little."""
+    if (ends := range_of(vdi)) != first:
+        said, of_first = (
+            "has colours" if k is None else f"keeps values from {k[0]} to {k[1]}"
+            for k in (ends, first)
+        )
+        raise InvalidVDIError(
+            f"the VDIs of one series or set keep values of one range, or all have colours: {which} "
+            f"{said}, and the first {of_first}; generate them with the same value_range"
         )
 
 

@@ -7,8 +7,10 @@ from typing import Any
 from pyvista_vdi.extensions.series.player import Player
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
 
 
@@ -20,24 +22,42 @@ class SeriesInput(Input):
     def __init__(self, series: VDISeries) -> None:
         super().__init__()
         self.player, self.collection = Player(series), series
+        self._kept: DeferredInput | None = None  # of the step, where it keeps values
 
     def vdi(self) -> VDI | None:
         """Return the step's VDI, decoded now if it is not ready."""
-        self._vdi = self.player.vdi
+        values = self.deferred
+        if values is None or self.prop is None:
+            self._vdi = as_vdi(self.player.vdi)  # refuses what has no colours
+            return self._vdi
+        if self._kept is None or (self._kept.deferred, self._kept.prop) != (values, self.prop):
+            self._kept = DeferredInput(values, self.prop)
+        self._vdi = self._kept.vdi()
         return self._vdi
+
+    @property
+    def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
+        """The step's values, where it keeps them."""
+        step: Any = self.player.vdi
+        return step if isinstance(step, DeferredVDI) else None
+
+    def classified_by(self, prop: Any) -> Input:
+        """Set the property that classifies the values of all steps from now on."""
+        self.prop = prop
+        return self
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds of the step that was shown last, or of the first."""
         return self.player.series.bounds if self._vdi is None else self._vdi.bounds
 
     def stamp(self) -> Any:
-        """Return the step."""
-        return self.player.step
+        """Return the step, and the time stamp of what classifies it."""
+        return self.player.step, self.prop and (id(self.prop), self.prop.GetMTime())
 
     def shared(self) -> Input:
         """Return an input that shows the same step, and plays by itself."""
         other = SeriesInput(self.player.series)
-        other.player.step = self.player.step
+        other.player.step, other.prop = self.player.step, self.prop
         return other
 
     def rest(self) -> None:
@@ -72,8 +92,8 @@ class SeriesInput(Input):
         at_hand = self.player.series.volumes is not None
         return "actor.regenerate() makes this step anew" if at_hand else super().remedy
 
-    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI:
+    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI | None:
         """Generate the step that is shown for another view, and show that as long as it is."""
         vdi = self.player.series.generate(self.player.step, camera, window_size)
         self.player.replace(vdi)
-        return vdi
+        return self.vdi()

@@ -20,12 +20,13 @@ from pyvista_vdi.extensions.series.codes import Codes, Samples, Tables
 from pyvista_vdi.extensions.series.continuing import Begun
 from pyvista_vdi.extensions.series.differences import SAME, Stepped, lengths_of
 from pyvista_vdi.extensions.series.encoder import encoded
-from pyvista_vdi.extensions.series.series import checked_time
+from pyvista_vdi.extensions.series.series import check_range, checked_time, range_of
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import writer as vdi_writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
 from pyvista_vdi.io.vdi_file.description import describe
 from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
@@ -115,6 +116,7 @@ class StepsWriter:
         self._last_time: float | None = None
         self._known: list[_Known] = []
         self._tried = 0.0
+        self._range: tuple[float, float] | None = None  # of the values that steps keep
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -147,6 +149,7 @@ class StepsWriter:
             codec=self._codec,
         )
         self._entries, self._last_time = begun.entries, begun.times[-1]
+        self._range = begun.info().value_range
 
     def checked_time(self, time: float | None) -> float:
         """Return the next step's time, or raise InvalidArgumentError."""
@@ -157,10 +160,22 @@ class StepsWriter:
             )
         return value
 
-    def write(self, stream: BinaryIO, vdi: VDI, time: float) -> None:
+    def write(self, stream: BinaryIO, vdi: VDI | DeferredVDI, time: float) -> None:
         """Write the frame of a step at the stream's end."""
         time = self.checked_time(time)
-        new = self._written(vdi.with_precision(self._precision))
+        if not self._entries:
+            self._range = range_of(vdi)
+        check_range(vdi, self._range, f"number {len(self)}")
+        packed = vdi.with_precision(self._precision)
+        if isinstance(packed, DeferredVDI):
+            if self._tolerance:
+                raise InvalidArgumentError(
+                    f"a tolerance is of colours and opacities, which a DeferredVDI does not have; "
+                    f"got {self._tolerance}: leave it out"
+                )
+            new = self._written(packed.lists, packed.about)
+        else:
+            new = self._written(packed)
         number = len(self._entries)
         header = layout.FrameHeader(
             layout.STEP, number, new.kind, new.by, time, len(new.content), zlib.crc32(new.content)
@@ -186,11 +201,13 @@ class StepsWriter:
         stream.write(header.to_bytes() + content)
         stream.write(layout.TRAILER.pack(begin, layout.TRAILER_MAGIC))
 
-    def _written(self, vdi: VDI) -> _Known:
+    def _written(self, vdi: VDI, deferred: dict[str, Any] | None = None) -> _Known:
         number = len(self._entries)
         description = describe(vdi, layout.FORMAT_VERSION)
         for name in ("format", "version", "written_by", "n_supersegments"):
             del description[name]
+        if deferred is not None:  # nested: nobody takes values for colours
+            description = {"deferred": deferred, "lists": description}
         key = self._known[0] if self._known else None
         new = _Known(number, vdi, description)
         if key is None or not new.goes_with(key):
@@ -228,7 +245,14 @@ class StepsWriter:
     def _file(self, new: _Known) -> _Known:
         """Return a step as a .vdi file within the file."""
         stream = io.BytesIO()
-        vdi_writer.write_to(stream, new.vdi, self._codec, self._asked_level, coarse=False)
+        vdi_writer.write_to(
+            stream,
+            new.vdi,
+            self._codec,
+            self._asked_level,
+            coarse=False,
+            deferred=new.description.get("deferred"),
+        )
         array: NDArray[Any] = np.frombuffer(stream.getbuffer(), np.uint8)
         return self._framed(new, None, {"vdi": array}, layout.VDI_FILE)
 

@@ -12,7 +12,6 @@ from pyvista_vdi.extensions.series.continuing import Begun
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
@@ -125,7 +124,7 @@ class SeriesWriter:
 
         Parameters
         ----------
-        step : VDI, or what generate_series takes as a step's volume
+        step : VDI or DeferredVDI, or what generate_series takes as a step's volume
             A volume becomes a VDI first.
         time : float, optional
             Above that of the step before; by default the number of the step.
@@ -145,9 +144,7 @@ class SeriesWriter:
         """
         time = self.checked_time(time)
         assert self._stream is not None
-        if not isinstance(step, VDI):
-            if isinstance(step, DeferredVDI):
-                as_vdi(step)  # raises, and says what to do
+        if not isinstance(step, VDI | DeferredVDI):
             if self._make is None:
                 raise InvalidArgumentError(
                     f"got {type(step).__name__}, which is no VDI: pass camera and window_size to "

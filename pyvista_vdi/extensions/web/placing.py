@@ -110,6 +110,8 @@ def encoded(vdi: VDI, *, coarse: bool = False) -> bytes:
 def several_of(actor: Any) -> VDISeries | VDISet | None:
     """Return the series or the set that an actor shows, as it shows it; ``None`` of one VDI."""
     shown, multiplier = (actor.series or actor.vdi_set), actor.opacity_multiplier
+    if shown is not None and shown.value_range is not None:  # pages show colours
+        shown = shown.classified(volume_property=actor.GetProperty())
     if shown is None or multiplier == 1:
         return shown
     vdis = Called(lambda i: thinned(shown[i], multiplier), range(len(shown)))

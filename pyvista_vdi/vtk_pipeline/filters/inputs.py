@@ -33,6 +33,8 @@ class Input:
     player: Any = None
     #: The values that the VDI is classified from; ``None`` where none are kept.
     deferred: DeferredVDI | None = None
+    #: The volume property that classifies values, where they are kept.
+    prop: Any = None
     #: What remedies a view that the VDI does not serve, where there is no source.
     remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
@@ -80,6 +82,10 @@ class Input:
 
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Call this when what is before it may be another; ``None`` ends it."""
+
+    def classified_by(self, prop: Any) -> Input:
+        """Return an input whose values, where they are kept, another property classifies."""
+        return self
 
     def rest(self) -> None:
         """End what goes on behind the frames, which may begin anew."""
@@ -156,7 +162,7 @@ class SourceInput(Input):
 
     def vdi(self) -> VDI | None:
         """Return the VDI, brought up to date."""
-        return self.source.GetVDI()
+        return as_vdi(self.source.GetVDI())
 
     def last(self) -> VDI | None:
         """Return the VDI made last."""
@@ -255,7 +261,7 @@ class ImageInput(Input):
             self._image = self._producer.GetOutputDataObject(self._port.GetIndex())
         image = self._image
         if self._vdi is None or self._read_at != image.GetMTime():
-            self._vdi = vdi_from_image(image)
+            self._vdi = as_vdi(vdi_from_image(image))
             self._read_at = image.GetMTime()
         return self._vdi
 
@@ -295,6 +301,10 @@ class DeferredInput(Input):
             self._vdi = classify_on_device(self.deferred, look)
             self._made_at = stamp
         return self._vdi
+
+    def classified_by(self, prop: Any) -> Input:
+        """Return one of the same values: whoever shares this one keeps the property."""
+        return DeferredInput(self.deferred, prop)
 
     def bounds(self) -> tuple[float, ...]:
         """Return the bounds in the model frame."""

@@ -9,15 +9,16 @@ import pytest
 import pyvista_vdi as pvdi
 from pyvista_vdi.extensions.series import keywords
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import GenerationOptions, QualityTarget, declared
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
 
-LOOK, MADE, DIAL = map(set, map(declared, (Classification, GenerationOptions, QualityTarget)))
+RECORDS = (Classification, GenerationOptions, QualityTarget, Deferral)
+LOOK, MADE, DIAL, DEFERRAL = map(set, map(declared, RECORDS))
 TAKEN = {
     "Look": LOOK,
     "SetOptions": LOOK | MADE - {"max_supersegments", "precision"},
-    "InSituOptions": LOOK | MADE,
-    "SeriesOptions": LOOK | MADE | DIAL,
-    "WriterOptions": (LOOK | MADE | DIAL | {"client", "spacing", "origin"})
+    "InSituOptions": LOOK | MADE | DEFERRAL,
+    "SeriesOptions": LOOK | MADE | DIAL | DEFERRAL,
+    "WriterOptions": (LOOK | MADE | DIAL | DEFERRAL | {"client", "spacing", "origin"})
     - {"tolerance", "precision"},
 }
 

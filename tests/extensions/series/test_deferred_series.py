@@ -1,0 +1,163 @@
+"""Series of deferred VDIs: their steps are those of ``generate``, their look is chosen later."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from command_line import run
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidVDIError,
+    UnsupportedError,
+    VDIFileError,
+)
+
+pytestmark = pytest.mark.filterwarnings("ignore:the transfer function shows values outside")
+
+SIZE, RANGE = (24, 16), (20, 180)
+TIMES = (0.0, 0.5, 2.0, 4.0)
+KEPT = {"classification": "deferred", "value_range": RANGE, "importance": [1, 2]}
+LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.8], "clim": (40, 170)}
+
+
+def volumes():
+    """Of which the last is as the one before it, and half of all does not change."""
+    still = np.random.default_rng(1).integers(0, 200, (8, 9, 10)).astype(np.uint8)
+    for seed in (2, 3, 4, 4):
+        moving = np.random.default_rng(seed).integers(0, 200, (8, 9, 10)).astype(np.uint8)
+        yield pvdi.Volume(np.where(np.arange(10) < 5, still, moving), (1, 1, 2), name="a")
+
+
+CAMERA = pvdi.Camera((4.5, -40, 20), (4.5, 4, 7), (0, 0, 1))
+
+
+@pytest.fixture(scope="module")
+def alone(default_runtime):
+    return [pvdi.generate(volume, CAMERA, SIZE, precision="8-byte", **KEPT) for volume in volumes()]
+
+
+@pytest.fixture(scope="module")
+def saved(default_runtime, tmp_path_factory):
+    path = tmp_path_factory.mktemp("series") / "run.vdis"
+    with pvdi.SeriesWriter(path, CAMERA, SIZE, **KEPT) as out:
+        for volume, time in zip(volumes(), TIMES, strict=True):
+            out.append(volume, time)
+    return path
+
+
+def all_equal(series, others):
+    return all(one.equals(other) for one, other in zip(series, others, strict=True))
+
+
+@pytest.mark.parametrize("precision", ["8-byte", "exact"])
+def test_what_is_read_is_what_generate_makes_of_each_step(precision, alone, saved, tmp_path):
+    made = pvdi.generate_series(volumes(), CAMERA, SIZE, TIMES, precision=precision, **KEPT)
+    path = made.save(tmp_path / "made.vdis")
+    for series in (made, pvdi.read(path), *((pvdi.read(saved),) * (precision == "8-byte"))):
+        assert (series.value_range, series.times) == (RANGE, TIMES)
+        assert all(isinstance(step, pvdi.DeferredVDI) for step in series)
+        if precision == "8-byte":
+            assert all_equal(series, alone)
+            assert all(step.metadata == alone[k].metadata for k, step in enumerate(series))
+        else:
+            assert all_equal(series, made)
+    assert "20 to 180" in repr(series)
+    assert all_equal(pvdi.VDISeries.of(alone)[1:3], alone[1:3])
+
+
+def test_a_look_is_that_of_each_step_alone_and_of_one_range(alone, saved):
+    shown = pvdi.read(saved).classified(**LOOK)
+    assert shown.value_range is None
+    assert shown.times == TIMES
+    assert all_equal(shown, [step.classified(**LOOK) for step in alone])
+    assert shown[1] is shown[1]  # made once
+    shown = pvdi.read(saved).classified(cmap="bone")[2:]
+    assert all_equal(shown, [step.classified(cmap="bone") for step in alone[2:]])
+    with pytest.raises(InvalidVDIError, match="have colours already"):
+        shown.classified(cmap="bone")
+    with pytest.raises(TypeError, match="colourmap"):
+        pvdi.read(saved).classified(colourmap="bone")
+
+
+def test_without_a_range_that_of_the_first_step_is_all_s(default_runtime):
+    series = pvdi.generate_series(
+        [pvdi.Volume(np.arange(64.0).reshape(4, 4, 4) * k) for k in (1, 2)],
+        CAMERA,
+        SIZE,
+        classification="deferred",
+    )
+    assert [step.value_range for step in series] == [(0, 63), (0, 63)]
+
+
+def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path):
+    path = tmp_path / "run.vdis"
+    path.write_bytes(saved.read_bytes())
+    with pvdi.SeriesWriter(path, append=True) as out:
+        out.append(alone[0], 5.0)
+    assert all_equal(pvdi.read(path), [*alone, alone[0]])
+    other = pvdi.generate(next(volumes()), CAMERA, SIZE, classification="deferred")
+    colours = alone[0].classified(transfer_function=pvdi.TransferFunction([[1] * 3], [1], RANGE))
+    with pvdi.SeriesWriter(path, append=True) as out:
+        for step, says in ((other, r"0\.0 to 199\.0"), (colours, "has colours")):
+            with pytest.raises(InvalidVDIError, match=rf"{says}.*keeps values from 20\.0"):
+                out.append(step, 6.0)
+    with pvdi.SeriesWriter(tmp_path / "mixed.vdis") as out:
+        out.append(colours)
+        with pytest.raises(InvalidVDIError, match="keeps values from 20"):
+            out.append(alone[0])
+    with pytest.raises(InvalidVDIError, match="step 1 keeps values from 0"):
+        pvdi.VDISeries.of([alone[0], other])
+
+
+def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
+    series = pvdi.VDISeries.of(alone)
+    with pytest.raises(InvalidVDIError, match="no colours yet"):
+        series.save(tmp_path / "run.html")
+    with pytest.raises(InvalidArgumentError, match="tolerance"):
+        series.save(tmp_path / "run.vdis", tolerance=0.01)
+    with pytest.raises(UnsupportedError, match="16-byte"):
+        series.save(tmp_path / "run.vdis", precision="16-byte")
+    with pytest.raises(InvalidArgumentError, match="cmap"):
+        pvdi.generate_series(volumes(), CAMERA, SIZE, cmap="bone", **KEPT)
+    with pytest.raises(UnsupportedError, match="quality"):
+        pvdi.SeriesWriter(tmp_path / "run.vdis", CAMERA, SIZE, quality="high", **KEPT)
+    assert not list(tmp_path.iterdir())
+    assert set(series._repr_mimebundle_()) == {"text/plain"}
+
+
+@pytest.mark.parametrize("wrong", [{"version": 2}, {"version": 1, "value_range": [1, 0]}])
+def test_what_is_said_of_values_is_checked(wrong, alone, tmp_path, monkeypatch):
+    series = pvdi.VDISeries.of(alone)
+    with monkeypatch.context() as patched:
+        patched.setattr(pvdi.DeferredVDI, "about", wrong)
+        path = series.save(tmp_path / "run.vdis")
+    with pytest.raises(VDIFileError, match="damaged|upgrade"):
+        pvdi.read(path)[0]
+
+
+def test_verbs_write_show_and_convert_it(saved, alone, tmp_path, capsys):
+    for k, volume in enumerate(volumes()):
+        np.save(tmp_path / f"step_{k}.npy", volume.array)
+    out = tmp_path / "out.vdis"
+    files = sorted(tmp_path.glob("*.npy"))
+    asked = ("--size", "24x16", "--classification", "deferred", "--value-range", *RANGE)
+    run(capsys, "series", *files, "-o", out, "--spacing", 1, 1, 2, *asked)
+    assert pvdi.read(out).value_range == RANGE
+    run(capsys, "series", saved, "-o", tmp_path / "again.vdis")
+    assert all_equal(pvdi.read(tmp_path / "again.vdis"), alone)
+    assert "values from 20 to 180, classified afterwards" in run(capsys, "info", saved)
+    assert json.loads(run(capsys, "info", saved, "--json"))["deferred"]["value_range"] == list(
+        RANGE
+    )
+    look = ("--cmap", "bone", "--opacity", "0,0.2,0.8", "--clim", 40, 170)
+    run(capsys, "convert", saved, "-o", tmp_path / "bone.vdis", *look)
+    shown = [step.classified(**LOOK) for step in alone]
+    assert all_equal(pvdi.read(tmp_path / "bone.vdis"), shown)
+    run(capsys, "convert", saved, "-o", tmp_path / "one.vdi")
+    assert pvdi.read(tmp_path / "one_0003.vdi").equals(alone[3])
+    run(capsys, "render", saved, "--time", 2, "-o", tmp_path / "two.png", *look)
+    assert (tmp_path / "two.png").stat().st_size > 100
