@@ -67,13 +67,11 @@ export function transferEditor(viewer, button) {
     if (by === null || by !== gesture) before.push(viewer.look.transfer ?? null);
     gesture = by;
     give(changes && { ...current(), ...changes });
-    show();
   };
   const back = () => {
     if (!before.length) return;
     gesture = null;
     give(before.pop());
-    show();
   };
 
   // -- points ------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ const CELLS = 1 << 14;
 /** What a step that is opaque lets through. */
 const OPAQUE_LEAVES = Math.exp(-30);
 /** Means between which what is made is interpolated: this part of the spread apart. */
-const SMOOTH = 24;
+const SMOOTH = 16;
 const ROOT_OF_3 = Math.sqrt(3);
 /** Most points of a curve. */
 const MOST_POINTS = 64;
@@ -170,22 +170,27 @@ function mediumInto(table, at, atLow, sums, mean, spread, stepsPerLength) {
     }
   }
   const empty = 1 - share - above;
+  for (let c = 0; c < 4; ++c) means[c] = empty * atLow[c];
+  addMean(means, sums, low, high, share);
+  if (above > 0) addMean(means, sums, high, 1, above);
+  const opacity = means[3];
   table[at] = table[at + 1] = table[at + 2] = table[at + 3] = 0;
-  const averageOf = (c) => share * meanOf(sums, c, low, high) +
-    (above > 0 ? above * meanOf(sums, c, high, 1) : 0) + empty * atLow[c];
-  const opacity = averageOf(3);
   if (opacity < 1e-12) return;
-  for (let c = 0; c < 3; ++c) table[at + c] = averageOf(c) / opacity;
+  for (let c = 0; c < 3; ++c) table[at + c] = means[c] / opacity;
   const ofStep = opacity < 0.01 ? opacity * (1 + opacity * (1 / 2 + opacity * (1 / 3 + opacity / 4)))
     : -Math.log(Math.max(1 - opacity, OPAQUE_LEAVES));
   table[at + 3] = ofStep * stepsPerLength;
 }
 
-// The mean of one of the four between two places, 0 to 1, that are widened to a cell's distance.
-function meanOf(sums, c, low, high) {
+const means = new Float64Array(4);
+
+// Add the mean between two places, 0 to 1, that are widened to a cell's distance, times a share.
+function addMean(to, sums, low, high, share) {
   const middle = (low + high) / 2, half = Math.max((high - low) / 2, 0.5 / CELLS);
   const from = Math.max(middle - half, 0) * CELLS, end = Math.min(middle + half, 1) * CELLS;
-  const a = Math.min(from | 0, CELLS - 1), b = Math.min(end | 0, CELLS - 1), i = 4 * a + c, j = 4 * b + c;
-  return (sums[j] + (end - b) * (sums[j + 4] - sums[j]) - sums[i] - (from - a) * (sums[i + 4] - sums[i])) /
-    (end - from);
+  const a = Math.min(from | 0, CELLS - 1), b = Math.min(end | 0, CELLS - 1);
+  const intoA = from - a, intoB = end - b, by = share / (end - from);
+  for (let c = 0, i = 4 * a, j = 4 * b; c < 4; ++c, ++i, ++j) {
+    to[c] += by * (sums[j] + intoB * (sums[j + 4] - sums[j]) - sums[i] - intoA * (sums[i + 4] - sums[i]));
+  }
 }
