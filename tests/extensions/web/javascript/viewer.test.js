@@ -12,7 +12,7 @@ const textOf = (name) => readFileSync(new URL(`${viewer}/${name}`), "utf-8");
 const { checkedCamera, lookingAt } = await import(`${viewer}/camera.js`);
 const { textOfView, viewOfText } = await import(`${viewer}/link.js`);
 const { AS_MADE, checkedLook, isAsMade } = await import(`${viewer}/look.js`);
-const { inShort, viewAt } = await import(`${viewer}/marks.js`);
+const { inShort } = await import(`${viewer}/marks.js`);
 const { checkedTransfer, editedFrom } = await import(`${viewer}/values.js`);
 
 const camera = checkedCamera({
