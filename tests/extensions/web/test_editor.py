@@ -1,12 +1,10 @@
 """Pages with values: the editor of their transfer function, and what it makes of the picture."""
 
 import json
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
-from browsers import SITE, picture
+from browsers import SITE, assert_axe_finds_nothing, picture
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
@@ -94,6 +92,7 @@ def test_pictures_are_those_of_render(kept, opened):
         assert_like(page, shown, turned)
 
 
+@pytest.mark.slow
 def test_exact_values_are_shown_and_a_file_without_a_look_has_a_ramp(kept, open_page, tmp_path):
     page = open_page(SIZE)
     page.load(kept.save(tmp_path / "kept.vdi").read_bytes())
@@ -112,6 +111,7 @@ def test_exact_values_are_shown_and_a_file_without_a_look_has_a_ramp(kept, open_
     assert_like(page, kept.classified(transfer_function=told), kept.camera, 2.0)
 
 
+@pytest.mark.slow
 def test_a_mouse_adds_and_drags_points_and_undo_goes_back(opened):
     page = opened()
     mouse, before = page.page.mouse, picture(page, SIZE)
@@ -135,6 +135,7 @@ def test_a_mouse_adds_and_drags_points_and_undo_goes_back(opened):
     np.testing.assert_array_equal(picture(page, SIZE), before)
 
 
+@pytest.mark.slow
 def test_a_finger_drags_a_point_and_chooses_a_preset(opened):
     page = opened(has_touch=True, is_mobile=True)
     before = picture(page, SIZE)
@@ -197,6 +198,7 @@ def test_keys_do_all_of_it(opened):
     ]
 
 
+@pytest.mark.slow
 def test_a_link_has_the_transfer_function(opened):
     page = opened()
     page.page.get_by_label("Colours").last.select_option("hot")
@@ -228,13 +230,7 @@ def test_colour_maps_are_those_of_matplotlib(open_page):
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.slow
 def test_axe_finds_nothing(scheme, opened):
-    axe = os.environ.get("PYVISTA_VDI_AXE")
-    if axe is None:
-        pytest.skip("PYVISTA_VDI_AXE names no axe.min.js: npm install axe-core")
-    page = opened(color_scheme=scheme)
-    page.evaluate(Path(axe).read_text(encoding="utf-8"))
-    found = page.evaluate("axe.run(document)")
-    assert not found["violations"], [(each["id"], each["nodes"]) for each in found["violations"]]
+    assert_axe_finds_nothing(opened(color_scheme=scheme))
 
 
 def test_a_page_takes_the_words_of_classified():
