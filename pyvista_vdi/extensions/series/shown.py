@@ -42,7 +42,7 @@ class SeriesInput(Input):
         return step if isinstance(step, DeferredVDI) else None
 
     def classified_by(self, prop: Any) -> Input:
-        """Have this property classify the values of all steps from now on."""
+        """Classify the values of all steps by another property, and return this input."""
         self.prop = prop
         return self
 
