@@ -74,16 +74,17 @@ def types(session: nox.Session) -> None:
 
 @nox.session
 def javascript(session: nox.Session) -> None:
-    """Check the viewer's JavaScript: ESLint, unit tests, axe-core; needs Node, npm, Chromium."""
+    """Check the viewer's JavaScript: ESLint, tsc, unit tests, axe-core; needs npm and Chromium."""
     session.install("-e", ".[test,browser]")
     folder = CHECKOUT / "tests" / "extensions" / "web" / "javascript"
     with session.chdir(folder):
         session.run("npm", "install", "--no-audit", "--no-fund", "--no-package-lock", external=True)
         session.run("npm", "run", "lint", external=True)
+        session.run("npm", "run", "types", external=True)
         session.run("npm", "test", external=True)
     env = {"PYVISTA_VDI_AXE": str(folder / "node_modules" / "axe-core" / "axe.min.js")}
     axe = ("-q", "-n", "0", "-m", "slow or not slow", "-k", "axe")
-    session.run("pytest", *axe, "tests/extensions/web/test_controls.py", env=env)
+    session.run("pytest", *axe, "tests/extensions/web", env=env)
 
 
 @nox.session

@@ -17,12 +17,13 @@ from __future__ import annotations
 
 import functools
 import inspect
+import locale
 import os
 import re
 import signal
 import sysconfig
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,14 @@ settings.register_profile("ci", deadline=None, print_blob=True, derandomize=True
 settings.load_profile(
     os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "default")
 )
+
+
+@pytest.fixture(autouse=True)
+def same_locale() -> Iterator[None]:
+    """Keep the process's locale: writers of VTK 9.4 and SimpleITK leave it in "C"."""
+    before = locale.setlocale(locale.LC_ALL)
+    yield
+    locale.setlocale(locale.LC_ALL, before)
 
 
 def pytest_configure() -> None:

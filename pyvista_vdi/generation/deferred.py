@@ -17,6 +17,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.vdi import VDI
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
 #: whatever lies before it: 1 - 2^-36 n is 1 for the voxels n of any ray.
@@ -32,6 +33,8 @@ _LOW_END = 2.0**-4
 #: Spreads below what float32 holds of a mean of squares are none; shares this near to 1 are 1.
 _LEAST_SPREAD = 5e-4
 _WHOLE = 1e-3
+#: Supersegments that are converted at a time.
+_PIECE = 2**16
 
 
 def unclassified(interpolation: str) -> TransferFunction:
@@ -95,34 +98,44 @@ def generate_deferred(
     )
     if made is None:
         return None
-    # What the channels of the table have become: means by length
-    _, mean, square = made.color.T.astype(np.float64) / _BESIDE
-    mean = np.clip(mean, 0, 1)
-    spread = np.sqrt(np.maximum(square / 4 - (mean - 0.5) ** 2, 0))
-    spread = np.minimum(np.where(spread < _LEAST_SPREAD, 0, spread), 0.5)
-    share = made.optical_depth / (_PER_VOXEL / min(volume.spacing) * lengths_of(made))
+
+    # Take what the channels of the table have become, means by length, a piece at a time
+    per_length = _PER_VOXEL / min(volume.spacing)
+    lengths = lengths_of(made)
+    color, spread = np.zeros_like(made.color), np.empty_like(made.optical_depth)
+    for start in range(0, len(spread), _PIECE):
+        piece = slice(start, start + _PIECE)
+        mean, square = made.color[piece, 1:].T.astype(np.float64) / _BESIDE
+        np.clip(mean, 0, 1, out=mean)
+        deviation = np.sqrt(np.maximum(square / 4 - (mean - 0.5) ** 2, 0))
+        spread[piece] = np.where(deviation < _LEAST_SPREAD, 0, np.minimum(deviation, 0.5))
+        share = made.optical_depth[piece] / (per_length * lengths[piece])
+        color[piece, 0], color[piece, 2] = mean, np.where(share > 1 - _WHOLE, 1, share)
     metadata: dict[str, Any] = dict(made.metadata)
     for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
         metadata.pop(name)
     if volume.chunks is None or volume.chunks.ranges() is not None:  # else nothing is read for it
         metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
-    return DeferredVDI(
+    lists = VDI(
         made.camera,
         made.window_size,
         made.offsets,
         made.front,
         made.back,
-        mean,
+        color,
         spread,
-        np.where(share > 1 - _WHOLE, 1, share),
         made.bounds,
-        value_range=(low, high),
-        unit_distance=volume.default_unit_distance,
-        sample_distance=metadata["sample_distance"],
-        importance=points,
         depth_origin=made.depth_origin,
         metadata=metadata,
-    ).with_precision(options.precision)
+    )
+    about = {
+        "version": 1,
+        "value_range": (low, high),
+        "unit_distance": volume.default_unit_distance,
+        "sample_distance": metadata["sample_distance"],
+        "importance": points,
+    }
+    return DeferredVDI.of_lists(lists, about).with_precision(options.precision)
 
 
 def _keeping(

@@ -95,10 +95,11 @@ class RangeFile:
                 self._in_file.file.flush()  # what this process has written is in the file then
                 return None, b""
             return _state(self._data), b""
-        for name in ARRAY_FILES:
+        found = []
+        for name in (*ARRAY_FILES, ".zattrs"):  # of zarr's format 2, attributes
             with contextlib.suppress(OSError):
-                return _state(self._data / name), (self._data / name).read_bytes()
-        return None, b""
+                found.append((_state(self._data / name), (self._data / name).read_bytes()))
+        return [state for state, _ in found], b"\0".join(content for _, content in found)
 
     def _places(self) -> Iterator[Path]:
         yield self._store.with_name(self._store.name + ".ranges") / self._name

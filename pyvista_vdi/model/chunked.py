@@ -7,7 +7,7 @@ import importlib
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -257,5 +257,7 @@ def _described(source: Any) -> str:
         return f"{source.file.filename}::{source.name}"
     if library == "zarr":
         store, path = getattr(source, "store", ""), getattr(source, "path", "")
-        return f"the zarr array {store}/{path}".rstrip("/ ")
+        # Those of zarr 2, which are mappings, have no name but their path
+        where = getattr(store, "path", store) if isinstance(store, Mapping) else store
+        return f"the zarr array {where}/{path}".rstrip("/ ")
     return f"the {library} array of shape {tuple(source.shape)}"

@@ -122,7 +122,7 @@ class DeferredVDI:
     def of_lists(cls, lists: VDI, about: Mapping[str, Any]) -> DeferredVDI:
         """Return what was stored as :attr:`lists` and :attr:`about`; InvalidVDIError if it is none.
 
-        Only our files call it: ``about`` may be anybody's.
+        Generation and our files call it: ``about`` may be anybody's.
         """
         deferred = cls.__new__(cls)
         if not isinstance(about, Mapping) or about.get("version") != 1:

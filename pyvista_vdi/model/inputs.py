@@ -92,11 +92,16 @@ def as_vdi(vdi: Any) -> VDI:
             "a DeferredVDI has no colours yet: pass vdi.classified(cmap=..., opacity=...)"
         )
     if hasattr(vdi, "GetClassName"):
-        return registry.method("VDI.from_image")(vdi)  # type: ignore[no-any-return]
+        return as_vdi(registry.method("VDI.from_image")(vdi))
     hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
     raise InvalidVDIError(
         f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
     )
+
+
+def as_any_vdi(vdi: Any) -> VDI | DeferredVDI:
+    """Return what :func:`as_vdi` returns, or a VDI that keeps values as it is."""
+    return vdi if isinstance(vdi, DeferredVDI) else as_vdi(vdi)
 
 
 def each_of(vdis: Any) -> Iterable[Any]:

@@ -157,12 +157,14 @@ def added(
     )
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
+    if is_vdi_image(first):
+        first = vdi_from_image(first)
     if asked.deferral.given and not isinstance(first, VDI | DeferredVDI) and several is None:
         first, asked = _deferred(first, asked, plotter)
-    made = isinstance(first, VDI) or is_vdi_image(first)
     if isinstance(first, DeferredVDI):
         shown = _deferred_shown(first, asked)
     else:
+        made = isinstance(first, VDI)
         shown = _vdi_shown(first, asked) if made else _volume_shown(first, asked, plotter, stored)
     actor = PlotterVDIActor()
     if shown.prop is not None:
@@ -226,10 +228,9 @@ def added_blocks(
     return actors
 
 
-def _vdi_shown(vdi: Any, asked: Addition) -> _Shown:
+def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
     """Return a VDI with the colours that it was made with, as far as its metadata has them."""
     asked.refuse_with_a_vdi()
-    shown = vdi if isinstance(vdi, VDI) else vdi_from_image(vdi)
     place, annotations = asked.place, asked.look.annotations
     bar, table = place.show_scalar_bar, stored_table(shown)
     if table is None:

@@ -139,13 +139,14 @@ def _probe(image: Any, grid: Any, progress: Callable[[float], object] | None) ->
     count = min(nz, 16, -(-image.n_points // _SLAB))  # each goes through all cells
     edges = np.linspace(0, nz, count + 1).astype(int)
     arrays: dict[str, Any] = {}
+    step = np.multiply(image.spacing, 1 - 2**-50)  # rounded up, the last points would lie outside
     for low, high in itertools.pairwise(edges):
         if progress is not None and progress(low / nz) is False:
             raise Cancelled("resampling was stopped by its progress callback")
         slab = pv.ImageData(
             dimensions=(nx, ny, high - low),
-            spacing=image.spacing,
-            origin=np.add(image.origin, (0, 0, low * image.spacing[2])),
+            spacing=step,
+            origin=np.add(image.origin, (0, 0, low * step[2])),
         )
         found = slab.sample(grid, categorical=False).point_data
         found["vtkGhostType"] = np.where(found.pop("vtkValidPointMask"), 0, _HIDDEN).astype(

@@ -7,7 +7,7 @@ from typing import Any
 import pyvista as pv
 
 from pyvista_vdi.io import read
-from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.inputs import as_any_vdi
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 
@@ -34,4 +34,4 @@ def read_vdi(path: str, **options: Any) -> pv.ImageData:
     InvalidArgumentError
         If an option is not one of the file's format.
     """
-    return pv.wrap(vdi_to_image(as_vdi(read(path, **options))))
+    return pv.wrap(vdi_to_image(as_any_vdi(read(path, **options))))

@@ -8,6 +8,7 @@ than that takes. ParaView has a VTK of its own: its plugin imports ``vtkmodules`
 
 from __future__ import annotations
 
+import locale
 import os
 import sys
 import threading
@@ -164,8 +165,12 @@ def weakly(thing: Any) -> Callable[[], Any]:
 
 @contextmanager
 def caught_messages() -> Iterator[Any]:
-    """Catch what VTK writes to its output window, which is the process's: one thread at a time."""
+    """Catch what VTK writes to its output window, which is the process's: one thread at a time.
+
+    The locale, which is the process's, too, stays: VTK 9.4 reads legacy files in "C" and leaves it.
+    """
     with _window_lock:
+        spoken = locale.setlocale(locale.LC_ALL)
         window = globals().get("vtkOutputWindow") or __getattr__("vtkOutputWindow")
         before, messages = window.GetInstance(), __getattr__("vtkStringOutputWindow")()
         window.SetInstance(messages)
@@ -173,6 +178,7 @@ def caught_messages() -> Iterator[Any]:
             yield messages
         finally:
             window.SetInstance(before)
+            locale.setlocale(locale.LC_ALL, spoken)
 
 
 def explain_import_error(error: ImportError) -> MissingDependencyError:

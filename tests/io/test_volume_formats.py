@@ -5,7 +5,6 @@ And what is truncated, damaged, missing or foreign: right, or a sentence, and no
 
 from __future__ import annotations
 
-import locale
 import logging
 import subprocess
 import sys
@@ -91,14 +90,6 @@ def test_the_page_lists_what_is_tried(tmp_path):
     assert "\n".join(rows) in page.read_text(encoding="utf-8")
 
 
-@pytest.fixture
-def same_locale():
-    """SimpleITK leaves the process in the locale "C" once it has read a file of VTK's."""
-    before = locale.setlocale(locale.LC_ALL)
-    yield
-    locale.setlocale(locale.LC_ALL, before)
-
-
 def itk_image(right):
     """What SimpleITK reads: of one time and one channel."""
     sitk = pytest.importorskip("SimpleITK")
@@ -113,7 +104,6 @@ def itk_image(right):
     return image
 
 
-@pytest.mark.usefixtures("same_locale")
 @pytest.mark.parametrize("name", ITK)
 def test_simpleitk_says_the_same(name, tmp_path):
     right = made(name, tmp_path)
@@ -128,7 +118,6 @@ def test_simpleitk_says_the_same(name, tmp_path):
         assert np.allclose(volume.array[int(k), int(j), int(i)], values[z, y, x], rtol=1e-6)
 
 
-@pytest.mark.usefixtures("same_locale")
 @pytest.mark.parametrize("name", ITK_PAGES)
 def test_simpleitk_has_the_same_pages(name, tmp_path):
     right = made(name, tmp_path)

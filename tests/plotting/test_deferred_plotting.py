@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 
 import numpy as np
@@ -51,6 +52,33 @@ def test_changes_of_property_and_table_are_seen_and_nothing_is_generated(
     pictures.append(seen(plotter))
     for before, after in itertools.pairwise(pictures):
         assert np.abs(before - after).mean() > 0.2
+
+
+def test_another_transfer_function_uploads_its_table_alone(default_runtime, plotter, monkeypatch):
+    """No list is generated, made on the host or uploaded, and the device holds no byte more."""
+    actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
+    uploaded, upload = [], type(default_runtime).upload
+    monkeypatch.setattr("pyvista_vdi.generation.deferred.generate_vdi", None)
+    monkeypatch.setattr(
+        type(default_runtime),
+        "upload",
+        lambda *given: uploaded.append(given[2]) or upload(*given),
+    )
+    first = seen(plotter)
+    assert {"front depths", "means of values"} <= set(uploaded)
+    held = default_runtime.allocated
+    for low in (50, 100, 150):
+        uploaded.clear()
+        opacity = actor.prop.GetScalarOpacity()
+        opacity.RemoveAllPoints()
+        opacity.AddPoint(low, 0)
+        opacity.AddPoint(255, 0.3)
+        assert np.abs(seen(plotter) - first).mean() > 0.2
+        assert uploaded.count("integrals") == 1
+        assert set(uploaded) <= {"integrals", "rays", "opaque depth"}
+        assert "offsets" not in vars(actor.vdi)
+        gc.collect()
+        assert default_runtime.allocated == held
 
 
 def test_a_file_takes_a_look_and_its_picture_is_that_of_the_classified_vdi(

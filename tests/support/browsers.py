@@ -14,6 +14,7 @@ import os
 import re
 import shutil
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -188,6 +189,20 @@ def picture(page, size, viewer="viewer"):
     )
     assert shape == [size[1], size[0]]
     return array_of(text, np.uint8).reshape(*shape, 4)
+
+
+def assert_axe_finds_nothing(page, within="document"):
+    """Hold a page, or an element of it, to axe-core's rules of accessibility.
+
+    ``PYVISTA_VDI_AXE`` names its axe.min.js: ``npm install axe-core``.
+    """
+    axe = os.environ.get("PYVISTA_VDI_AXE")
+    if axe is None:
+        pytest.skip("PYVISTA_VDI_AXE names no axe.min.js: npm install axe-core")
+    page.evaluate(Path(axe).read_text(encoding="utf-8"))
+    found = page.evaluate(f"axe.run({within})")
+    assert [each["id"] for each in found["violations"]] == []
+    assert len(found["passes"]) > 10
 
 
 class Page:

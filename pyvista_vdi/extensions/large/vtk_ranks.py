@@ -223,6 +223,11 @@ class RanksVDISource(VDISource):
         comm = communicator()
         if comm is None:
             return super()._generate(request)
+        if request.deferral.deferred:
+            raise UnsupportedError(
+                "several ranks make VDIs with colours alone: start one rank, or leave "
+                "classification='deferred' out"
+            )
         part: Any = request.volume
         camera, window_size = request.generating
         vdi = generate_on_mpi(

@@ -42,7 +42,7 @@ class SeriesInput(Input):
         return step if isinstance(step, DeferredVDI) else None
 
     def classified_by(self, prop: Any) -> Input:
-        """Classify the values of all steps by another property, and return this input."""
+        """Set the property that classifies the values of all steps from now on."""
         self.prop = prop
         return self
 

@@ -62,7 +62,7 @@ class SetInput(Input):
         return nearest if isinstance(nearest, DeferredVDI) else None
 
     def classified_by(self, prop: Any) -> Input:
-        """Classify the values of all VDIs by another property, and return this input."""
+        """Set the property that classifies the values of all VDIs from now on."""
         self.prop = prop
         self._kept.clear()
         return self

@@ -13,11 +13,10 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
 from pyvista_vdi.extensions.web.placing import as_shown, look_of, planes_of, several_of
 from pyvista_vdi.extensions.web.still import part_of, png, stand_in
-from pyvista_vdi.extensions.web.widget import RENDER, VDIWidget
+from pyvista_vdi.extensions.web.widget import VDIWidget
 from pyvista_vdi.vtk_pipeline.interaction import browser
 
 #: Seconds without a turn from which a view rests.
@@ -34,7 +33,7 @@ class PlotterWidget(VDIWidget):
     the browser; the step at which it is paused is the actor's, and the other way round.
     """
 
-    _esm = viewer_script(scene=True, series=True, module=True) + RENDER
+    _has_scene = True
 
     def __init__(self, plotter: Any, renderer: Any, scene: Any, picture: Any) -> None:
         self._plotter = weakref.ref(plotter)

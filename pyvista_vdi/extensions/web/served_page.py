@@ -20,6 +20,7 @@ form {{ position: relative; display: flex; flex-wrap: wrap; gap: 4px 16px; paddi
   align-items: center; min-height: 1.5em; }}
 label {{ display: flex; gap: 6px; align-items: center; }}
 input[type="number"] {{ width: 6em; }}
+@media (pointer: coarse) {{ input, select {{ min-height: 36px; }} }}
 input:invalid {{ outline: 2px solid #ff6060; }}
 /* Over the picture, as high as its text: the viewer's size, which is the view that is asked for,
    depends on nothing that is said. */

@@ -37,9 +37,9 @@ except ImportError as error:
     ) from error
 
 #: What anywidget calls in the page: a view of the model that the kernel's widget is.
-RENDER = """
+_RENDER = """
 function render({ model, el }) {
-  const viewer = document.createElement("vdi-viewer");
+  const viewer = document.createElement(NAME);
   const [width, height] = model.get("_picture_size");
   viewer.style.cssText =
     `display: block; width: 100%; max-width: ${width}px; aspect-ratio: ${width} / ${height}`;
@@ -129,6 +129,13 @@ export default { render };
 """
 
 
+#: Another element: in the page there may already be one that cannot play series.
+_OF_SERIES = """
+const NAME = "vdi-viewer-of-series";
+if (!customElements.get(NAME)) customElements.define(NAME, class extends VDIViewer {});
+"""
+
+
 class _CameraTrait(traitlets.TraitType[dict[str, Any], Any]):
     """A camera in the viewer's form; whatever is a camera becomes one."""
 
@@ -210,7 +217,7 @@ class VDIWidget(anywidget.AnyWidget):
     >>> widget  # doctest: +SKIP
     """
 
-    _esm = viewer_script(series=True, module=True) + RENDER
+    _has_scene = False
     _file = traitlets.Bytes().tag(sync=True)
     _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
     _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
@@ -235,6 +242,7 @@ class VDIWidget(anywidget.AnyWidget):
         check_controls(controls)
         self._precision = precision
         self._vdi = shown = self._accept(vdi)
+        self._esm = self._script(shown)
         super().__init__(
             _file=self._encoded(shown),
             _picture_size=_size_of(shown),
@@ -253,6 +261,8 @@ class VDIWidget(anywidget.AnyWidget):
     @vdi.setter
     def vdi(self, vdi: Any) -> None:
         shown = self._accept(vdi)
+        if isinstance(shown, VDISeries | VDISet):
+            self._esm = self._script(shown)  # views are made anew where it is another
         self._file = self._encoded(shown, coarse=False)  # the one before is better meanwhile
         self._vdi = shown
         series = isinstance(shown, VDISeries)
@@ -311,6 +321,12 @@ class VDIWidget(anywidget.AnyWidget):
         if isinstance(shown, VDISeries):
             return shown[shown.nearest(shown.times[0] if self.time is None else self.time)]
         return shown[shown.nearest(camera_of(self.camera))] if isinstance(shown, VDISet) else shown
+
+    def _script(self, shown: Any) -> str:
+        """Return what runs in the page: what plays series, or chooses of a set, where it is for."""
+        series = isinstance(shown, VDISeries | VDISet)
+        script = viewer_script(scene=self._has_scene, series=series, module=True)
+        return script + (_OF_SERIES if series else 'const NAME = "vdi-viewer";\n') + _RENDER
 
     def _encoded(self, vdi: Any, *, coarse: bool = True) -> bytes:
         if vdi is None:

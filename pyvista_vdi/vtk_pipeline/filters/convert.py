@@ -21,6 +21,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.io.vdi_file.description import plain_number
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.vtk_pipeline import vtk
@@ -34,8 +35,8 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
 COUNT = "count"
 #: Field array of the canonical form: everything that is not an array, as JSON.
 DESCRIPTION = "vdi"
-#: Version of the canonical form; readers refuse newer ones.
-FORM_VERSION = 1
+#: Version of the canonical form; readers refuse newer ones. The first is of colours alone.
+FORM_VERSION = 2
 
 #: Ragged arrays in field data, with their number of components.
 _RAGGED = {"front": 1, "back": 1, "color": 3, "optical_depth": 1}
@@ -277,13 +278,13 @@ def volume_to_image(volume: Volume, name: str | None = None) -> vtk.vtkImageData
     return image
 
 
-def vdi_to_image(vdi: VDI) -> vtk.vtkImageData:
+def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
     """Return a VDI in its canonical VTK form.
 
     Parameters
     ----------
-    vdi : VDI
-        Any VDI.
+    vdi : VDI or DeferredVDI
+        Any VDI. One that keeps values has them in the place of colours, and is marked so.
 
     Returns
     -------
@@ -294,6 +295,9 @@ def vdi_to_image(vdi: VDI) -> vtk.vtkImageData:
         arrays share the VDI's memory, so they must not be written to. A ``.vti`` file keeps every
         bit.
     """
+    kept: dict[str, Any] = {}
+    if isinstance(vdi, DeferredVDI):
+        kept, vdi = {"deferred": vdi.about}, vdi.with_precision("exact").lists
     width, height = vdi.window_size
     image = vtk.vtkImageData()
     image.SetDimensions(width, height, 1)
@@ -304,11 +308,12 @@ def vdi_to_image(vdi: VDI) -> vtk.vtkImageData:
         field.AddArray(to_vtk(name, getattr(vdi, name)))
     # Everything that is not an array, as a field string of JSON
     about = {
-        "form_version": FORM_VERSION,
+        "form_version": FORM_VERSION if kept else 1,
         "camera": vdi.camera.to_dict(),
         "bounds": list(vdi.bounds),
         "depth_origin": vdi.depth_origin,
         "metadata": vdi.metadata,
+        **kept,
     }
     try:
         text = json.dumps(about, default=plain_number)  # NaN and infinity, as Python reads them
@@ -331,7 +336,7 @@ def is_vdi_image(data: Any) -> bool:
     )
 
 
-def vdi_from_image(image: Any) -> VDI:
+def vdi_from_image(image: Any) -> VDI | DeferredVDI:
     """Return the VDI that a canonical VTK form holds.
 
     Parameters
@@ -341,7 +346,7 @@ def vdi_from_image(image: Any) -> VDI:
 
     Returns
     -------
-    VDI
+    VDI or DeferredVDI
         The same to the last bit; it shares the image's memory.
 
     Raises
@@ -357,6 +362,7 @@ def vdi_from_image(image: Any) -> VDI:
             "a VDI by pyvista_vdi.generate or VDISource"
         )
     about = view_of_image(image)
+    kept = about.pop("deferred", None)
     # Where each list begins, and where the last one ends
     counts = _counts_of(image)
     offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
@@ -370,17 +376,23 @@ def vdi_from_image(image: Any) -> VDI:
             arrays[name] = np.zeros((0, 3) if components == 3 else 0, dtype=np.float32)
         else:
             raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
-    return VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
+    vdi = VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
+    return vdi if kept is None else DeferredVDI.of_lists(vdi, kept)
 
 
 def view_of_image(image: vtk.vtkImageData) -> dict[str, Any]:
-    """Return what the description of a VDI's image says: arguments of :class:`VDI`."""
+    """Return what the description of a VDI's image says: arguments of :class:`VDI`.
+
+    And ``deferred`` where values are kept: what a :class:`DeferredVDI` is about.
+    """
     try:
         about = json.loads(image.GetFieldData().GetAbstractArray(DESCRIPTION).GetValue(0))
         version = int(about["form_version"])
         if version <= FORM_VERSION:
             camera = Camera.from_dict(about["camera"])
             entries = {key: about[key] for key in ("bounds", "depth_origin", "metadata")}
+            if "deferred" in about:
+                entries["deferred"] = about["deferred"]
             return {"camera": camera, **entries}
     except (
         *(KeyError, TypeError, IndexError, ValueError, OverflowError, RecursionError),

@@ -11,7 +11,7 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIError, VDIFileError
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.io.files import format_of, holds
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.inputs import as_any_vdi
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
@@ -101,13 +101,13 @@ class VDIReader(Algorithm):
             raise InvalidArgumentError("VDIReader has no file name: call SetFileName(path)")
         image = vtkImageData.GetData(outputs, 0)
         if holds(self._path) != "series":
-            image.ShallowCopy(vdi_to_image(as_vdi(read(self._path))))
+            image.ShallowCopy(vdi_to_image(as_any_vdi(read(self._path))))
             return
         # What is wrong with it is raised by opening it again
         series: Any = read(self._path) if self._series is None else self._series
         time = wanted_time(outputs.GetInformationObject(0))
         step = 0 if time is None else series.nearest(time)
-        vdi = as_vdi(series[step])
+        vdi = as_any_vdi(series[step])
         announce(outputs, vdi.window_size)
         ask_for_all([outputs])
         image.ShallowCopy(vdi_to_image(vdi))

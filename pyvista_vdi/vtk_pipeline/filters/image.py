@@ -8,25 +8,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_number, not_taken
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI, picture_size
+from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
-    Algorithm,
     announce,
     ask_for_all,
     whole_extent,
 )
+from pyvista_vdi.vtk_pipeline.filters.classifying import Classifying
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     is_vdi_image,
     to_vtk,
     vdi_from_image,
     view_of_image,
 )
+from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.view import camera_of
 from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData
 
@@ -46,7 +49,7 @@ def _checked_degrees(value: Any) -> float:
     return degrees
 
 
-class VDIToImage(Algorithm):
+class VDIToImage(Classifying):
     """Raycast the VDI at its input, and put out the picture.
 
     In goes a VDI in its canonical VTK form (see
@@ -54,6 +57,8 @@ class VDIToImage(Algorithm):
     W x H x 1 points, bottom row first, one per pixel, with the point scalars ``RGBA`` (uint8,
     straight, for display) and the point array ``premultiplied`` (float32, what
     :func:`pyvista_vdi.render` returns). It executes again only if the VDI or a setting has changed.
+    A VDI that keeps values is classified by the volume property (:meth:`SetVolumeProperty`), whose
+    changes are followed; nothing is generated. One with colours has no use for it.
 
     Notes
     -----
@@ -71,8 +76,10 @@ class VDIToImage(Algorithm):
         self._elevation = 0.0
         self._window_size: tuple[int, int] | None = None
         self._device: Any = None
-        self._vdi: VDI | None = None
+        self._vdi: VDI | DeferredVDI | None = None
         self._vdi_of: tuple[str, int] | None = None
+        self._look: VDI | None = None
+        self._look_of: Any = None
 
     def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
         """Set the new view V_N.
@@ -162,7 +169,7 @@ class VDIToImage(Algorithm):
         return (whole[1] - whole[0] + 1, whole[3] - whole[2] + 1) if whole else None
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        vdi = self._read(vtkImageData.GetData(inputs[0], 0))
+        vdi = self._classified(self._read(vtkImageData.GetData(inputs[0], 0)))
         view = vdi.camera if self._camera is None else self._camera
         view = view.azimuth(self._azimuth) if self._azimuth else view
         view = view.elevation(self._elevation) if self._elevation else view
@@ -173,7 +180,24 @@ class VDIToImage(Algorithm):
         pixels = render_vdi(vdi, FrameRequest(view, size, device=self._device))
         vtkImageData.GetData(outputs, 0).ShallowCopy(rgba_to_image(pixels))
 
-    def _read(self, image: vtkImageData) -> VDI:
+    def _classified(self, vdi: VDI | DeferredVDI) -> VDI:
+        """Return a VDI, or what the volume property shows of one that keeps values."""
+        if isinstance(vdi, VDI):
+            return vdi
+        prop = self.GetVolumeProperty()
+        if prop is None:
+            raise InvalidArgumentError(
+                "the VDI keeps values, and VDIToImage has no volume property that classifies them: "
+                "call SetVolumeProperty"
+            )
+        key = (self._vdi_of, prop.GetAddressAsString(""), prop.GetMTime())
+        if self._look is None or key != self._look_of:
+            table = transfer_function_from_property(prop)
+            self._look = classify_on_device(vdi, table, self._device)
+            self._look_of = key
+        return self._look
+
+    def _read(self, image: vtkImageData) -> VDI | DeferredVDI:
         """Return the VDI; the same object as long as it is the same (it is on the device)."""
         # Not the image itself: before 9.7 VTK frees a node of its table of wrappers twice where an
         # algorithm's last attribute goes that is data (vtkPythonUtil::FindObject)

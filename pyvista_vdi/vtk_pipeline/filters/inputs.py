@@ -162,7 +162,7 @@ class SourceInput(Input):
 
     def vdi(self) -> VDI | None:
         """Return the VDI, brought up to date."""
-        return self.source.GetVDI()
+        return as_vdi(self.source.GetVDI())
 
     def last(self) -> VDI | None:
         """Return the VDI made last."""
@@ -261,7 +261,7 @@ class ImageInput(Input):
             self._image = self._producer.GetOutputDataObject(self._port.GetIndex())
         image = self._image
         if self._vdi is None or self._read_at != image.GetMTime():
-            self._vdi = vdi_from_image(image)
+            self._vdi = as_vdi(vdi_from_image(image))
             self._read_at = image.GetMTime()
         return self._vdi
 

@@ -44,7 +44,7 @@ RGBA_OPACITY = 3
 _LOG10 = 1
 
 #: VTK's interpolation types that a VDI can be made with (VTK_NEAREST_..., VTK_LINEAR_...).
-_INTERPOLATION = {0: "nearest", 1: "linear"}
+INTERPOLATION = {0: "nearest", 1: "linear"}
 
 
 def transfer_function_from_property(
@@ -97,7 +97,7 @@ def transfer_function_from_property(
     if prop.GetShade():
         reflected = (prop.GetAmbient(), prop.GetDiffuse(), prop.GetSpecular())
         shading = Shading(*reflected, prop.GetSpecularPower())
-    interpolation = _INTERPOLATION[prop.GetInterpolationType()]
+    interpolation = INTERPOLATION[prop.GetInterpolationType()]
     functions = [
         _Function("colour", color_function(prop)),
         _Function("opacity", prop.GetScalarOpacity()),
@@ -132,7 +132,7 @@ def check_property(prop: Any, *, rgba: bool = False) -> None:
         reasons.append("a label map's functions (remove SetLabelColor, SetLabelScalarOpacity)")
     if prop.GetUseClippedVoxelIntensity():
         reasons.append("an intensity of clipped voxels (SetUseClippedVoxelIntensity(0))")
-    if prop.GetInterpolationType() not in _INTERPOLATION:
+    if prop.GetInterpolationType() not in INTERPOLATION:
         reasons.append("cubic interpolation (SetInterpolationTypeToLinear())")
     if reasons:
         raise UnsupportedError(

@@ -12,14 +12,21 @@ from pyvista_vdi.errors import (
     Cancelled,
     InvalidArgumentError,
     InvalidVolumeError,
+    UnsupportedError,
     VDIError,
     warn_external,
 )
+from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, QualityTarget
+from pyvista_vdi.model.options import (
+    Deferral,
+    GenerationOptions,
+    GenerationRequest,
+    QualityTarget,
+)
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
@@ -38,7 +45,11 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_to_image,
     volume_from_vtk,
 )
-from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
+from pyvista_vdi.vtk_pipeline.filters.properties import (
+    INTERPOLATION,
+    check_property,
+    transfer_function_from_property,
+)
 from pyvista_vdi.vtk_pipeline.filters.source_settings import SourceSettings
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData
@@ -53,6 +64,7 @@ class Request:
     screen: View
     generating: tuple[Camera, tuple[int, int]]  # V_O and its window, after coverage
     options: GenerationOptions
+    deferral: Deferral
     target: QualityTarget | None
     device: Any
     metadata: dict[str, Any]  # what is added to the VDI's
@@ -144,7 +156,7 @@ class VDISource(SourceSettings):
             self.Modified()
 
     def GetVDI(self) -> VDI:
-        """Return the VDI, brought up to date.
+        """Return the VDI, brought up to date; a ``DeferredVDI`` if :meth:`SetDeferral` says so.
 
         Raises
         ------
@@ -171,6 +183,11 @@ class VDISource(SourceSettings):
         This brings the pipeline before the source up to date, and generates nothing; it raises what
         :meth:`GetVDI` would raise before it generates.
         """
+        if self._deferral.deferred:
+            raise UnsupportedError(
+                "this VDISource keeps values, and a mapper draws colours: give add_vdi or "
+                "VDIToImage what it makes, or VDIMapper GetVDI().classified(cmap=..., opacity=...)"
+            )
         data = self.UpdateInput()
         return self._make_request(
             data,
@@ -283,6 +300,8 @@ class VDISource(SourceSettings):
 
     def _generate(self, request: Request) -> VDI:
         asked = request.generation.replace(progress=self._advance)
+        if request.deferral.deferred:
+            return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
         if request.target is None:
             return generate_vdi(asked)
         from pyvista_vdi.quality.probe import generate_to_target
@@ -301,18 +320,22 @@ class VDISource(SourceSettings):
         needed = {
             "camera (SetCamera)": camera,
             "window size (SetWindowSize)": window_size,
-            "volume property (SetVolumeProperty)": prop,
+            "volume property (SetVolumeProperty)": prop or self._deferral.deferred or None,
         }
         missing = [what for what, value in needed.items() if value is None]
-        if camera is None or window_size is None or prop is None:
+        if camera is None or window_size is None or missing:
             raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
         volume = self._read(image)
-        # Take the property's functions over the volume's scalars, the same until they change
-        key = (self._volume_key, prop.GetMTime())
-        if self._table is None or key != self._table_key:
-            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
-            self._table_key = key
-        table = self._table
+        if prop is None or self._deferral.deferred:
+            self._deferral.refuse_target(self._target or QualityTarget())
+            table = _unclassified(prop)
+        else:
+            # Take the property's functions over the volume's scalars, the same until they change
+            key = (self._volume_key, prop.GetMTime())
+            if self._table is None or key != self._table_key:
+                self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
+                self._table_key = key
+            table = self._table
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self._options, lights=lights)
         return Request(
@@ -321,10 +344,14 @@ class VDISource(SourceSettings):
             View(camera, window_size),
             self._view(image, camera, window_size, warn=warn),
             options,
+            self._deferral,
             self._target,
             self._device,
             {"scalars": volume.name, **self._metadata},
-            (self._volume_key, table, options, self._target, self._device, self._metadata),
+            (
+                *(self._volume_key, table, options, self._deferral),
+                *(self._target, self._device, self._metadata),
+            ),
         )
 
     def _read(self, image: Any) -> Volume:
@@ -401,6 +428,19 @@ class VDISource(SourceSettings):
     def _aborted(self) -> bool:
         """Whether this algorithm, or one before it, is to stop."""
         return bool(self.GetAbortExecute() or self.CheckAbort())
+
+
+def _unclassified(prop: Any) -> TransferFunction:
+    """Return what stands for the transfer function where values are kept, of a property or None."""
+    if prop is None:
+        return unclassified("nearest")
+    check_property(prop)
+    if prop.GetShade():
+        raise UnsupportedError(
+            "the volume property is shaded, which needs gradients, and a deferred VDI keeps values "
+            "alone: call ShadeOff(), or leave classification='deferred' out"
+        )
+    return unclassified(INTERPOLATION[prop.GetInterpolationType()])
 
 
 def _end_abort(source: Any, event: str) -> None:

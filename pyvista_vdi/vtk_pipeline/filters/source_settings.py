@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, not_taken
+from pyvista_vdi.model.checks import as_float, as_floats, not_taken
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import GenerationOptions, QualityTarget
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.types import (
     CameraLike,
     DeviceLike,
@@ -22,17 +22,13 @@ from pyvista_vdi.model.types import (
     OcclusionLike,
     Progress,
 )
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, Held, watch
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
+from pyvista_vdi.vtk_pipeline.filters.classifying import Classifying
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, require_image_port
-from pyvista_vdi.vtk_pipeline.filters.properties import (
-    check_property,
-    color_function,
-)
 from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera, camera_of
 from pyvista_vdi.vtk_pipeline.vtk import (
     require_this_build,
     vtkImageData,
-    vtkVolumeProperty,
     vtkWeakReference,
 )
 
@@ -46,6 +42,7 @@ _PLAIN = (
     "_scalars",
     "_preference",
     "_options",
+    "_deferral",
     "_target",
     "_device",
     "_lights",
@@ -54,7 +51,7 @@ _PLAIN = (
 )
 
 
-class SourceSettings(Algorithm):
+class SourceSettings(Classifying):
     """What can be set of a source; each setting is checked when it is set."""
 
     def __init__(self) -> None:
@@ -74,12 +71,11 @@ class SourceSettings(Algorithm):
         self._scalars: str | None = None
         self._preference = "point"
         self._options = GenerationOptions()
+        self._deferral = Deferral()
         self._target: QualityTarget | None = None
         self._device: Any = None
         self._lights: Lights | None = None
         self._lit_by = vtkWeakReference()
-        self._property: Held | None = None
-        self._observed: list[tuple[Held, int]] = []
         self._progress: Progress | None = None
         self._metadata: dict[str, Any] = {}
 
@@ -220,26 +216,6 @@ class SourceSettings(Algorithm):
     def GetCoverage(self) -> str:
         """Return what the VDI's window covers."""
         return self._coverage
-
-    def SetVolumeProperty(self, prop: vtkVolumeProperty | None) -> None:
-        """Set the volume property; later changes to it make the VDI out of date.
-
-        Raises
-        ------
-        UnsupportedError, InvalidArgumentError
-            If it cannot be honoured: see ``transfer_function_from_property``. Functions without
-            points may be filled later, before the VDI is made.
-        """
-        if prop is not None:
-            check_property(prop, rgba=not prop.GetIndependentComponents())
-        if prop is not self.GetVolumeProperty():
-            self._property = None if prop is None else Held(prop)
-            self._observe_property()
-            self.Modified()
-
-    def GetVolumeProperty(self) -> vtkVolumeProperty | None:
-        """Return the volume property."""
-        return None if self._property is None else self._property.get()
 
     def SetLights(self, lights: LightsLike | None) -> None:
         """Set what a shaded volume is lit by.
@@ -403,6 +379,22 @@ class SourceSettings(Algorithm):
         """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
         return self._target
 
+    def SetDeferral(self, deferral: Deferral) -> None:
+        """Set when scalars are classified, and what is kept of them until then.
+
+        ``Deferral("deferred", (low, high))`` of ``pyvista_vdi.model.options``: as
+        ``classification``, ``value_range`` and ``importance`` of :func:`pyvista_vdi.generate`. The
+        VDI is a :class:`~pyvista_vdi.DeferredVDI` then, and of the volume property only the
+        interpolation counts.
+        """
+        if deferral.importance is not None:  # a list, which tells whether another is the same
+            deferral = replace(deferral, importance=as_floats(deferral.importance).tolist())
+        self._change("_deferral", deferral)
+
+    def GetDeferral(self) -> Deferral:
+        """Return when scalars are classified."""
+        return self._deferral
+
     def SetDevice(self, device: DeviceLike | None) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""
         self._change("_device", device)
@@ -425,23 +417,3 @@ class SourceSettings(Algorithm):
     def _watch_camera(self) -> None:
         if self._given is not None:
             self._given.watch(Algorithm.Modified if self._track else None)
-
-    def _observe_property(self) -> None:
-        """Modify this algorithm whenever the property or one of its functions is modified."""
-        for watched, tag in self._observed:
-            watched.get().RemoveObserver(tag)
-        self._observed = []
-        prop = self.GetVolumeProperty()
-        if prop is None:
-            return
-        functions = [color_function(prop), prop.GetScalarOpacity()]
-        if prop.HasGradientOpacity():
-            functions.append(prop.GetStoredGradientOpacity())
-
-        def changed(source: SourceSettings) -> None:
-            source._observe_property()  # its functions may be others now
-            source.Modified()
-
-        self._observed = [(Held(prop), watch(prop, self, changed))]
-        for each in functions:
-            self._observed.append((Held(each), watch(each, self, Algorithm.Modified)))

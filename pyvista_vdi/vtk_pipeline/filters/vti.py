@@ -11,6 +11,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidVDIError, VDIFileError
 from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import whole_file
 from pyvista_vdi.vtk_pipeline import vtk
@@ -57,7 +58,7 @@ def write(
     return target
 
 
-def read(path: str | os.PathLike[str]) -> VDI:
+def read(path: str | os.PathLike[str]) -> VDI | DeferredVDI:
     """Read a VDI from a ``.vti`` file that holds its canonical form."""
     image = _image(path)
     try:
@@ -83,6 +84,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
         codec=_codec(file),
         file_bytes=file.stat().st_size,
         memory_bytes=vdi.nbytes,
+        deferred=vdi.about if isinstance(vdi, DeferredVDI) else None,
     )
 
 

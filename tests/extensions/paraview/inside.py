@@ -200,6 +200,42 @@ def scene(folder):
     shot("deleted")
 
 
+def deferred(folder):
+    """Edit the colours and opacities of values, from a file and from a source of them."""
+    asked = json.loads((folder / "asked.json").read_text())
+    reader = simple.OpenDataFile(str(folder / "kept.vdi"))
+    simple.SaveData(str(folder / "again.vdi"), reader)
+    view = black_view(SIZE)
+    shown = simple.Show(simple.VDIInScene(Input=reader), view)
+    shown.Opacity = 0
+    view.CameraPosition = asked["camera"]["position"]
+    view.CameraFocalPoint = asked["camera"]["focal_point"]
+    view.CameraViewUp = asked["camera"]["view_up"]
+    view.CameraViewAngle = asked["camera"]["view_angle"]
+    picture = simple.VDIToImage(Input=reader)
+    table = shown.LookupTable  # what the colour map editor edits
+    ends = [table.RGBPoints[0], table.RGBPoints[-4]]
+    found = {"array": list(shown.ColorArrayName), "range": ends}
+    table.ColorSpace = "RGB"
+
+    source = brain_source()
+    source.Classification = "deferred"
+    source.ValueRange = [20, 133]
+    source.Importance = [20, 1, 133, 2]
+    simple.SaveData(str(folder / "source.vdi"), source)
+    made = source.GetClientSideObject().GetOutputDataObject(0).GetMTime()
+    of_source = simple.VDIToImage(Input=source)
+    of_source.ColorFunction, of_source.OpacityFunction = table, table.ScalarOpacityFunction
+    for i, look in enumerate(asked["looks"]):
+        table.RGBPoints, table.ScalarOpacityFunction.Points = look
+        simple.SaveScreenshot(str(folder / f"scene_{i}.png"), view, ImageResolution=SIZE)
+        for name, image in (("file", picture), ("source", of_source)):
+            image.UpdatePipeline()
+            save_pixels(image, folder / f"{name}_{i}.npy")
+    found["idle"] = source.GetClientSideObject().GetOutputDataObject(0).GetMTime() == made
+    (folder / "found.json").write_text(json.dumps(found))
+
+
 def in_time(folder):
     """Return the source of a volume in several files, a time step each."""
     volume = simple.OpenDataFile([str(folder / f"ball_{step}.vti") for step in range(3)])

@@ -274,6 +274,39 @@ def test_a_series_is_one_source_with_time_steps(paraview, tmp_path, default_runt
         assert_pixels_alike(pixels(tmp_path / f"step_{step}.npy", (60, 40)), expected)
 
 
+def test_colour_map_editor_acts_on_values(paraview, tmp_path, default_runtime):
+    """Of a file, in a scene and as a picture; and of a source, which generates nothing again."""
+    looks = [([[0, 0.2, 1], [1, 0.5, 0]], [0.0, 0.8]), ([[1, 1, 1], [0.9, 0, 0.3]], [0.0, 0.3])]
+    low, high = 30.0, 220.0
+    ball, camera = soft_ball(12), filling_camera((-1, 1, -1, 1, -1, 1), SCREEN)
+    kept = pvdi.generate(
+        ball, camera, SCREEN, classification="deferred", value_range=(low, high), scalars="v"
+    )
+    kept.save(tmp_path / "kept.vdi")
+    seen_from = camera.azimuth(10)
+    asked = {"camera": seen_from.to_dict(), "looks": []}
+    for colors, (first, last) in looks:
+        points = [low, *colors[0], high, *colors[1]], [low, first, 0.5, 0, high, last, 0.5, 0]
+        asked["looks"].append(points)
+    (tmp_path / "asked.json").write_text(json.dumps(asked))
+    assert paraview("deferred", tmp_path).strip() == ""
+
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert found == {"array": ["POINTS", "v"], "range": [low, high], "idle": True}
+    assert pvdi.read(tmp_path / "again.vdi").equals(kept)
+    brain = pvdi.read(tmp_path / "source.vdi")
+    assert brain.value_range == (20, 133)
+    assert brain.importance == ((20, 1), (133, 2))
+    for i, (colors, opacities) in enumerate(looks):
+        table = pvdi.TransferFunction(colors, opacities, (low, high))
+        expected = over_black(pvdi.render(kept, seen_from, SCREEN, transfer_function=table))
+        assert_alike(screenshot(tmp_path / f"scene_{i}.png"), expected)
+        front = pvdi.render(kept, camera, SCREEN, transfer_function=table)
+        assert_pixels_alike(pixels(tmp_path / f"file_{i}.npy", SCREEN), front)
+        front = pvdi.render(brain, brain.camera, transfer_function=table)
+        assert_pixels_alike(pixels(tmp_path / f"source_{i}.npy", SCREEN), front)
+
+
 def save_volumes(folder):
     """Save what the case ``ranks`` reads."""
     save_steps(folder)

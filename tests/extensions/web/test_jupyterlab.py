@@ -137,11 +137,17 @@ class Notebook:
 
     def __init__(self, page, url):
         self.page = page
-        self.hosts = set()
+        self.hosts, self.complaints = set(), []
         page.set_default_timeout(LONG * 1000)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("console", self.hear)
         page.on("request", lambda request: self.hosts.add(request.url.partition("?")[0]))
         page.goto(url)
         page.wait_for_selector("text=/Python 3.*Idle/")
+
+    def hear(self, message):
+        if message.type == "error" or "GL_INVALID" in message.text:
+            self.complaints.append(f"{message.text} ({message.location['url']})")
 
     def run(self, k):
         """Run a cell; return what it printed."""

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import in_base64, picture
+from browsers import assert_axe_finds_nothing, in_base64, picture
 from PIL import Image
 from web_client import soft_ball
 
@@ -462,6 +462,7 @@ def test_the_example_s_cells_run():
 #: A page with a model as anywidget hands it in, and two views of it, as of two outputs.
 PAGE = """<!doctype html><meta charset="utf-8"><div id="one" style="width: 192px"></div>
 <div id="two" style="width: 192px"></div><script type="module">
+import "./before.js";
 import widget from "./widget.js";
 const heard = {}, values = STATE;
 for (const name of BINARIES) {
@@ -478,7 +479,7 @@ window.model = {
 };
 window.leave = ["one", "two"].map((id) =>
   widget.render({ model, el: document.getElementById(id) }));
-window.viewers = [...document.querySelectorAll("vdi-viewer")];
+window.viewers = [...document.querySelectorAll(":is(#one, #two) > *")];
 await Promise.all(viewers.map((viewer) => viewer.ready));
 window.begun = true;
 </script>"""
@@ -488,12 +489,12 @@ window.begun = true;
 def open_widget(open_page):
     """Open a page with two views of a widget."""
 
-    def open_widget(widget):
+    def open_widget(widget, before=""):
         state, files = widget.get_state(), binaries(widget)
         module = state.pop("_esm")
         text = json.dumps({name: state[name] for name in state.keys() - files.keys()})
         html = PAGE.replace("STATE", text).replace("BINARIES", json.dumps([*files]))
-        files |= {"widget.html": html, "widget.js": module}
+        files |= {"widget.html": html, "widget.js": module, "before.js": before}
         page = open_page(name="widget.html", files=files)
         page.wait_for("window.begun")
         return page
@@ -533,7 +534,7 @@ def test_the_view_draws_and_shares_its_camera(open_widget, widget, vdi):
     page.evaluate("model.set('background', null)")
     assert page.evaluate("viewers[0].background") == "transparent"
     page.evaluate("leave.forEach((go) => go())")
-    left = "[model.listeners(), document.querySelectorAll('vdi-viewer').length]"
+    left = "[model.listeners(), document.querySelectorAll(':is(#one, #two) > *').length]"
     assert page.evaluate(left) == [0, 0]
 
 
@@ -586,13 +587,21 @@ def test_subplots_are_where_they_are_in_the_window(open_widget):
     plotter.close()
 
 
-def test_a_series_in_a_notebook_has_one_time(open_widget, series):
-    widget = VDIWidget(series)
+def test_what_plays_series_is_sent_with_them_alone(widget, series):
+    small, large = widget._esm, VDIWidget(series)._esm
+    assert len(small) < len(large) - 40_000
+    widget.vdi = series
+    assert widget._esm == large
+
+
+def test_a_series_in_a_notebook_has_one_time(open_widget, widget, series):
+    """In a page in which the viewer of another cell can play none."""
+    single, widget = widget._esm, VDIWidget(series)
     assert widget.time == 0
     first = widget.screenshot()
     widget.time = 1.4
     assert np.abs(widget.screenshot() - first.astype(float)).max() > 20
-    page = open_widget(widget)
+    page = open_widget(widget, before=single)
     page.wait_for("viewers.every(({ time }) => time === 1.5) && model.get('time') === 1.5")
     seen = picture(page, SIZE, "viewers[0]") / 255
     assert (
@@ -601,6 +610,16 @@ def test_a_series_in_a_notebook_has_one_time(open_widget, series):
     )
     page.evaluate("viewers[0].time = 0")
     page.wait_for("model.get('time') === 0 && viewers[1].time === 0")
+
+
+@pytest.mark.slow
+def test_axe_finds_nothing_in_our_part_of_an_output(open_widget, series):
+    """With the bar and a panel, and below the picture a series' button and slider."""
+    page = open_widget(VDIWidget(series))
+    page.evaluate("viewers[0].style.cssText = 'display: block; width: 420px; height: 340px'")
+    page.page.get_by_role("button", name="View and marks").first.click()
+    page.wait_for("viewers.every(({ series }) => series.complete)")
+    assert_axe_finds_nothing(page, "viewers[0]")
 
 
 #: As nbconvert writes outputs: what an output's script does, and then the view, or the picture.

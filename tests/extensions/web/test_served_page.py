@@ -6,7 +6,7 @@ import urllib.request
 
 import numpy as np
 import pytest
-from browsers import picture
+from browsers import assert_axe_finds_nothing, picture
 from PIL import Image
 from web_client import soft_ball
 
@@ -155,6 +155,17 @@ def test_a_lost_connection_comes_back(page):
     wait(page, "remote.received.full === 1")
     page.evaluate("sockets.at(-1).close(); viewer.camera = { ...viewer.camera, view_angle: 5 }")
     wait(page, "remote.received.full === 2")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_axe_finds_nothing(scheme, server, open_page):
+    viewport = {"width": 390, "height": 700}
+    page = open_page(url=server.url, viewport=viewport, color_scheme=scheme)
+    wait(page, "remote.received.full === 1")
+    assert_axe_finds_nothing(page)
+    page.page.get_by_role("button", name="Brightness, opacity and clipping").click()
+    assert_axe_finds_nothing(page)
 
 
 def named_controls(page):

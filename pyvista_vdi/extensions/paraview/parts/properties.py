@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pyvista_vdi.model.options import MAX_SUPERSEGMENTS, GenerationOptions, declared
+from pyvista_vdi.model.options import MAX_SUPERSEGMENTS, Deferral, GenerationOptions, declared
 
 #: Value of the property View that means the camera properties.
 CAMERA = 1
@@ -76,7 +76,7 @@ _REFLECTION_XML = "".join(
 )
 
 #: What is declared of the options of ``generate``.
-_DECLARED = declared(GenerationOptions)
+_DECLARED = declared(GenerationOptions, Deferral)
 
 
 def _sentence(option: str, more: str = "") -> str:
@@ -100,6 +100,31 @@ def _number(option: str, name: str, bounds: str, more: str = "") -> str:
 #: Setters that take 0 for the default.
 _COMMANDS = {"SampleDistance": "Step"}
 
+#: Where opacities hold.
+UNIT_DISTANCE_XML = """
+<DoubleVectorProperty name="ScalarOpacityUnitDistance" command="SetUnitDistance"
+                      number_of_elements="1" default_values="0">
+  <DoubleRangeDomain name="range" min="0" />
+  <Documentation>Length over which the opacity function's opacities are reached, in the volume's
+  units. 0: the diagonal over the mean number of points along an edge, or, of a VDI that keeps
+  values, of its volume's.</Documentation>
+</DoubleVectorProperty>
+"""
+
+#: What a volume, or values that are kept, are classified by; {default} says by which otherwise.
+FUNCTIONS_XML = f"""
+<ProxyProperty name="ColorFunction" command="SetColorFunction">
+  <ProxyGroupDomain name="groups"><Group name="lookup_tables" /></ProxyGroupDomain>
+  <Documentation>Colours of scalars; by default {{default}}.</Documentation>
+</ProxyProperty>
+<ProxyProperty name="OpacityFunction" command="SetOpacityFunction">
+  <ProxyGroupDomain name="groups"><Group name="piecewise_functions" /></ProxyGroupDomain>
+  <Documentation>Opacities of scalars; by default {{default}}.</Documentation>
+</ProxyProperty>
+{UNIT_DISTANCE_XML}"""
+
+_WHERE_DEFERRED = _WITH_CAMERA.replace("View", "Classification")
+
 SOURCE_XML = f"""
 <StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5"
                       element_types="0 0 0 0 2" animateable="0">
@@ -108,27 +133,12 @@ SOURCE_XML = f"""
   </ArrayListDomain>
   <Documentation>The array that is classified.</Documentation>
 </StringVectorProperty>
-<ProxyProperty name="ColorFunction" command="SetColorFunction">
-  <ProxyGroupDomain name="groups"><Group name="lookup_tables" /></ProxyGroupDomain>
-  <Documentation>A colour transfer function; by default black to white over the scalars'
-  range.</Documentation>
-</ProxyProperty>
-<ProxyProperty name="OpacityFunction" command="SetOpacityFunction">
-  <ProxyGroupDomain name="groups"><Group name="piecewise_functions" /></ProxyGroupDomain>
-  <Documentation>An opacity transfer function; by default 0 to 1 over the scalars'
-  range.</Documentation>
-</ProxyProperty>
+{FUNCTIONS_XML.format(default="ramps over the scalars' range")}
 <Property name="TakeTransferFunctions" label="Take the array's colours and opacities"
           command="TakeTransferFunctions" panel_widget="command_button">
   <Documentation>Use the transfer functions that ParaView has for this array, and follow their
   changes. Client and server must be one process.</Documentation>
 </Property>
-<DoubleVectorProperty name="ScalarOpacityUnitDistance" command="SetUnitDistance"
-                      number_of_elements="1" default_values="0">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>Length over which the opacity function's opacities are reached, in the volume's
-  units. 0: the diagonal over the mean number of points along an edge.</Documentation>
-</DoubleVectorProperty>
 <IntVectorProperty name="InterpolationType" command="SetInterpolation" number_of_elements="1"
                    default_values="1">
   <EnumerationDomain name="enum">
@@ -150,6 +160,23 @@ SOURCE_XML = f"""
   <DoubleRangeDomain name="range" min="0" />
   <Documentation>How far around it that is looked for, in the volume's units. 0: the default
   radius.</Documentation>
+</DoubleVectorProperty>
+<IntVectorProperty name="Classification" command="SetClassification" number_of_elements="1"
+                   default_values="0">
+  <EnumerationDomain name="enum">
+    <Entry value="0" text="baked" /><Entry value="1" text="deferred" />
+  </EnumerationDomain>
+  <Documentation>{_sentence("classification")}</Documentation>
+</IntVectorProperty>
+<DoubleVectorProperty name="ValueRange" command="SetValueRange" number_of_elements="2"
+                      default_values="0 0">
+  <Documentation>{_sentence("value_range", ". 0 0: all")}</Documentation>{_WHERE_DEFERRED}
+</DoubleVectorProperty>
+<DoubleVectorProperty name="Importance" command="AddImportance" clean_command="ClearImportance"
+                      repeat_command="1" repeatable="1" number_of_elements="0"
+                      number_of_elements_per_command="2" panel_visibility="advanced">
+  <Documentation>{_sentence("importance", ": pairs of a scalar and a weight")}</Documentation>
+  {_WHERE_DEFERRED}
 </DoubleVectorProperty>
 {_number("max_supersegments", "MaxSupersegments", f'min="1" max="{MAX_SUPERSEGMENTS}"')}
 {_number("sample_distance", "SampleDistance", 'min="0"', ". 0: half the smallest spacing")}

@@ -11,17 +11,12 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
 from vtkmodules.vtkCommonCore import vtkWeakReference
-from vtkmodules.vtkCommonDataModel import (
-    vtkDataObject,
-    vtkImageData,
-    vtkPiecewiseFunction,
-    vtkPolyData,
-)
+from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData, vtkPolyData
 from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm
 from vtkmodules.vtkFiltersSources import vtkOutlineSource
-from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
 try:
     from pyvista_vdi import vtk_pipeline
@@ -36,17 +31,33 @@ from pyvista_vdi.errors import VDIError
 from pyvista_vdi.extensions.large.on_mpi import together
 from pyvista_vdi.extensions.large.vtk_ranks import RanksVDISource, communicator, is_first_rank
 from pyvista_vdi.extensions.paraview.parts.client import Client, say
+from pyvista_vdi.extensions.paraview.parts.functions import (
+    Functions,
+    Looks,
+    functions_of_array,
+)
 from pyvista_vdi.extensions.paraview.parts.looking import Looking
 from pyvista_vdi.extensions.paraview.parts.properties import (
     DEVICE_XML,
+    FUNCTIONS_XML,
     SOURCE_XML,
     TIMES_XML,
+    UNIT_DISTANCE_XML,
     VIEW_XML,
 )
 from pyvista_vdi.io.files import holds
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.options import Deferral
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce_times, wanted_time, watch
-from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of, vdi_from_image
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.filters.algorithm import announce_times, wanted_time
+from pyvista_vdi.vtk_pipeline.filters.convert import (
+    require_image,
+    scalars_of,
+    to_vtk,
+    vdi_from_image,
+)
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
 #: What ParaView's plugin manager shows.
@@ -58,7 +69,7 @@ def _of_looks(setter: str) -> Any:
     """Return a method that sets what a setter of the source's volume property sets."""
 
     def set_it(self: Any, value: Any) -> None:
-        getattr(self._looks, setter)(value)
+        getattr(self._looks.prop, setter)(value)
         self.Modified()
 
     return set_it
@@ -73,7 +84,7 @@ def _of_looks(setter: str) -> Any:
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
-class VDISource(Looking, RanksVDISource):
+class VDISource(Looking, Functions, RanksVDISource):
     """Generates a volume's VDI, by default of a view and with a ramp of its own.
 
     See :class:`pyvista_vdi.VDISource`.
@@ -85,12 +96,10 @@ class VDISource(Looking, RanksVDISource):
         self._kind = "point"
         self._occluded = False
         self._occlusion_radius = 0.0
-        self._unit_distance: float | None = None
-        self._functions: dict[str, Any] = {}
-        self._observers: dict[str, int] = {}
-        self._looks = vtkVolumeProperty()
-        self._looks.SetColor(vtkColorTransferFunction())
-        self._looks.SetScalarOpacity(vtkPiecewiseFunction())
+        self._looks = Looks()
+        self._deferred = False
+        self._value_range: tuple[float, float] | None = None
+        self._importance: list[tuple[float, float]] = []
 
     def SetAzimuth(self, degrees: float) -> None:
         """Turn the generating view."""
@@ -105,24 +114,30 @@ class VDISource(Looking, RanksVDISource):
         self._kind = "cell" if kind == 1 else "point"
         self.SetScalars(name or None, self._kind)
 
-    def SetColorFunction(self, function: Any) -> None:
-        """Set ParaView's colour transfer function, or ``None`` for the default."""
-        self._follow("color", function)
-
-    def SetOpacityFunction(self, function: Any) -> None:
-        """Set ParaView's opacity transfer function, or ``None`` for the default."""
-        self._follow("opacity", function)
-
-    def SetUnitDistance(self, distance: float) -> None:
-        """Set the scalar opacity unit distance; 0 is the default one."""
-        self._change("_unit_distance", distance or None)
-
     SetInterpolation = _of_looks("SetInterpolationType")
     SetShade = _of_looks("SetShade")
     SetAmbient = _of_looks("SetAmbient")
     SetDiffuse = _of_looks("SetDiffuse")
     SetSpecular = _of_looks("SetSpecular")
     SetSpecularPower = _of_looks("SetSpecularPower")
+
+    def SetClassification(self, deferred: int) -> None:
+        """Choose when scalars are classified: as the VDI is made, or by what shows it."""
+        self._change("_deferred", bool(deferred))
+
+    def SetValueRange(self, low: float, high: float) -> None:
+        """Set the scalars that a deferred VDI keeps; two that are equal mean all."""
+        self._change("_value_range", (low, high) if low != high else None)
+
+    def AddImportance(self, scalar: float, weight: float) -> None:
+        """Append a point to the importance by which a deferred VDI is cut."""
+        self._importance.append((scalar, weight))
+        self.Modified()
+
+    def ClearImportance(self) -> None:
+        """Begin anew."""
+        self._importance.clear()
+        self.Modified()
 
     def SetOcclusion(self, occluded: int) -> None:
         """Choose whether what is hidden from the light around it is darkened."""
@@ -140,24 +155,14 @@ class VDISource(Looking, RanksVDISource):
 
     def TakeTransferFunctions(self) -> None:
         """Use the transfer functions that ParaView has for the array."""
-        from paraview.modules.vtkRemotingViews import (
-            vtkSMTransferFunctionManager,
-            vtkSMTransferFunctionProxy,
-        )
-
         client = Client.of(self)
         name = client.values("Scalars")[4] if client else None
         if client is None or not name:
             return
-        functions = vtkSMTransferFunctionManager()
-        color = functions.GetColorTransferFunction(name, client.manager)
-        opacity = functions.GetOpacityTransferFunction(name, client.manager)
         data = self.GetInputDataObject(0, 0) if self.GetNumberOfInputConnections(0) else None
-        if data is not None and not client.values("ScalarRangeInitialized", color)[0]:
-            low, high = scalars_of(data, name, self._kind).GetFiniteRange()
-            for function in (color, opacity):
-                vtkSMTransferFunctionProxy.RescaleTransferFunction(function, low, high)
-        for prop, function in (("ColorFunction", color), ("OpacityFunction", opacity)):
+        ends = data and scalars_of(data, name, self._kind).GetFiniteRange()
+        functions = functions_of_array(client, name, ends)
+        for prop, function in zip(("ColorFunction", "OpacityFunction"), functions, strict=True):
             client.proxy.GetProperty(prop).RemoveAllProxies()
             client.proxy.GetProperty(prop).AddProxy(function)
         client.proxy.UpdateVTKObjects()
@@ -173,6 +178,8 @@ class VDISource(Looking, RanksVDISource):
         image = require_image(vtkDataObject.GetData(inputs[0], 0))
         self._set_view()
         self._set_looks(image)
+        kept = (self._value_range, self._importance or None)
+        self.SetDeferral(Deferral("deferred", *kept) if self._deferred else Deferral())
         super()._execute_here(inputs, outputs)
 
     def _set_view(self) -> None:
@@ -185,31 +192,14 @@ class VDISource(Looking, RanksVDISource):
 
     def _set_looks(self, image: vtkImageData) -> None:
         """Bring the volume property up to date with what is given, and with defaults."""
-        prop = self._looks
-        low, high = self._scalar_range(image)
-        color, opacity = vtkColorTransferFunction(), vtkPiecewiseFunction()
-        for x, share in ((low, 0.0), (high, 1.0)):
-            color.AddRGBPoint(x, share, share, share)
-            opacity.AddPoint(x, share)
-        # A plain copy, not ParaView's object: that one gives as few colours as its table holds,
-        # which its volumes do not show either
-        prop.GetRGBTransferFunction().DeepCopy(self._functions.get("color") or color)
-        prop.GetScalarOpacity().DeepCopy(self._functions.get("opacity") or opacity)
-        distance = self._unit_distance
-        if distance is None:
-            distance = self._default_unit_distance(image)
-        prop.SetScalarOpacityUnitDistance(distance)
-        self.SetVolumeProperty(prop)
+        distance = self._unit_distance or self._default_unit_distance(image)
+        self._looks.copy(list(self._functions.values()), self._scalar_range(image), distance)
+        self.SetVolumeProperty(self._looks.prop)
 
-    def _follow(self, role: str, function: Any) -> None:
-        """Be out of date whenever a transfer function changes."""
-        before = self._functions.pop(role, None)
-        if before is not None:
-            before.RemoveObserver(self._observers.pop(role))
-        if function is not None:
-            self._functions[role] = function
-            self._observers[role] = watch(function, self, Algorithm.Modified)
-        self.Modified()
+
+def name_of(vdi: DeferredVDI) -> str:
+    """Return the name of the array that a deferred VDI keeps, by which ParaView shows it."""
+    return str(vdi.metadata.get("scalars") or "values")
 
 
 @smproxy.filter(name="VDIToImage", label="VDI To Image", support_reload=False)
@@ -218,15 +208,17 @@ class VDISource(Looking, RanksVDISource):
     VIEW_XML.format(
         default="The VDI's own", size="0 0", least=0, note="0: that of the VDI's pictures."
     )
+    + FUNCTIONS_XML.format(default="those that ParaView has for the array")
     + DEVICE_XML
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
-class VDIToImage(Looking, vtk_pipeline.VDIToImage):
+class VDIToImage(Looking, Functions, vtk_pipeline.VDIToImage):
     """A picture of a VDI: :class:`pyvista_vdi.vtk_pipeline.VDIToImage`."""
 
     def __init__(self) -> None:
         super().__init__()
+        self._looks = Looks()
         self._shown: set[str] = set()
         self._watching = False
 
@@ -238,6 +230,20 @@ class VDIToImage(Looking, vtk_pipeline.VDIToImage):
         super()._execute(inputs, outputs)
         if not self._watching:
             self._watching = Client.watch(self, "RegisterEvent", VDIToImage._show_as_it_is)
+
+    def _classified(self, vdi: VDI | DeferredVDI) -> VDI:
+        """Classify values by the given functions, or else by those of the array, in one process."""
+        if isinstance(vdi, DeferredVDI):
+            client = Client.of(self, silent=True)
+            if client is not None:
+                proxies = functions_of_array(client, name_of(vdi), vdi.value_range)
+                for role, proxy in zip(self._functions, proxies, strict=True):
+                    if self._functions[role] is None:
+                        self._follow(role, proxy.GetClientSideObject())
+            distance = self._unit_distance or vdi.unit_distance
+            self._looks.copy(list(self._functions.values()), vdi.value_range, distance)
+            self.SetVolumeProperty(self._looks.prop)
+        return super()._classified(vdi)
 
     def _show_as_it_is(self) -> None:
         """Turn off *Map Scalars*, once, wherever the picture has just been shown."""
@@ -252,14 +258,19 @@ class VDIToImage(Looking, vtk_pipeline.VDIToImage):
 
 @smproxy.filter(name="VDIInScene", label="VDI In Scene", support_reload=False)
 @smhint.xml('<ShowInMenu category="VDI" />')
+@smproperty.xml(UNIT_DISTANCE_XML)
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
-class VDIInScene(Algorithm):
+class VDIInScene(Functions):
     """A VDI among the objects of render views.
 
     ParaView's representations are written in C++. Hence the output is the outline of the VDI's
     bounds, which ParaView shows, and a :class:`pyvista_vdi.VDIActor` joins it in each render view
     in which it is visible. Client and server must be one process.
+
+    The outline of a VDI that keeps values has an array of their name, and ends of their range: what
+    colours the outline in a view, ParaView's transfer functions of that array, classifies the
+    values there.
     """
 
     def __init__(self) -> None:
@@ -268,16 +279,21 @@ class VDIInScene(Algorithm):
         )
         self._vdi: Any = None
         self._actors: dict[str, Any] = {}
+        self._looks: dict[str, Looks] = {}
         self._watching = False
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         self._vdi = vdi_from_image(vtkImageData.GetData(inputs[0], 0))
-        for actor in self._actors.values():
-            actor.vdi = self._vdi
+        for name, actor in self._actors.items():
+            actor.GetMapper().SetInputData(self._input(name))
         outline = vtkOutlineSource()
         outline.SetBounds(self._vdi.bounds)
         outline.Update()
-        vtkPolyData.GetData(outputs, 0).ShallowCopy(outline.GetOutput())
+        output = vtkPolyData.GetData(outputs, 0)
+        output.ShallowCopy(outline.GetOutput())
+        if isinstance(self._vdi, DeferredVDI):
+            ends = np.resize(self._vdi.value_range, output.GetNumberOfPoints())
+            output.GetPointData().SetScalars(to_vtk(name_of(self._vdi), ends))
         if not self._watching and Client.of(self) is not None:
             self._watching = Client.watch(self, "RegisterEvent", VDIInScene._join_views)
         self._join_views()
@@ -290,21 +306,43 @@ class VDIInScene(Algorithm):
             if self._vdi is None or name in self._actors:
                 continue
             mapper, actor = vtk_pipeline.VDIMapper(), vtk_pipeline.VDIActor()
-            mapper.SetVDI(self._vdi)
+            self._looks[name] = Looks()
+            mapper.SetInputData(self._input(name))
             actor.SetMapper(mapper)
             actor.PickableOff()  # ParaView's selections know its own props only
             self._actors[name] = actor
             _enter(view, actor, self)
 
-    def visible_in(self, view: Any) -> bool:
-        """Whether a view shows the output."""
+    def _input(self, name: str) -> Any:
+        """Return what the actor of a view draws."""
+        vdi = self._vdi
+        return DeferredInput(vdi, self._looks[name].prop) if isinstance(vdi, DeferredVDI) else vdi
+
+    def shown_by(self, view: Any) -> Any:
+        """Return the representation that a view shows the output by; ``None`` if it does not."""
         client = Client.of(self, silent=True)
         shown = view.GetProperty("Representations")
         proxies = [shown.GetProxy(i) for i in range(shown.GetNumberOfProxies())]
-        return client is not None and any(
-            representation in proxies and representation.GetProperty("Visibility").GetElement(0)
-            for _, representation in client.representations()
-        )
+        for _, representation in client.representations() if client else ():
+            if representation in proxies and representation.GetProperty("Visibility").GetElement(0):
+                return representation
+        return None
+
+    def classify(self, view: Any, representation: Any) -> None:
+        """Take the functions that a representation colours by, or, if by none, the array's."""
+        client, vdi = Client.of(self, silent=True), self._vdi
+        if client is None or not isinstance(vdi, DeferredVDI):
+            return
+        color, opacity = functions_of_array(client, name_of(vdi), vdi.value_range)
+        table = representation.GetProperty("LookupTable")
+        if table is not None and table.GetNumberOfProxies() and table.GetProxy(0) is not None:
+            color = table.GetProxy(0)
+            of_table = color.GetProperty("ScalarOpacityFunction")
+            if of_table.GetNumberOfProxies() and of_table.GetProxy(0) is not None:
+                opacity = of_table.GetProxy(0)
+        functions = [each.GetClientSideObject() for each in (color, opacity)]
+        distance = self._unit_distance or vdi.unit_distance
+        self._looks[view.GetGlobalIDAsString()].copy(functions, vdi.value_range, distance)
 
 
 def _enter(view: Any, actor: Any, algorithm: VDIInScene) -> None:
@@ -322,10 +360,12 @@ def _enter(view: Any, actor: Any, algorithm: VDIInScene) -> None:
         if owner is None or where is None:
             renderer.RemoveViewProp(shown)
         else:
-            shown.SetVisibility(owner.visible_in(where))
+            representation = owner.shown_by(where)
+            shown.SetVisibility(representation is not None)
             if shown.GetVisibility():
                 # ParaView does not where it keeps the outlines of an animation's times
                 vtkAlgorithm.UpdateTimeStep(owner, where.GetProperty("ViewTime").GetElement(0))
+                owner.classify(where, representation)
                 renderer.SetUseDepthPeelingForVolumes(False)  # else wrong beside the translucent
 
     renderer = view.GetClientSideObject().GetRenderer()

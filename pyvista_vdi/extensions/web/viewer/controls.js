@@ -2,7 +2,7 @@
 import { lookingAt } from "./camera.js";
 import { htmlElement, strokes } from "./html.js";
 import { AS_MADE } from "./look.js";
-import { drawMarks, inShort } from "./marks.js";
+import { drawMarks, inShort, viewAt } from "./marks.js";
 
 /** Milliseconds after the last sign of somebody from which the bar fades. */
 const FADES = 3000;
@@ -10,6 +10,8 @@ const FADES = 3000;
 const POINTER_RESTS = 60;
 /** Milliseconds from a touch until its click has come. */
 const CLICK_LATER = 400;
+/** Pixels that the controls of a series are high. */
+const PLAYER = 40;
 /** Pixels that a finger or a hand trembles by. */
 const TREMBLING = 4;
 
@@ -84,7 +86,7 @@ export const CONTROLS_STYLE = `
 .panel input[type="checkbox"] { width: 18px; height: 18px; margin: 0; }
 .panel .said { min-width: 44px; text-align: end; font-variant-numeric: tabular-nums; }
 .panel small { display: block; padding: 4px 0; font-size: 12px; }
-.panel dl { display: grid; grid-template-columns: auto 1fr; gap: 2px 12px; margin: 4px 0; }
+.panel dl { display: grid; grid-template-columns: 3fr 2fr; gap: 4px 12px; margin: 4px 0; }
 .panel dd { margin: 0; }
 .place { left: 6px; top: 6px; padding: 4px 8px; font-variant-numeric: tabular-nums; }
 :host([controls="none"]) :is(.frame, .controls) { display: none; }
@@ -107,7 +109,7 @@ export const CONTROLS_STYLE = `
  *   `show` what has changed, `drawn`: a frame; whether a `key` is taken.
  */
 export function viewerControls(frame, canvas, marks, viewer, host, signal) {
-  const shown = { axes: false, bounds: false, colors: false, place: false };
+  const shown = { axes: false, cube: false, bounds: false, colors: false, place: false };
   const listen = (target, name, listener) => target.addEventListener(name, listener, { signal });
   const button = (label, act, ...content) => {
     const made = htmlElement("button", { type: "button", title: label, label }, ...content);
@@ -147,11 +149,13 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   const panel = (label, ...content) =>
     htmlElement("div", { className: "panel", role: "group", label, hidden: true }, ...content);
 
-  const choices = VIEWS.map(([name, from, up]) => button(
-    name === "iso" ? "Seen iso, from between the axes" : `Seen from ${name}`,
-    () => (viewer.camera = lookingAt(viewer.camera, viewer.bounds, from, up)), name));
-  const checks = Object.entries({ axes: "Axes", bounds: "Bounds", colors: "Colour bar",
-    place: "Position under the pointer" }).map(([name, text]) => {
+  const lookFrom = ([, from, up]) =>
+    (viewer.camera = lookingAt(viewer.camera, viewer.bounds, from, up));
+  const choices = VIEWS.map((view) => button(
+    view[0] === "iso" ? "Seen iso, from between the axes" : `Seen from ${view[0]}`,
+    () => lookFrom(view), view[0]));
+  const checks = Object.entries({ axes: "Axes", cube: "Orientation cube", bounds: "Bounds",
+    colors: "Colour bar", place: "Position under the pointer" }).map(([name, text]) => {
     const input = htmlElement("input", { type: "checkbox" });
     input.addEventListener("change", () => {
       shown[name] = input.checked;
@@ -265,16 +269,28 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   for (const name of ["pointermove", "pointerdown", "focusin", "keydown"]) listen(viewer, name, wake);
   wake();
 
-  // A right button that has not been dragged opens the menu, on all systems alike
+  // A right button that has not been dragged opens the menu, on all systems alike; another one, or a
+  // finger, on a face of the cube goes to the view that it names
+  const faceUnder = ({ offsetX, offsetY }) => {
+    const size = [canvas.clientWidth, canvas.clientHeight];
+    return shown.cube && viewer.bounds && viewAt(VIEWS, [size[0], size[1] - below()],
+      host.camera(...size), [offsetX, offsetY]);
+  };
   let pressed = null;
+  listen(canvas, "pointermove", (event) => (canvas.style.cursor = faceUnder(event) ? "pointer" : ""));
   listen(canvas, "pointerdown", (event) => {
     open(null);
-    pressed = event.button === 2 ? [event.offsetX, event.offsetY] : null;
+    const face = event.button === 0 && event.isPrimary ? faceUnder(event) : null;
+    pressed = event.button === 2 || face ? { at: [event.offsetX, event.offsetY], face } : null;
   });
   listen(canvas, "pointerup", ({ offsetX, offsetY }) => {
-    const at = pressed;
+    const { at, face } = pressed ?? {};
     pressed = null;
     if (!at || Math.hypot(offsetX - at[0], offsetY - at[1]) > TREMBLING || isOff()) return;
+    if (face) {
+      lookFrom(face);
+      return;
+    }
     open(menu);
     const { clientWidth, clientHeight } = frame;
     menu.style.inset = `${Math.max(0, Math.min(offsetY, clientHeight - menu.offsetHeight - 6))}px auto ` +
@@ -284,12 +300,13 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
 
   // -- marks -------------------------------------------------------------------------------------
 
+  const below = () => (viewer.series ? PLAYER : 0);
   const drawOver = (on, size) => viewer.camera && drawMarks(on, size, host.camera(...size), {
-    axes: shown.axes, bounds: shown.bounds ? viewer.bounds : null,
-    colors: shown.colors ? viewer.transferFunction : null,
+    axes: shown.axes, cube: shown.cube ? VIEWS : null, bounds: shown.bounds ? viewer.bounds : null,
+    colors: shown.colors ? viewer.transferFunction : null, below: below(),
   });
   const drawn = () => {
-    const any = !isOff() && (shown.axes || shown.bounds || shown.colors);
+    const any = !isOff() && (shown.axes || shown.cube || shown.bounds || shown.colors);
     if (marks.canvas.hidden && !any) return;
     marks.canvas.hidden = !any;
     const density = window.devicePixelRatio || 1;
@@ -320,7 +337,7 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
     sliders.forEach((take) => take());
     const { bounds, transferFunction, scene } = viewer;
     choices.forEach((each) => (each.disabled = !bounds));
-    const known = { axes: true, bounds, colors: transferFunction, place: !scene };
+    const known = { axes: true, cube: true, bounds, colors: transferFunction, place: !scene };
     checks.forEach(([name, label]) => (label.hidden = !known[name]));
     linking.hidden = entries[1].hidden = !host.hasLink();
     place.hidden = !shown.place || Boolean(scene);

@@ -27,12 +27,12 @@ canvas { touch-action: none; outline-offset: -2px; }
 p, .hint { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em; font: 14px sans-serif;
   color: white; background: #000a; }
 .controls { position: absolute; inset: auto 0 0 0; display: flex; align-items: center; gap: 0.5em;
-  padding: 0.2em 0.5em; font: 14px sans-serif; color: white; background: #0008; }
-.controls button { width: 2.5em; padding: 0.3em; border: 0; font: inherit; color: inherit;
+  padding: 2px 0.5em; font: 14px sans-serif; color: white; background: #0008; }
+.controls button { min-width: 36px; min-height: 36px; padding: 0.3em; border: 0; font: inherit; color: inherit;
   background: none; cursor: pointer; }
-.controls input { flex: 1; min-width: 3em; accent-color: white; }
+.controls input { flex: 1; min-width: 3em; height: 36px; margin: 0; accent-color: white; }
 .controls output { min-width: 3em; overflow: hidden; text-align: right; font-variant-numeric: tabular-nums; }
-.controls:not([hidden]) ~ :is(p, .hint) { bottom: 2.4em; }
+.controls:not([hidden]) ~ :is(p, .hint) { bottom: 40px; }
 progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; border: 0; }
 ${CONTROLS_STYLE}
 [hidden] { display: none !important; }
@@ -100,10 +100,7 @@ export class VDIViewer extends HTMLElement {
   constructor() {
     super();
     const root = this.attachShadow({ mode: "open" });
-    // No markup in text: pages may forbid what is not in a file of theirs
-    const style = new CSSStyleSheet();
-    style.replaceSync(STYLE);
-    root.adoptedStyleSheets = [style];
+    root.adoptedStyleSheets = [styleSheet()];
     const make = (name, className, more) => htmlElement(name, { className, hidden: true, ...more });
     const parts = this.#parts = {
       img: make("img", "without", { alt: "" }),
@@ -936,6 +933,16 @@ export class VDIViewer extends HTMLElement {
     this.#ready = resolvers();
     this.#ready.promise.then(resolve, reject);
   }
+}
+
+// One for all viewers of a page. No markup in text: pages may forbid what is not in a file of theirs
+let sheet = null;
+function styleSheet() {
+  if (!sheet) {
+    sheet = new CSSStyleSheet();
+    sheet.replaceSync(STYLE);
+  }
+  return sheet;
 }
 
 function resolvers() {

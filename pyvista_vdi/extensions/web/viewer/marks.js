@@ -1,11 +1,13 @@
-// What is drawn over a picture by the page itself: axes, the bounds with numbers, a colour bar.
+// What is drawn over a picture by the page itself: axes, a cube that says where one looks from, the
+// bounds with numbers, a colour bar.
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
-import { dot, subtract } from "./vectors.js";
+import { cross, dot, subtract } from "./vectors.js";
 
 const AXIS_COLORS = ["#ff6b5e", "#5fd35f", "#6da4ff"];
 const AXIS_NAMES = ["x", "y", "z"];
-/** Lengths in CSS pixels: of an axis, of the colour bar, and from the picture's edges. */
-const ARM = 28, BAR = [12, 120], EDGE = 12;
+/** Lengths in CSS pixels: of an axis, half of the cube's edge, of the colour bar, and from the picture's edges. */
+const ARM = 28, HALF = 20, BAR = [12, 120], EDGE = 12;
+const LEGIBLE = 0.4; // the part of a face's height, seen from the side, from which its name is read
 const NEAREST = 1e-6; // view depth, world units: what is nearer is behind the eye
 
 /** A number as people read it. */
@@ -17,15 +19,18 @@ export const inShort = (x) => String(Number(x.toPrecision(4)));
  * @param {CanvasRenderingContext2D} on Scaled to CSS pixels, and empty.
  * @param {number[]} size Width and height, CSS pixels.
  * @param {object} camera The view, as it is drawn.
- * @param {object} marks `axes`: whether there are some; `bounds`: a box of the world, or null;
- *   `colors`: a transfer function ({colors, scalar_range}), or null.
+ * @param {object} marks `axes`: whether there are some; `cube`: the views that its faces name
+ *   ([name, from, up]), or null; `bounds`: a box of the world, or null; `colors`: a transfer function
+ *   ({colors, scalar_range}), or null. `below`: how high what lies over the picture's lower edge is.
  */
-export function drawMarks(on, size, camera, { axes, bounds, colors }) {
+export function drawMarks(on, size, camera, { axes, cube, bounds, colors, below = 0 }) {
   on.font = "12px sans-serif";
   on.lineJoin = on.lineCap = "round";
   if (bounds) drawBounds(on, size, camera, bounds);
-  if (axes) drawAxes(on, size, camera);
-  if (colors) drawColors(on, size, colors);
+  const free = [size[0], size[1] - below];
+  if (axes) drawAxes(on, free, camera, cube ? 3.5 * HALF : 0);
+  if (cube) drawCube(on, free, camera, cube);
+  if (colors) drawColors(on, free, colors);
 }
 
 // Letters that are read on whatever is behind them.
@@ -47,9 +52,58 @@ function line(on, from, to, color, width) {
   }
 }
 
-function drawAxes(on, [, height], camera) {
+// The faces of the cube that are seen, in pixels: where `points` of a face ([right, up], 1 at its edges) are.
+function facesOf(views, [, height], camera) {
   const [right, up, forward] = cameraAxes(camera);
-  const middle = [EDGE + ARM + 8, height - EDGE - ARM - 8];
+  const middle = [EDGE + 1.75 * HALF, height - EDGE - 1.75 * HALF];
+  const onScreen = (v) => [HALF * dot(v, right), -HALF * dot(v, up)];
+  return views.flatMap((view) => {
+    const [name, from, top] = view, facing = -dot(from, forward);
+    if (Math.hypot(...from) > 1 || facing < 1e-6) return []; // views from between the axes have no face
+    const [along, upwards, out] = [cross(top, from), top, from].map(onScreen);
+    const at = (x, y) => [0, 1].map((k) => middle[k] + out[k] + x * along[k] + y * upwards[k]);
+    return [{ view, name, facing, along, upwards, middle: at(0, 0),
+      corners: [[-1, -1], [1, -1], [1, 1], [-1, 1]].map((corner) => at(...corner)) }];
+  });
+}
+
+/** The view, of those that a cube's faces name, whose face is at a place of the picture; or null. */
+export function viewAt(views, size, camera, [x, y]) {
+  const isIn = ({ corners }) => {
+    const sides = corners.map(([cx, cy], k) => {
+      const [nx, ny] = corners[(k + 1) % 4];
+      return (nx - cx) * (y - cy) - (ny - cy) * (x - cx);
+    });
+    return sides.every((side) => side <= 0);
+  };
+  return facesOf(views, size, camera).find(isIn)?.view ?? null;
+}
+
+function drawCube(on, size, camera, views) {
+  on.textAlign = "center";
+  on.textBaseline = "middle";
+  for (const { view, name, facing, along, upwards, middle, corners } of facesOf(views, size, camera)) {
+    on.beginPath();
+    corners.forEach((corner) => on.lineTo(...corner));
+    on.closePath();
+    const grey = 20 + 50 * facing;
+    on.fillStyle = `rgb(${grey} ${grey} ${grey} / 85%)`;
+    on.fill();
+    [on.strokeStyle, on.lineWidth] = ["#fffc", 1];
+    on.stroke();
+    if (facing < LEGIBLE) continue;
+    on.save();
+    on.transform(...along.map((x) => x / HALF), ...upwards.map((x) => -x / HALF), ...middle);
+    on.fillStyle = AXIS_COLORS[view[1].findIndex(Boolean)];
+    on.font = "bold 18px sans-serif";
+    on.fillText(name, 0, 1);
+    on.restore();
+  }
+}
+
+function drawAxes(on, [, height], camera, shift) {
+  const [right, up, forward] = cameraAxes(camera);
+  const middle = [EDGE + ARM + 8 + shift, height - EDGE - ARM - 8];
   const arms = AXIS_NAMES.map((name, k) => ({ name, color: AXIS_COLORS[k], depth: forward[k],
     at: (length) => [middle[0] + length * right[k], middle[1] - length * up[k]] }));
   on.textAlign = "center";

@@ -736,7 +736,7 @@ export function embeddedScene(viewer) {
 export function turnTogether(viewer) {
   viewer.addEventListener("camerachange", ({ detail }) => {
     const text = JSON.stringify(detail.camera);
-    for (const other of document.querySelectorAll(`vdi-viewer[data-link="${viewer.dataset.link}"]`)) {
+    for (const other of document.querySelectorAll(`[data-link="${viewer.dataset.link}"]`)) {
       if (JSON.stringify(other.camera) !== text) other.camera = detail.camera;
     }
   });

@@ -1,0 +1,104 @@
+"""Values that are kept, in a VTK pipeline: a source of them, their form, a picture's property."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plugin_scenes import soft_ball
+
+import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, UnsupportedError
+from pyvista_vdi.model.options import Deferral
+from pyvista_vdi.vtk_pipeline import VDIToImage, vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline.filters.convert import DESCRIPTION
+from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkVolumeProperty
+
+CAMERA = pvdi.Camera((0, -6, 2), (0, 0, 0), (0, 0, 1))
+SIZE = (24, 18)
+KEPT = {"value_range": (30, 220), "importance": [1.0, 2.0]}
+
+
+def source():
+    source = pvdi.VDISource()
+    source.SetInputDataObject(soft_ball(12))
+    source.SetCamera(CAMERA)
+    source.SetWindowSize(SIZE)
+    source.SetDeferral(Deferral("deferred", *KEPT.values()))
+    return source
+
+
+def shown_by(prop, vdi):
+    image = pvdi.render(vdi.classified(volume_property=prop), vdi.camera)
+    return image[::-1].reshape(-1, 4)
+
+
+def pixels(picture):
+    return vtk_to_numpy(picture.GetImage().GetPointData().GetArray("premultiplied"))
+
+
+def some_property():
+    prop = vtkVolumeProperty()
+    prop.GetRGBTransferFunction().RemoveAllPoints()
+    prop.GetScalarOpacity().RemoveAllPoints()  # VTK's has two
+    prop.GetRGBTransferFunction().AddRGBPoint(30, 0, 0.5, 1)
+    prop.GetRGBTransferFunction().AddRGBPoint(220, 1, 0.5, 0)
+    prop.GetScalarOpacity().AddPoint(30, 0)
+    prop.GetScalarOpacity().AddPoint(220, 0.9)
+    return prop
+
+
+def test_a_source_keeps_values_and_a_property_classifies_them(default_runtime, monkeypatch):
+    keeping, prop = source(), some_property()
+    kept = keeping.GetVDI()
+    direct = {"classification": "deferred", **KEPT, "device": default_runtime}
+    assert kept.equals(pvdi.generate(soft_ball(12), CAMERA, SIZE, **direct))
+    monkeypatch.setattr("pyvista_vdi.vtk_pipeline.filters.source.generate_deferred", None)
+    picture = VDIToImage()
+    picture.SetInputConnection(keeping.GetOutputPort())
+    with pytest.raises(InvalidArgumentError, match="SetVolumeProperty"):
+        picture.Update()
+    picture.SetVolumeProperty(prop)
+    first = pixels(picture).copy()
+    np.testing.assert_array_equal(first, shown_by(prop, kept))
+    prop.GetScalarOpacity().AddPoint(100, 0)
+    keeping.SetVolumeProperty(prop)  # which decides nothing here
+    np.testing.assert_array_equal(pixels(picture), shown_by(prop, kept))
+    assert np.abs(pixels(picture) - first).max() > 0.1
+
+
+@pytest.mark.parametrize("precision", ["exact", "8-byte"])
+def test_form_files_and_plotters_keep_values(default_runtime, tmp_path, precision):
+    pv = pytest.importorskip("pyvista")
+    kept = source().GetVDI().with_precision(precision)
+    again = vdi_from_image(vdi_to_image(kept))
+    assert again.about == kept.about
+    for name in ("offsets", "front", "back", "mean", "spread", "share", "steps"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(kept, name), err_msg=name)
+    image = pv.read(kept.save(tmp_path / "kept.vdi"))
+    image.save(tmp_path / "again.vdi")
+    assert pvdi.read(tmp_path / "again.vdi").equals(again)
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    actor = plotter.add_vdi(image, cmap="bone", clim=(30, 220), show_scalar_bar=False)
+    assert actor.mapper.driver.input.deferred.equals(again)
+    plotter.close()
+
+
+def test_what_draws_colours_refuses_values_by_name(default_runtime):
+    keeping = source()
+    image = vdi_to_image(keeping.GetVDI())
+    for draw in (pvdi.VDIMapper().SetInputData, lambda image: pvdi.render(image, CAMERA)):
+        with pytest.raises(InvalidVDIError, match=r"classified\(cmap"):
+            draw(image)
+    with pytest.raises(UnsupportedError, match="keeps values"):
+        keeping.MakeRequest()
+    prop = some_property()
+    prop.ShadeOn()
+    keeping.SetVolumeProperty(prop)
+    with pytest.raises(UnsupportedError, match="ShadeOff"):
+        keeping.Update()
+    text = image.GetFieldData().GetAbstractArray(DESCRIPTION)
+    text.SetValue(
+        0, text.GetValue(0).replace('"deferred": {"version": 1', '"deferred": {"version": 9')
+    )
+    with pytest.raises(InvalidVDIError, match="version 9"):
+        vdi_from_image(image)
