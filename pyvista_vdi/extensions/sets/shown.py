@@ -62,7 +62,7 @@ class SetInput(Input):
         return nearest if isinstance(nearest, DeferredVDI) else None
 
     def classified_by(self, prop: Any) -> Input:
-        """Have this property classify the values of all VDIs from now on."""
+        """Set the property that classifies the values of all VDIs from now on."""
         self.prop = prop
         self._kept.clear()
         return self
