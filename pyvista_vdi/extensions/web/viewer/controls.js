@@ -210,10 +210,13 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   const editor = transferEditor?.(viewer, button); // in pages that keep values; others have colours
   const ofColors = [factor("brightness", "Brightness"), factor("opacity", "Opacity"),
     htmlElement("small", {}, "Colours and opacities were chosen when this picture's data was made: " +
-      "the sliders make all of it brighter or denser."),
-    button("As it was made", () => (viewer.look = AS_MADE), "As it was made")];
+      "the sliders make all of it brighter or denser.")];
+  const reset = button("As it was made", () => {
+    editor?.reset(); // which can be undone
+    viewer.look = AS_MADE;
+  }, "As it was made");
   const lookPanel = panel(OF_COLORS, ...(editor ? [editor.element] : []), ...ofColors.slice(0, 2),
-    ...[0, 1, 2].map(cut), ...ofColors.slice(2));
+    ...[0, 1, 2].map(cut), ofColors[2], reset);
 
   const keysShown = htmlElement("dl");
   const helpPanel = panel("Keys and gestures", keysShown);

@@ -48,8 +48,8 @@ const thousandths = (x) => Math.round(1000 * Math.min(Math.max(x, 0), 1)) / 1000
  * @param {function(string, function(), string): HTMLElement} button Makes one: its name, what it
  *   does and what stands on it.
  * @returns {{element: HTMLElement, show: function(), key: function(KeyboardEvent, EventTarget): boolean,
- *   undo: function(KeyboardEvent, EventTarget): boolean}} `show` what the viewer has; whether a `key`
- *   is taken, and one with Ctrl by `undo`.
+ *   undo: function(KeyboardEvent, EventTarget): boolean, reset: function()}} `show` what the viewer has;
+ *   whether a `key` is taken, and one with Ctrl by `undo`; `reset`: to what the file begins with.
  */
 export function transferEditor(viewer, button) {
   const before = []; // that undo goes back to
@@ -202,14 +202,10 @@ export function transferEditor(viewer, button) {
     button(`Opacity: ${name}`, () => change({ points }), name));
   const undoing = button("Undo", back, "Undo");
   const removing = button("Remove the point", remove, "\u2212 Point");
-  const reset = button("As it was made", () => {
-    change(null);
-    viewer.look = {};
-  }, "As it was made");
   const row = (...content) => htmlElement("div", { className: "row" }, ...content);
   const element = htmlElement("div", { className: "editor" }, curve, colors, ends,
     row(button("Add a point", addBehind, "+ Point"), removing, undoing),
-    labelled("Colours", maps), ...sliders.map(([label]) => label), row(...presets), row(reset));
+    labelled("Colours", maps), ...sliders.map(([label]) => label), row(...presets));
 
   const textOf = ([x, y]) => `value ${inShort(valueOf(x))}, opacity ${y}`;
   let histogram = null; // that is drawn
@@ -279,5 +275,5 @@ export function transferEditor(viewer, button) {
     back();
     return true;
   };
-  return { element, show, key, undo };
+  return { element, show, key, undo, reset: () => viewer.look.transfer && change(null) };
 }
