@@ -57,8 +57,10 @@ prepare_values(__global const OFFSET_T *starts, // of the lists in the arrays, w
         lengths[place] = n;
         longest = max(longest, n);
     }
+    // One entry beyond, if there is room: rays that meet nothing there weigh what they read with 0
+    const int written = min(longest + 1, count_of_header(places[bundle]));
     for (int place = 0; place < LISTS_PER_BUNDLE; ++place)
-        for (int n = lengths[place]; n < longest; ++n) {
+        for (int n = lengths[place]; n < written; ++n) {
             const OFFSET_T entry = first + ((OFFSET_T)n << 2 * LIST_SHIFT) + place;
             faces[entry] = NO_FACE;
             media[entry] = (float4)(0.0f);

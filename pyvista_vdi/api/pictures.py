@@ -69,8 +69,9 @@ def render(
         A :class:`VDISet` shows what was made nearest to the view, by itself blended with what is
         about as near.
         Several are merged by depth along each ray; their order does not matter, to the last bit.
-        A :class:`DeferredVDI` takes the words of :meth:`DeferredVDI.classified` (``cmap``,
-        ``opacity``, ``clim`` ...) as well; of several, those that keep values take them.
+        A :class:`DeferredVDI`, or a set of such, takes the words of
+        :meth:`DeferredVDI.classified` (``cmap``, ``opacity``, ``clim`` ...) as well; of several,
+        those that keep values take them.
     camera : pyvista.Camera or vtkCamera or Camera
         The new view V_N. Its model transform places the VDI's model frame in the world.
     window_size : (int, int), optional
@@ -122,9 +123,9 @@ def render(
     """
     view = Camera.from_any(camera)
     given: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
-    if look and any(isinstance(each, DeferredVDI) for each in given):
+    if look and any(_keeps_values(each) for each in given):
         given = [
-            each.classified(**look, device=device) if isinstance(each, DeferredVDI) else each
+            each.classified(**look, device=device) if _keeps_values(each) else each
             for each in given
         ]
         vdi = given if isinstance(vdi, list | tuple) else given[0]
@@ -154,7 +155,7 @@ def render(
     if _is_of_views(shown):
         from pyvista_vdi.raycasting.multi_vdi import blended
 
-        return blended(shown.parts(view), request)
+        return blended([(as_vdi(part), weight) for part, weight in shown.parts(view)], request)
     from pyvista_vdi.raycasting.raycast import render_fitting
 
     return render_fitting(shown, request)
@@ -200,8 +201,8 @@ def render_depth(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
-    if isinstance(vdi, DeferredVDI) and look:
-        vdi = vdi.classified(**look, device=device)
+    if look and _keeps_values(vdi):
+        vdi = vdi.classified(**look, device=device)  # type: ignore[union-attr]
     else:
         refuse_keywords(look, render_depth)
     seen = _seen(vdi, view)
@@ -270,12 +271,13 @@ def pick(
     A single ray, walked in float64 on the host: no device is needed.
     """
     view = Camera.from_any(camera)
-    kept = vdi if isinstance(vdi, DeferredVDI) else None
+    near: Any = vdi[vdi.nearest(view)] if isinstance(vdi, VDICollection) and look else vdi
+    kept = near if isinstance(near, DeferredVDI) else None
     if kept is not None and look:
-        vdi = kept.classified(**look)
+        near = kept.classified(**look)
     else:
         refuse_keywords(look, pick)
-    seen = _seen(vdi, view)
+    seen = _seen(near, view)
     options = RenderOptions.checked(clipping_planes, cropping, opacity_multiplier)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size
     from pyvista_vdi.raycasting.picking import pick_vdi
@@ -403,6 +405,11 @@ def render_volume(
     from pyvista_vdi.volume.render import raycast_volume
 
     return raycast_volume(read, table, request, medium)
+
+
+def _keeps_values(vdi: Any) -> bool:
+    """Whether a VDI, or what a set has, keeps values, so that a look can be given."""
+    return getattr(vdi, "value_range", None) is not None
 
 
 def _is_of_views(vdi: Any) -> bool:

@@ -61,13 +61,14 @@ class _LengthOptions(GenerationOptions):
 def generate_deferred(
     request: GenerationRequest,
     deferral: Deferral,
-    generate: Callable[[GenerationRequest], VDI] = generate_vdi,
-) -> DeferredVDI:
+    generate: Callable[[GenerationRequest], Any] = generate_vdi,
+) -> Any:
     """Make a deferred VDI; of the request's transfer function the interpolation counts.
 
-    ``generate`` makes the VDI of a request: here, in blocks, or by workers. InvalidArgumentError if
-    the range or the importance cannot be used, UnsupportedError for what cannot be deferred, and
-    what ``generate`` raises.
+    ``generate`` makes the VDI of a request: here, in blocks, or by workers; where it makes none, as
+    on all of MPI's ranks but one, there is no deferred one either, and None is returned.
+    InvalidArgumentError if the range or the importance cannot be used, UnsupportedError for what
+    cannot be deferred, and what ``generate`` raises.
     """
     volume, options = request.volume, request.options
     if volume.rgba:
@@ -95,6 +96,8 @@ def generate_deferred(
             options=_LengthOptions(**{**given, "precision": "exact"}),
         )
     )
+    if made is None:
+        return None
 
     # Take what the channels of the table have become, means by length, a piece at a time
     per_length = _PER_VOXEL / min(volume.spacing)

@@ -145,8 +145,8 @@ class AddVDI(Component):
             VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
             view is drawn. With VDIs nothing is generated, and arguments that
-            only a volume can honour are refused. A :class:`DeferredVDI` takes a look (``cmap``,
-            ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
+            only a volume can honour are refused. A :class:`DeferredVDI`, or a series or a set of
+            such, takes a look (``cmap``, ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
         scalars : str or numpy.ndarray, optional
             Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
         clim : float or (float, float), optional

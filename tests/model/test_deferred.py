@@ -180,8 +180,6 @@ def test_entrances_for_colours_name_the_remedy(tmp_path):
         lambda: pvdi.render([made, made], made.camera),
         lambda: pvdi.pick(made, made.camera, (0, 0)),
         lambda: pvdi.render_depth(made, made.camera),
-        lambda: pvdi.VDISeries.of([made]),
-        lambda: pvdi.VDISet.of([made]),
         lambda: made.save(tmp_path / "a.exr"),
     ):
         with pytest.raises(InvalidVDIError, match=r"classified\(cmap=..., opacity=...\)"):
@@ -203,12 +201,10 @@ def test_render_takes_the_look(default_runtime):
     assert np.array_equal(both, pvdi.render([vdi, vdi], made.camera))
 
 
-@pytest.mark.parametrize("generate", [pvdi.generate_set, pvdi.generate_series])
-def test_sets_and_series_of_values_are_refused_by_name(generate):
+def test_generating_a_set_of_values_is_refused_by_name():
     volume = pvdi.Volume(np.zeros((4, 4, 4), np.float32))
-    given = (volume,) if generate is pvdi.generate_set else ([volume], deferred().camera, (8, 8))
     with pytest.raises(TypeError, match="'classification': values in place of colours are kept by"):
-        generate(*given, classification="deferred", cmap="bone")
+        pvdi.generate_set(volume, classification="deferred", cmap="bone")
 
 
 @pytest.mark.parametrize("compression", ["lz4", "zstd", "deflate", "none"])

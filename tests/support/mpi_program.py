@@ -24,9 +24,11 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.extensions.insitu import InSitu
 from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.volume import Grid
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from support import moving_field
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 COMM = MPI.COMM_WORLD
@@ -304,6 +306,17 @@ def series(folder):
         assert len(show.seconds) == 2
 
 
+def deferred(folder):
+    """Write 25 steps of values in four slabs, as a series."""
+    cuts = np.linspace(0, moving_field.N, COMM.size + 1).astype(int)
+    low, high = cuts[COMM.rank], cuts[COMM.rank + 1]
+    view = filling_camera((-1, 1) * 3, moving_field.SIZE), moving_field.SIZE
+    options = {**moving_field.GRID, **moving_field.KEPT, "comm": COMM}
+    with InSitu(folder / "kept.vdis", *view, (moving_field.N,) * 3, **options) as show:
+        for step in range(moving_field.STEPS):
+            show(moving_field.values_at(step, slice(low, high)), (0, 0, low), 0.5 * step)
+
+
 if __name__ == "__main__":
     for case in sys.argv[1].split(","):
         {
@@ -314,4 +327,5 @@ if __name__ == "__main__":
             "pipeline": pipeline,
             "closing": closing,
             "series": series,
+            "deferred": deferred,
         }[case](Path(sys.argv[2]))

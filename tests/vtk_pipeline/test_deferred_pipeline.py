@@ -8,7 +8,6 @@ from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, UnsupportedError
-from pyvista_vdi.model.options import Deferral
 from pyvista_vdi.vtk_pipeline import VDIToImage, vdi_from_image, vdi_to_image
 from pyvista_vdi.vtk_pipeline.filters.convert import DESCRIPTION
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkVolumeProperty
@@ -23,7 +22,7 @@ def source():
     source.SetInputDataObject(soft_ball(12))
     source.SetCamera(CAMERA)
     source.SetWindowSize(SIZE)
-    source.SetDeferral(Deferral("deferred", *KEPT.values()))
+    source.SetDeferral("deferred", **KEPT)
     return source
 
 
@@ -102,3 +101,15 @@ def test_what_draws_colours_refuses_values_by_name(default_runtime):
     )
     with pytest.raises(InvalidVDIError, match="version 9"):
         vdi_from_image(image)
+
+
+def test_several_ranks_refuse_values_by_name(default_runtime, monkeypatch):
+    ranks = pytest.importorskip("pyvista_vdi.extensions.large.vtk_ranks")
+    keeping = ranks.RanksVDISource()
+    keeping.TakeSettings(source())
+    keeping.SetInputDataObject(soft_ball(12))
+    assert keeping.GetVDI().equals(source().GetVDI())
+    request = keeping.GetCurrentRequest()
+    monkeypatch.setattr(ranks, "communicator", lambda: "of several")
+    with pytest.raises(UnsupportedError, match="one rank"):
+        keeping.MakeVDI(request)

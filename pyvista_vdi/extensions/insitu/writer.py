@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from string import Formatter
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,11 +25,18 @@ from pyvista_vdi.extensions.large.on_mpi import (
 from pyvista_vdi.extensions.series.continuing import check_goes_on, checked_way, refused
 from pyvista_vdi.extensions.series.series import checked_time
 from pyvista_vdi.extensions.series.writer import SeriesWriter
+from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions
+from pyvista_vdi.model.options import (
+    GENERATION_NAMES,
+    Deferral,
+    GenerationOptions,
+    GenerationRequest,
+    declared,
+)
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
@@ -38,6 +46,8 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from pyvista_vdi.extensions.series.keywords import InSituOptions
+
+_DEFERRAL = tuple(declared(Deferral))
 
 
 class InSitu:
@@ -70,7 +80,9 @@ class InSitu:
         Of this rank, see :func:`pyvista_vdi.list_devices`.
     **options
         What :func:`pyvista_vdi.generate` takes, classification included. ``clim`` must be given, so
-        that colours mean the same in all steps. ``precision`` is ``"8-byte"`` by default.
+        that colours mean the same in all steps; or ``classification="deferred"`` and
+        ``value_range``, so that colours can be chosen after the run (docs/deferred.md).
+        ``precision`` is ``"8-byte"`` by default.
 
     Attributes
     ----------
@@ -151,12 +163,21 @@ class InSitu:
         """Take what is asked for, or raise."""
         self._camera = Camera.from_any(camera)
         self._size = check_window_size(window_size)
-        looks = {name: value for name, value in options.items() if name not in GENERATION_NAMES}
-        if looks.get("clim") is None and "transfer_function" not in looks:
+        others = (*GENERATION_NAMES, *_DEFERRAL)
+        looks = {name: value for name, value in options.items() if name not in others}
+        self._deferral = Deferral(**{n: options[n] for n in _DEFERRAL if n in options})
+        missing = looks.get("clim") is None and "transfer_function" not in looks
+        if self._deferral.deferred:
+            missing = self._deferral.value_range is None
+        if missing:
             raise InvalidArgumentError(
-                "clim=(low, high) is missing: no step knows the range of the others"
+                f"{'value_range' if self._deferral.deferred else 'clim'}=(low, high) is missing: "
+                "no step knows the range of the others"
             )
-        self._looks = Classification.composited(looks, "InSitu", GENERATION_NAMES)
+        self._looks = Classification.composited(looks, "InSitu", others)
+        if self._deferral.deferred:
+            self._looks.require_no_look()
+            self._function = unclassified(self._looks.interpolation)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
         points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
@@ -215,22 +236,47 @@ class InSitu:
                     "append=True to go on"
                 )
             at = self._checked_time(at)
+            own = Volume(values, self._grid.spacing, self._grid.origin).load()
             if self._function is None:
-                own = Volume(values, self._grid.spacing, self._grid.origin).load()
                 self._function = self._looks.transfer_function_of(own)
+            finite = np.isfinite(own.array).any()
+            ends = own.finite_range() if finite else (np.nan, np.nan)
         assert self._function is not None
-        vdi = generate_on_mpi(
-            values,
-            first,
-            self._grid,
+        low, high = zip(*self._comm.allgather(ends), strict=True)
+        ends = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
+
+        def make(asked: GenerationRequest) -> Any:
+            return generate_on_mpi(
+                values,
+                first,
+                self._grid,
+                self._camera,
+                self._size,
+                asked.transfer_function,
+                asked.options,
+                comm=self._comm,
+                device=self._device,
+                metadata=asked.metadata,
+            )
+
+        whole: Any = SimpleNamespace(
+            spacing=self._grid.spacing,
+            default_unit_distance=self._grid.default_unit_distance,
+            rgba=own.rgba,
+            chunks=None,
+            finite_range=lambda: ends,
+        )
+        request = GenerationRequest(
+            whole,
+            self._function,
             self._camera,
             self._size,
-            self._function,
             self._options,
-            comm=self._comm,
-            device=self._device,
             metadata={"classification": self._looks.describe(), "time": at},
         )
+        with together(self._comm, f"step {number}"):
+            deferred = self._deferral.deferred
+            vdi = generate_deferred(request, self._deferral, make) if deferred else make(request)
         with together(self._comm, f"writing step {number}"):  # or the others would wait for ever
             if vdi is not None and self._writer is not None:
                 self._writer.append(vdi, at)

@@ -95,9 +95,7 @@ class VDISeries(VDICollection):
         """
         if isinstance(vdis, VDI | DeferredVDI):
             raise InvalidVDIError("a series is made of several VDIs: pass them in a list")
-        steps: Any = tuple(
-            vdi if isinstance(vdi, DeferredVDI) else as_vdi(vdi) for vdi in each_of(vdis)
-        )
+        steps: Any = tuple(as_step(vdi) for vdi in each_of(vdis))
         for i, step in enumerate(steps):
             check_range(step, range_of(steps[0]), f"step {i}")
         return cls(steps, range(len(steps)) if times is None else checked_times(times))
@@ -251,6 +249,11 @@ class Called(Sequence[Any]):
         return (
             Called(self._function, chosen) if isinstance(index, slice) else self._function(chosen)
         )
+
+
+def as_step(vdi: Any) -> Any:
+    """Return a VDI, its VTK form or a DeferredVDI as such; InvalidVDIError if it is none."""
+    return vdi if isinstance(vdi, DeferredVDI) else as_vdi(vdi)
 
 
 def range_of(vdi: Any) -> tuple[float, float] | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.cli import declare
+from pyvista_vdi.cli.files import of_values
 from pyvista_vdi.cli.generate import generating_view
 from pyvista_vdi.cli.inputs import (
     ambient_occlusion,
@@ -19,6 +20,7 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
     refuse,
     say_written,
+    with_look,
 )
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
 from pyvista_vdi.extensions.series.cli import OF_READ_IMAGES, OF_WRITTEN_IMAGES, write_each
@@ -82,6 +84,7 @@ def info(options: argparse.Namespace) -> int:
                 "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}",
                 "written by": f"{about.written_by}, format version {about.format_version}",
                 "views": f"{len(vdi_set)}",
+                **({} if about.value_range is None else of_values(about.value_range)),
                 "bytes a view": f"{min(about.step_bytes)} to {max(about.step_bytes)}",
                 "precision": about.precision,
                 "pictures": f"{width} x {height}",
@@ -99,8 +102,10 @@ def info(options: argparse.Namespace) -> int:
 def convert(options: argparse.Namespace) -> int:
     """Write a set anew, as a page or a Cinema database, or each VDI to a file of its own."""
     refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a set")
-    vdi_set, target = files.read(options.file), Path(options.output)
+    target = Path(options.output)
     suffix, arguments = target.suffix.lower(), of_the_file(options)
+    colors = suffix not in (files.SUFFIX, ".vdi")
+    vdi_set = with_look(options, files.read(options.file), options.file, colors=colors)
     found = format_named(target)
     page = found is not None and found.page
     if suffix not in (files.SUFFIX, cinema.SUFFIX) and not page:

@@ -19,6 +19,7 @@ from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.quality.view_error import eye_from_centre
@@ -71,6 +72,7 @@ def save(vdi_set: VDISet, path: str | os.PathLike[str], **options: Any) -> Path:
     """Write a file of a set, or a page that shows it: see :meth:`VDISet.save`."""
     found = format_named(path)
     if found is not None and found.page:
+        as_vdi(vdi_set[0])  # refuses what has no colours
         return found.load().write_set(vdi_set, path, **options)  # type: ignore[no-any-return]
     return write(vdi_set, path, **options)
 

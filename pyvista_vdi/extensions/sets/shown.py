@@ -7,13 +7,15 @@ from typing import Any
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
-from pyvista_vdi.extensions.series.player import MEMORY, ON_DEVICE, Decoding
+from pyvista_vdi.extensions.series.player import MEMORY, ON_DEVICE, Decoding, bring
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.prepared import prepared_vdi
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 
 #: How many of the VDIs nearest to a view are decoded.
 _AHEAD = 8
@@ -46,23 +48,38 @@ class SetInput(Input):
         self._decoder = Worker("pyvista-vdi set")
         self._grower = Worker("pyvista-vdi set's growth")
         self._grown_for: Camera | None = None
+        self._kept: dict[int, DeferredInput] = {}  # of what is drawn, where it keeps values
 
     def vdi(self) -> VDI | None:
         """Return the nearest VDI, decoded now if it is not ready."""
-        self._vdi = self._at(self.stamp())
+        self._vdi = self._seen(self._weights[0][0])
         return self._vdi
+
+    @property
+    def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
+        """The nearest VDI's values, where it keeps them."""
+        nearest: Any = self._at(self._weights[0][0])
+        return nearest if isinstance(nearest, DeferredVDI) else None
+
+    def classified_by(self, prop: Any) -> Input:
+        """Set the property that classifies the values of all VDIs from now on."""
+        self.prop = prop
+        self._kept.clear()
+        return self
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds that all VDIs have."""
         return self.collection.bounds
 
-    def stamp(self) -> int:
-        """Return which VDI is nearest."""
-        return self._weights[0][0]
+    def stamp(self) -> Any:
+        """Return which VDI is nearest, and the time stamp of what classifies it."""
+        return self._weights[0][0], self.prop and (id(self.prop), self.prop.GetMTime())
 
     def shared(self) -> Input:
         """Return an input that looks at the same set by itself."""
-        return SetInput(self.collection)
+        other = SetInput(self.collection)
+        other.prop = self.prop
+        return other
 
     def rest(self) -> None:
         """Leave no thread; the next frame may begin anew."""
@@ -94,7 +111,19 @@ class SetInput(Input):
 
     def parts(self) -> list[tuple[VDI, float]]:
         """Return what a picture is blended of, with weights; the nearest first."""
-        return [(self._at(i), weight) for i, weight in self._weights]
+        return [(self._seen(i), weight) for i, weight in self._weights]
+
+    def _seen(self, i: int) -> VDI:
+        """Return a VDI, with the colours that the property gives it where it keeps values."""
+        vdi: Any = self._at(i)
+        if not isinstance(vdi, DeferredVDI) or self.prop is None:
+            return as_vdi(vdi)  # refuses what has no colours
+        kept = self._kept.get(i)
+        if kept is None or kept.deferred is not vdi:
+            drawn = dict(self._weights)
+            self._kept = {k: one for k, one in self._kept.items() if k in drawn}
+            kept = self._kept[i] = DeferredInput(vdi, self.prop)
+        return kept.vdi()
 
     def _at(self, i: int) -> VDI:
         with self._lock:
@@ -172,7 +201,7 @@ class SetInput(Input):
         while (i := self._wanted()) is not None and self._decoder.running:
             try:
                 vdi = self.collection[i]
-                prepared_vdi(runtime, vdi)
+                bring(runtime, vdi)
             except Cancelled:
                 raise
             except Exception:  # a frame that needs it says what is wrong

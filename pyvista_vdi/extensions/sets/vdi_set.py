@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol, overload
 
@@ -13,10 +14,12 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
+from pyvista_vdi.extensions.series.series import Called, as_step, check_range, range_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.inputs import as_vdi, each_of
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.inputs import each_of
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
 
@@ -24,6 +27,8 @@ from pyvista_vdi.quality.view_error import eye_from_centre
 BLEND = 6.0
 #: Tangent of half the angle of VTK's lens.
 _LENS = math.tan(math.radians(15))
+#: VDIs with other colours that are kept, as those that were decoded last are.
+_KEPT = 8
 #: Most V_Os that a picture is blended of.
 MOST_BLENDED = 3
 
@@ -94,7 +99,7 @@ class VDISet(VDICollection):
                 f"views must be a sequence of VDIs, got {type(views).__name__}: pass a list"
             )
         if cameras is None:
-            cameras = [as_vdi(vdi).camera for vdi in views]
+            cameras = [as_step(vdi).camera for vdi in views]
         elif not np.iterable(cameras):
             raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
         cameras = [Camera.from_any(camera) for camera in cameras]
@@ -137,10 +142,11 @@ class VDISet(VDICollection):
         InvalidVDIError
             If one is no VDI, or they are of other bounds than the first.
         """
-        if isinstance(vdis, VDI):
+        if isinstance(vdis, VDI | DeferredVDI):
             raise InvalidVDIError("a set is made of several VDIs: pass them in a list")
-        views = tuple(as_vdi(vdi) for vdi in each_of(vdis))
+        views = tuple(as_step(vdi) for vdi in each_of(vdis))
         for i, vdi in enumerate(views):
+            check_range(vdi, range_of(views[0]), f"view {i}")
             if vdi.bounds != views[0].bounds:
                 raise InvalidVDIError(
                     f"the VDIs of a set are of one scene: number {i} has the bounds "
@@ -198,6 +204,19 @@ class VDISet(VDICollection):
         if not 0 <= value <= 180:
             raise InvalidArgumentError(f"blend must be degrees, 0 to 180; got {degrees!r}")
         self._blend = value
+
+    def _mapped(self, function: Callable[[VDI], VDI]) -> VDISet:
+        """Return a set of what a function makes of each VDI, when that is asked for."""
+        make = lru_cache(_KEPT)(lambda i: function(self[i]))
+        found = VDISet(
+            Called(make, range(len(self))),
+            self.cameras,
+            window_size=self.window_size,
+            bounds=self.bounds,
+            about=self.about,
+        )
+        found.blend = self.blend
+        return found
 
     def distances(self, camera: Any) -> NDArray[np.float64]:
         """Return how far each V_O's eye is from that of a view, degrees, float64 (n,).
@@ -314,7 +333,8 @@ class VDISet(VDICollection):
         InvalidVDIError
             If it has other bounds.
         """
-        vdi = as_vdi(vdi)
+        vdi = as_step(vdi)
+        check_range(vdi, self.value_range, "this one")
         if vdi.bounds != self.bounds:
             raise InvalidVDIError(
                 f"the VDIs of a set are of one scene: this one has the bounds {vdi.bounds}, the "
@@ -363,11 +383,15 @@ class VDISet(VDICollection):
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         """Return what a notebook shows: a viewer, or a picture."""
         text = {"text/plain": repr(self)}
+        if self.value_range is not None:  # pages show colours
+            return text
         return registry.method("VDISet._repr_mimebundle_", lambda *_: text)(self, include, exclude)
 
     def __repr__(self) -> str:
         width, height = self.window_size
-        return f"VDISet({len(self)} VDIs, for pictures of {width} x {height})"
+        ends = self.value_range
+        kept = "" if ends is None else f", values from {ends[0]:g} to {ends[1]:g}"
+        return f"VDISet({len(self)} VDIs, for pictures of {width} x {height}{kept})"
 
     def _places_of(self, cameras: Sequence[Camera]) -> NDArray[np.float64]:
         """Return the direction of each eye from the centre, and the logarithm of its distance.

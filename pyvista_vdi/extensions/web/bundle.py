@@ -34,6 +34,9 @@ OF_SERIES = (
     "zstd.js",
 )
 
+#: What edits the transfer function of values, which pages of colours do not have.
+OF_VALUES = ("editor.js",)
+
 #: What takes the place of SPAWN.
 _SPAWN_BUNDLED = """\
 export const waysToSpawn = [() => {
@@ -64,15 +67,20 @@ class _Module(NamedTuple):
 
 @cache
 def viewer_script(
-    *, scene: bool = False, remote: bool = False, series: bool = False, module: bool = False
+    *,
+    scene: bool = False,
+    remote: bool = False,
+    series: bool = False,
+    values: bool = False,
+    module: bool = False,
 ) -> str:
     """Return the viewer as one script, ASCII or UTF-8 text that may stand in a ``<script>``.
 
     ``scene``: it draws meshes, lines and text beside VDIs. ``remote``: it can be fed by
     ``pyvista-vdi serve``. ``series``: it plays series, and reads what zstd has compressed;
-    otherwise the names that these modules export are null. ``module``: names stay in sight of
-    what is written behind the script, for an ES module; by default it is a function that is
-    called, and shows nothing but its element.
+    ``values``: it edits transfer functions; otherwise the names that these modules export are
+    null. ``module``: names stay in sight of what is written behind the script, for an ES module;
+    by default it is a function that is called, and shows nothing but its element.
     """
     folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
     sources = {
@@ -80,10 +88,9 @@ def viewer_script(
         for entry in folder.iterdir()
         if entry.name.endswith(".js")
     }
-    if not series:
-        for name in OF_SERIES:
-            exports = _module(name, sources[name]).exports
-            sources[name] = "".join(f"export const {each} = null;\n" for each in exports)
+    for name in (*(() if series else OF_SERIES), *(() if values else OF_VALUES)):
+        exports = _module(name, sources[name]).exports
+        sources[name] = "".join(f"export const {each} = null;\n" for each in exports)
     entries = ["element.js", *["scene.js"] * scene, *["remote.js"] * remote]
     script = bundled(sources, entries)
     return script if module else f'(() => {{\n"use strict";\n{script}}})();\n'

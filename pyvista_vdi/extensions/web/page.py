@@ -159,8 +159,11 @@ def assembled(
     """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
     without = check_controls(controls)
     title = html.escape(title)
-    has_scene = any(view.scene is not None for view in views)
-    has_series = any(view.series for view in views)
+    parts_of = {
+        "scene": any(view.scene is not None for view in views),
+        "series": any(view.series for view in views),
+        "values": any(view.deferred is not None for view in views),
+    }
     parts = []
     for number, view in enumerate(views):
         files = list(view.series)
@@ -175,7 +178,7 @@ def assembled(
         texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in files]
         first, rest = "".join(texts[:1]), "".join(texts[1:])
         scene = "" if view.scene is None else _SCENE.format(_text(view.scene))
-        viewer = "" if number else viewer_script(scene=has_scene, series=has_series)
+        viewer = "" if number else viewer_script(**parts_of)
         script = f"<script>\n{viewer}</script>\n" if viewer else ""
         width, height = view.still_size
         shares = {} if number else {"hash": ""}  # what the first one shows is in the address

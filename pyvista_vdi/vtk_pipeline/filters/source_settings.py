@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_floats, not_taken
+from pyvista_vdi.model.checks import as_float, as_floats, as_range, not_taken
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.types import (
@@ -21,6 +21,7 @@ from pyvista_vdi.model.types import (
     MemoryLike,
     OcclusionLike,
     Progress,
+    RangeLike,
 )
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
 from pyvista_vdi.vtk_pipeline.filters.classifying import Classifying
@@ -379,17 +380,32 @@ class SourceSettings(Classifying):
         """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
         return self._target
 
-    def SetDeferral(self, deferral: Deferral) -> None:
-        """Set when scalars are classified, and what is kept of them until then.
+    def SetDeferral(
+        self,
+        classification: str = "baked",
+        value_range: RangeLike | None = None,
+        importance: ArrayLike | None = None,
+    ) -> None:
+        """Choose when scalars are classified; without arguments, as the VDI is made.
 
-        ``Deferral("deferred", (low, high))`` of ``pyvista_vdi.model.options``: as
-        ``classification``, ``value_range`` and ``importance`` of :func:`pyvista_vdi.generate`. The
-        VDI is a :class:`~pyvista_vdi.DeferredVDI` then, and of the volume property only the
-        interpolation counts.
+        ``"deferred"`` makes a :class:`~pyvista_vdi.DeferredVDI`: of the volume property, which may
+        be left out, only the interpolation counts then.
+
+        Parameters
+        ----------
+        classification, value_range, importance
+            As for :func:`pyvista_vdi.generate`.
+
+        Raises
+        ------
+        InvalidArgumentError
+            If one is out of range, or they contradict each other.
         """
-        if deferral.importance is not None:  # a list, which tells whether another is the same
-            deferral = replace(deferral, importance=as_floats(deferral.importance).tolist())
-        self._change("_deferral", deferral)
+        if importance is not None:  # a list, which tells whether another is the same
+            importance = as_floats(importance).tolist()
+        if value_range is not None:
+            value_range = as_range(value_range)
+        self._change("_deferral", Deferral.checked(classification, value_range, importance))
 
     def GetDeferral(self) -> Deferral:
         """Return when scalars are classified."""

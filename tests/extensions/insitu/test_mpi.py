@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from drawing import generate_chunked, generate_vdi
 from PIL import Image
+from support import moving_field
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.extensions.insitu import InSitu
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.quality.probe import turned
@@ -96,6 +97,29 @@ def test_a_simulation_writes_a_series_and_single_files(tmp_path):
 
 @needs_mpi
 @pytest.mark.slow
+def test_a_look_is_chosen_after_the_run(tmp_path):
+    """25 steps of four ranks, and three transfer functions that the run did not know."""
+    pytest.importorskip("pyvista")
+    run(4, PROGRAM, "deferred", tmp_path)
+    series, size = pvdi.read(tmp_path / "kept.vdis"), moving_field.SIZE
+    assert len(series) == moving_field.STEPS
+    assert series[0].metadata["blocks"] == [4, 1, 1]
+    for look in moving_field.LOOKS.values():
+        shown = series.classified(**look)
+        for step in (0, 12, 24):
+            volume = pvdi.Volume(moving_field.values_at(step), **moving_field.GRID)
+            look = {**look, "interpolation": "linear"}
+            baked = pvdi.generate(volume, series.camera, size, precision="8-byte", **look)
+            for degrees, least, lost in ((0, 0.996, 0.001), (5, 0.985, 0.003), (30, 0.985, 0.003)):
+                view = turned(series.camera, volume.bounds, degrees)
+                target = pvdi.render_volume(volume, view, size, **look)
+                found = compare_images(pvdi.render(shown[step], view), target).ssim
+                assert found >= least
+                assert found >= compare_images(pvdi.render(baked, view), target).ssim - lost
+
+
+@needs_mpi
+@pytest.mark.slow
 def test_the_example_writes_a_picture_and_says_what_it_costs(tmp_path):
     said = run(2, EXAMPLE, tmp_path / "smoke.png")
     assert re.search(r"solver: \d+ ms a step; in situ: \d+ ms a VDI", said), said
@@ -141,6 +165,31 @@ def test_one_rank_is_one_piece(tmp_path, scene):
     expected = pvdi.generate(*scene, **options)
     assert found.n_supersegments == expected.n_supersegments
     np.testing.assert_array_equal(found.front, expected.front)
+
+
+def test_one_rank_keeps_the_values_of_one_piece(tmp_path, scene):
+    volume, *view = scene
+    options = {"classification": "deferred", "value_range": (20, 200), "interpolation": "linear"}
+    options |= {"precision": "exact"}
+    for name in ("run.vdis", "{}.vdi"):
+        path = str(tmp_path / name)
+        with InSitu(path, *view, volume.dimensions, comm=OneRank(), **options) as show:
+            show(volume.array, (0, 0, 0), 0.0)
+            show(volume.array, (0, 0, 0), 1.5)
+    expected = pvdi.generate(*scene, **options)
+    found = [*pvdi.read(tmp_path / "run.vdis"), pvdi.read(tmp_path / "0.vdi")]
+    assert all(each.equals(expected) for each in found)
+    assert found[1].metadata["time"] == 1.5
+    with InSitu(path, *view, volume.dimensions, comm=OneRank(), append=True, **options) as show:
+        show(volume.array, (0, 0, 0), 2.0)
+    assert pvdi.read(tmp_path / "2.vdi").equals(expected)
+    for wrong, error, says in (
+        ({"value_range": None}, InvalidArgumentError, "value_range=.* is missing"),
+        ({"cmap": "bone"}, InvalidArgumentError, "cmap"),
+        ({"ambient_occlusion": True}, UnsupportedError, "ambient occlusion"),
+    ):
+        with pytest.raises(error, match=says):
+            simulate(tmp_path / "other.vdis", scene, [0.0], **{**options, "clim": None, **wrong})
 
 
 @pytest.mark.parametrize("precision", ["exact", "16-byte"])

@@ -78,6 +78,15 @@ def test_whoever_makes_it_the_bytes_are_the_same(client, scene, expected):
     check_same(generate_on_dask(*arguments, client=client, workers=one, **options), expected)
 
 
+def test_values_are_the_same_by_workers(client, scene, default_runtime):
+    volume, camera, size, _ = scene[0]
+    chunked = Volume(da.from_array(volume.array, chunks=(16, 41, 25)), volume.spacing)
+    options = {"classification": "deferred", "value_range": (20, 200), "max_supersegments": 8}
+    expected = generate(chunked, camera, size, device=default_runtime, **options)
+    assert expected.n_supersegments > 1000
+    check_same(generate(chunked, camera, size, client=client, **options), expected)
+
+
 @pytest.mark.slow
 def test_occlusion_is_the_same_by_workers(client, scene, default_runtime):
     arguments, options = scene

@@ -205,13 +205,19 @@ def deferred(folder):
     asked = json.loads((folder / "asked.json").read_text())
     reader = simple.OpenDataFile(str(folder / "kept.vdi"))
     simple.SaveData(str(folder / "again.vdi"), reader)
-    view = black_view(SIZE)
-    shown = simple.Show(simple.VDIInScene(Input=reader), view)
-    shown.Opacity = 0
-    view.CameraPosition = asked["camera"]["position"]
-    view.CameraFocalPoint = asked["camera"]["focal_point"]
-    view.CameraViewUp = asked["camera"]["view_up"]
-    view.CameraViewAngle = asked["camera"]["view_angle"]
+    in_scene = simple.VDIInScene(Input=reader)
+
+    def show():
+        view = black_view(SIZE)
+        shown = simple.Show(in_scene, view)
+        shown.Opacity = 0
+        view.CameraPosition = asked["camera"]["position"]
+        view.CameraFocalPoint = asked["camera"]["focal_point"]
+        view.CameraViewUp = asked["camera"]["view_up"]
+        view.CameraViewAngle = asked["camera"]["view_angle"]
+        return view, shown
+
+    view, shown = show()
     picture = simple.VDIToImage(Input=reader)
     table = shown.LookupTable  # what the colour map editor edits
     ends = [table.RGBPoints[0], table.RGBPoints[-4]]
@@ -219,6 +225,7 @@ def deferred(folder):
     table.ColorSpace = "RGB"
 
     source = brain_source()
+    source.ColorFunction, source.OpacityFunction = table, table.ScalarOpacityFunction
     source.Classification = "deferred"
     source.ValueRange = [20, 133]
     source.Importance = [20, 1, 133, 2]
@@ -234,6 +241,21 @@ def deferred(folder):
             save_pixels(image, folder / f"{name}_{i}.npy")
     found["idle"] = source.GetClientSideObject().GetOutputDataObject(0).GetMTime() == made
     (folder / "found.json").write_text(json.dumps(found))
+
+    # Another view with a colour map of its own; and both again, from a state
+    _, other = show()
+    of_array = ("POINTS", found["array"][1])
+    simple.ColorBy(other, of_array, separate=True)
+    own = simple.GetColorTransferFunction(of_array[1], other, separate=True)
+    opacity = simple.GetOpacityTransferFunction(of_array[1], other, separate=True)
+    own.ColorSpace = "RGB"
+    own.RGBPoints, opacity.Points = asked["looks"][0]
+    simple.SaveState(str(folder / "state.pvsm"))
+    simple.ResetSession()
+    simple.LoadState(str(folder / "state.pvsm"))
+    for name, view in zip(("last", "first"), simple.GetRenderViews(), strict=True):
+        view.UseFXAA = 0  # no part of ParaView's states
+        simple.SaveScreenshot(str(folder / f"{name}.png"), view, ImageResolution=SIZE)
 
 
 def in_time(folder):

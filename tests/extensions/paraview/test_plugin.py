@@ -305,6 +305,9 @@ def test_colour_map_editor_acts_on_values(paraview, tmp_path, default_runtime):
         assert_pixels_alike(pixels(tmp_path / f"file_{i}.npy", SCREEN), front)
         front = pvdi.render(brain, brain.camera, transfer_function=table)
         assert_pixels_alike(pixels(tmp_path / f"source_{i}.npy", SCREEN), front)
+    for name, i in (("first", 0), ("last", 1)):  # from a state, each view by its own colour map
+        again = screenshot(tmp_path / f"{name}.png")
+        np.testing.assert_array_equal(again, screenshot(tmp_path / f"scene_{i}.png"))
 
 
 def save_volumes(folder):

@@ -5,7 +5,7 @@ from importlib import resources
 
 import pytest
 
-from pyvista_vdi.extensions.web.bundle import OF_SERIES, SPAWN, bundled, viewer_script
+from pyvista_vdi.extensions.web.bundle import OF_SERIES, OF_VALUES, SPAWN, bundled, viewer_script
 
 MODULES = {
     "a.js": 'import { b, B } from "./b.js";\nimport { waysToSpawn } from "./spawn.js";\n'
@@ -170,10 +170,12 @@ def test_every_module_of_the_viewer_is_in_the_package_and_can_be_bundled():
         bundled(sources, [name])
 
 
-def test_what_plays_series_is_left_out_of_pages_without_one():
+def test_what_plays_series_and_edits_values_is_left_out_of_pages_without_them():
     without, whole = viewer_script(), viewer_script(series=True)
     assert "const unzstd = null;" in without
     assert "class ZstdFrame" in whole
     assert "class ZstdFrame" not in without
+    assert "transferEditor = null" in without
+    assert "transferEditor = null" not in viewer_script(values=True)
     folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
-    assert all((folder / name).is_file() for name in OF_SERIES)
+    assert all((folder / name).is_file() for name in OF_SERIES + OF_VALUES)

@@ -57,7 +57,7 @@ def ball(data, open_page):
 def pressed(page, name, *keys):
     """Press keys at the control of a name."""
     for key in keys:
-        page.page.get_by_label(name, exact=True).first.press(key)
+        page.page.get_by_label(name, exact=True).filter(visible=True).first.press(key)
 
 
 def tabbed(page):

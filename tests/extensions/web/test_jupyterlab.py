@@ -263,6 +263,10 @@ def test_in_jupyterlab(chromium, lab, vdi):
     assert_alike(again.picture(TURNED), pvdi.render(sent, vdi.camera.azimuth(60)))
     again.drag(SHOWN)
 
+    # Nobody complained, but JupyterLab of servers for languages that there are not
+    complaints = notebook.complaints + again.complaints
+    assert not [each for each in complaints if "/lsp/status" not in each]
+
     # Nothing came from elsewhere
     server = lab[1].partition("/doc")[0]
     foreign = [url for url in notebook.hosts if not url.startswith((server, "blob:", "data:"))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import methodcaller
 from typing import Any
 
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
@@ -73,7 +74,11 @@ class Functions(Algorithm):
             before.RemoveObserver(self._observers.pop(role))
         self._functions[role] = function
         if function is not None:
-            self._observers[role] = watch(function, self, Algorithm.Modified)
+            changed = methodcaller("_function_changed")
+            self._observers[role] = watch(function, self, changed)
+        self.Modified()
+
+    def _function_changed(self) -> None:
         self.Modified()
 
 

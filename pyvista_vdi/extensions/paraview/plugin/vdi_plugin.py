@@ -47,7 +47,6 @@ from pyvista_vdi.extensions.paraview.parts.properties import (
 )
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.options import Deferral
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import announce_times, wanted_time
@@ -125,6 +124,10 @@ class VDISource(Looking, Functions, RanksVDISource):
         """Choose when scalars are classified: as the VDI is made, or by what shows it."""
         self._change("_deferred", bool(deferred))
 
+    def _function_changed(self) -> None:
+        if not self._deferred:  # else it decides nothing here
+            super()._function_changed()
+
     def SetValueRange(self, low: float, high: float) -> None:
         """Set the scalars that a deferred VDI keeps; two that are equal mean all."""
         self._change("_value_range", (low, high) if low != high else None)
@@ -178,8 +181,8 @@ class VDISource(Looking, Functions, RanksVDISource):
         image = require_image(vtkDataObject.GetData(inputs[0], 0))
         self._set_view()
         self._set_looks(image)
-        kept = (self._value_range, self._importance or None)
-        self.SetDeferral(Deferral("deferred", *kept) if self._deferred else Deferral())
+        kept = ("deferred", self._value_range, self._importance or None)
+        self.SetDeferral(*kept if self._deferred else ())
         super()._execute_here(inputs, outputs)
 
     def _set_view(self) -> None:
@@ -219,6 +222,7 @@ class VDIToImage(Looking, Functions, vtk_pipeline.VDIToImage):
     def __init__(self) -> None:
         super().__init__()
         self._looks = Looks()
+        self._by_default: dict[str, Any] = {}
         self._shown: set[str] = set()
         self._watching = False
 
@@ -238,8 +242,10 @@ class VDIToImage(Looking, Functions, vtk_pipeline.VDIToImage):
             if client is not None:
                 proxies = functions_of_array(client, name_of(vdi), vdi.value_range)
                 for role, proxy in zip(self._functions, proxies, strict=True):
-                    if self._functions[role] is None:
-                        self._follow(role, proxy.GetClientSideObject())
+                    function, before = proxy.GetClientSideObject(), self._functions[role]
+                    if before in (None, self._by_default.get(role)) and before is not function:
+                        self._follow(role, function)
+                        self._by_default[role] = function
             distance = self._unit_distance or vdi.unit_distance
             self._looks.copy(list(self._functions.values()), vdi.value_range, distance)
             self.SetVolumeProperty(self._looks.prop)

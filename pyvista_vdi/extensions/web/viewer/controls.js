@@ -100,7 +100,7 @@ export const CONTROLS_STYLE = `
 @container (max-width: 279px) or (max-height: 139px) { .bar, .panel { display: none; } }
 @media (prefers-reduced-motion: reduce) { .bar { transition: none; } }
 @media print { .frame { display: none; } }
-${EDITOR_STYLE}`;
+${EDITOR_STYLE ?? ""}`;
 
 /**
  * The bar of a viewer, its panels and its marks.
@@ -207,16 +207,16 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
           return { ...look, clip };
         });
     }));
-  const editor = transferEditor(viewer, button); // of VDIs that keep values; others have colours
+  const editor = transferEditor?.(viewer, button); // in pages that keep values; others have colours
   const ofColors = [factor("brightness", "Brightness"), factor("opacity", "Opacity"),
     htmlElement("small", {}, "Colours and opacities were chosen when this picture's data was made: " +
       "the sliders make all of it brighter or denser.")];
   const reset = button("As it was made", () => {
-    editor.reset(); // which can be undone
+    editor?.reset(); // which can be undone
     viewer.look = AS_MADE;
   }, "As it was made");
-  const lookPanel = panel(OF_COLORS, editor.element, ...ofColors.slice(0, 2), ...[0, 1, 2].map(cut),
-    ofColors[2], reset);
+  const lookPanel = panel(OF_COLORS, ...(editor ? [editor.element] : []), ...ofColors.slice(0, 2),
+    ...[0, 1, 2].map(cut), ofColors[2], reset);
 
   const keysShown = htmlElement("dl");
   const helpPanel = panel("Keys and gestures", keysShown);
@@ -347,7 +347,7 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   const isOff = () => viewer.getAttribute("controls") === "none";
   const show = () => {
     sliders.forEach((take) => take());
-    editor.show();
+    editor?.show();
     ofColors.forEach((each) => (each.hidden = Boolean(viewer.values)));
     const called = viewer.values ? OF_VALUES : OF_COLORS;
     for (const each of [lookPanel, openers.get(lookPanel)]) each.setAttribute("aria-label", called);
@@ -371,7 +371,7 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
       if (event.key === "?") open(helpPanel.hidden ? helpPanel : null, canvas);
       else if (canFill && event.key.toLowerCase() === "f") goFull();
       else return false;
-    } else if (!editor.key(event, target)) { // buttons and sliders do it by themselves
+    } else if (!editor?.key(event, target)) { // buttons and sliders do it by themselves
       return frame.contains(target) && ([" ", "Enter"].includes(event.key) ||
         (["range", "select-one"].includes(target.type) && OF_SLIDER.test(event.key)));
     }
@@ -379,7 +379,7 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
     return true;
   };
   show();
-  return { show, drawn, key, undo: (event, target) => !isOff() && editor.undo(event, target) };
+  return { show, drawn, key, undo: (event, target) => !isOff() && !!editor?.undo(event, target) };
 }
 
 // What is seen, over its background, as a PNG file.

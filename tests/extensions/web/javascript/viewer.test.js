@@ -72,6 +72,19 @@ test("a look has factors and shares in order", () => {
   }
 });
 
+test("the faces of the cube name the views that they are seen from", async () => {
+  const { viewAt } = await import(`${viewer}/marks.js`);
+  const views = [["+x", [1, 0, 0], [0, 0, 1]], ["+y", [0, 1, 0], [0, 0, 1]], ["iso", [1, 1, 1], [0, 0, 1]]];
+  const at = (position, place) => viewAt(views, [320, 180], checkedCamera({
+    position, focal_point: [0, 0, 0], view_up: [0, 0, 1], view_angle: 30 }), place)?.[0] ?? null;
+  assert.equal(at([9, 0, 0], [47, 133]), "+x");
+  assert.equal(at([0, 9, 0], [47, 133]), "+y");
+  assert.equal(at([9, 9, 0], [35, 133]), "+x"); // +y is to the right of +x
+  assert.equal(at([9, 9, 0], [59, 133]), "+y");
+  assert.equal(at([-9, 0, 0], [47, 133]), null); // none of these faces is seen
+  assert.equal(at([9, 0, 0], [80, 133]), null); // beside it
+});
+
 test("a standard view sees all of a box", () => {
   const seen = lookingAt(camera, [0, 2, 0, 4, 0, 4], [1, 0, 0], [0, 0, 1]);
   assert.deepEqual(seen.focal_point, [1, 2, 2]);
