@@ -359,6 +359,11 @@ class DeferredVDI:
         """
         return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
 
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Return what a notebook shows: a viewer in which it is classified, or a picture."""
+        forms = registry.method("VDI._repr_mimebundle_", lambda vdi, *_: {"text/plain": repr(vdi)})
+        return forms(self, include, exclude)
+
     def __repr__(self) -> str:
         low, high = self.value_range
         return repr(self._lists).replace("VDI(", "DeferredVDI(")[:-1] + f", {low:g} to {high:g})"

@@ -11,6 +11,7 @@ from pyvista_vdi.errors import MissingDependencyError, warn_external
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.still import still
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 
 #: Longest edge of a thumbnail, pixels.
@@ -18,7 +19,7 @@ _THUMBNAIL = 240
 
 
 def mime_bundle(
-    vdi: VDI | VDISeries | VDISet,
+    vdi: VDI | DeferredVDI | VDISeries | VDISet,
     include: Collection[str] | None = None,
     exclude: Collection[str] | None = None,
 ) -> Any:
@@ -31,7 +32,8 @@ def mime_bundle(
     try:
         from pyvista_vdi.extensions.web.widget import VDIWidget
     except MissingDependencyError as error:
-        return _without_a_viewer(vdi, str(error))
+        shown = vdi.classified() if isinstance(vdi, DeferredVDI) else vdi
+        return _without_a_viewer(shown, str(error))
     data, metadata = VDIWidget(vdi)._repr_mimebundle_(include=include, exclude=exclude)
     return {**data, "text/plain": repr(vdi)}, metadata
 

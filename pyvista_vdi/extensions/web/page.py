@@ -133,19 +133,32 @@ def page(
     if isinstance(vdi, DeferredVDI):
         begun = vdi.classified(**look)
         view = _view_of(begun, background)
-        kept = vdi.with_precision(precision or "8-byte")
-        view.vdi, view.deferred = copy.copy(kept.lists), kept.about
-        told = begun.metadata["transfer_function"]
-        view.vdi.metadata = {**kept.metadata, "transfer_function": told}
+        view.vdi, view.deferred = edited(vdi.with_precision(precision or "8-byte"), begun)
     else:
-        if look:
-            raise UnsupportedError(
-                f"a page shows a VDI in the colours that it has: leave out {', '.join(look)}, or "
-                "generate with classification='deferred'"
-            )
+        refuse_look(look)
         view = _view_of(vdi, background)
         view.vdi = vdi.with_precision(precision or "8-byte")
     return assembled([view], title=title, controls=controls, level=level, progress=progress)
+
+
+def edited(kept: DeferredVDI, begun: VDI) -> tuple[VDI, Mapping[str, Any]]:
+    """Return the lists whose transfer function a viewer edits, and what they are about.
+
+    ``begun``: the same with the colours that editing begins with.
+    """
+    lists = copy.copy(kept.lists)
+    told = begun.metadata["transfer_function"]
+    lists.metadata = {**kept.metadata, "transfer_function": told}
+    return lists, kept.about
+
+
+def refuse_look(look: Mapping[str, Any]) -> None:
+    """Raise UnsupportedError if there is one, as what has colours takes none."""
+    if look:
+        raise UnsupportedError(
+            f"a viewer shows a VDI in the colours that it has: leave out {', '.join(look)}, or "
+            "generate with classification='deferred'"
+        )
 
 
 def assembled(

@@ -16,12 +16,13 @@ from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, camera_of, viewer_camera
-from pyvista_vdi.extensions.web.page import check_controls
+from pyvista_vdi.extensions.web.page import check_controls, edited, refuse_look
 from pyvista_vdi.extensions.web.placing import encoded_many
 from pyvista_vdi.extensions.web.still import picture, stand_in, still
 from pyvista_vdi.io import write_png
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.writer import write_to
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import checked_planes
@@ -129,11 +130,13 @@ export default { render };
 """
 
 
-#: Another element: in the page there may already be one that cannot play series.
-_OF_SERIES = """
-const NAME = "vdi-viewer-of-series";
+#: Another element: in the page there may already be one that can neither play nor edit.
+_NAMED = """
+const NAME = "vdi-viewer-of-%s";
 if (!customElements.get(NAME)) customElements.define(NAME, class extends VDIViewer {});
 """
+
+_PLAIN = 'const NAME = "vdi-viewer";\n'
 
 
 class _CameraTrait(traitlets.TraitType[dict[str, Any], Any]):
@@ -173,9 +176,9 @@ class VDIWidget(anywidget.AnyWidget):
 
     Parameters
     ----------
-    vdi : VDI, VDISeries, VDISet or vtkImageData
+    vdi : VDI, DeferredVDI, VDISeries, VDISet or vtkImageData
         What to show, or a VDI's VTK form (``pyvista.read("x.vdi")``). All of a series or a set is
-        sent to the browser.
+        sent to the browser. The transfer function of a deferred VDI is edited there.
     camera : Camera or pyvista.Camera or vtkCamera or dict, optional
         The first view; by default the VDI's own.
     background : str or (float, float, float), optional
@@ -186,6 +189,10 @@ class VDIWidget(anywidget.AnyWidget):
         too long for that. Series and sets take 8 bytes.
     controls : {"all", "none"}
         Whether there is a bar of buttons over the picture, which fades.
+    **look
+        What the transfer function of a deferred VDI begins with, as for
+        :meth:`pyvista_vdi.DeferredVDI.classified`: ``cmap``, ``opacity``, ``clim`` and others.
+        Pictures of the kernel, :meth:`screenshot` too, are by this one.
 
     Attributes
     ----------
@@ -209,6 +216,8 @@ class VDIWidget(anywidget.AnyWidget):
     ------
     InvalidVDIError, InvalidCameraError, InvalidArgumentError
         If an argument cannot be used.
+    UnsupportedError
+        If a look is given to what has colours.
 
     Examples
     --------
@@ -238,9 +247,10 @@ class VDIWidget(anywidget.AnyWidget):
         background: Any = None,
         precision: str | None = None,
         controls: str = "all",
+        **look: Any,
     ) -> None:
         check_controls(controls)
-        self._precision = precision
+        self._precision, self._look = precision, look
         self._vdi = shown = self._accept(vdi)
         self._esm = self._script(shown)
         super().__init__(
@@ -261,7 +271,7 @@ class VDIWidget(anywidget.AnyWidget):
     @vdi.setter
     def vdi(self, vdi: Any) -> None:
         shown = self._accept(vdi)
-        if isinstance(shown, VDISeries | VDISet):
+        if isinstance(shown, VDISeries | VDISet | DeferredVDI):
             self._esm = self._script(shown)  # views are made anew where it is another
         self._file = self._encoded(shown, coarse=False)  # the one before is better meanwhile
         self._vdi = shown
@@ -308,6 +318,10 @@ class VDIWidget(anywidget.AnyWidget):
 
     def _accept(self, vdi: Any) -> Any:
         """Return what can be shown, or raise InvalidVDIError."""
+        if isinstance(vdi, DeferredVDI):
+            self._begun = vdi.classified(**self._look)
+            return vdi
+        refuse_look(self._look)
         if isinstance(vdi, VDISeries | VDISet):
             as_vdi(vdi[0])  # refuses what has no colours
             return vdi
@@ -318,26 +332,32 @@ class VDIWidget(anywidget.AnyWidget):
         shown = self._vdi
         if shown is None:
             raise InvalidVDIError("there is no VDI here: plotter.screenshot() is the picture")
+        if isinstance(shown, DeferredVDI):
+            return self._begun
         if isinstance(shown, VDISeries):
             return shown[shown.nearest(shown.times[0] if self.time is None else self.time)]
         return shown[shown.nearest(camera_of(self.camera))] if isinstance(shown, VDISet) else shown
 
     def _script(self, shown: Any) -> str:
-        """Return what runs in the page: what plays series, or chooses of a set, where it is for."""
-        series = isinstance(shown, VDISeries | VDISet)
-        script = viewer_script(scene=self._has_scene, series=series, module=True)
-        return script + (_OF_SERIES if series else 'const NAME = "vdi-viewer";\n') + _RENDER
+        """Return what runs in the page: what plays series, chooses of a set, or edits values."""
+        series, values = isinstance(shown, VDISeries | VDISet), isinstance(shown, DeferredVDI)
+        script = viewer_script(scene=self._has_scene, series=series, values=values, module=True)
+        name = _NAMED % "series" if series else _NAMED % "values" if values else _PLAIN
+        return script + name + _RENDER
 
     def _encoded(self, vdi: Any, *, coarse: bool = True) -> bytes:
         if vdi is None:
             return b""
-        if not isinstance(vdi, VDI):
+        if not isinstance(vdi, VDI | DeferredVDI):
             return encoded_many(vdi)[0]
         fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
-        sent = vdi.with_precision(self._precision or "8-byte") if fits else vdi
+        sent: Any = vdi.with_precision(self._precision or "8-byte") if fits else vdi
+        about = None
+        if isinstance(sent, DeferredVDI):
+            sent, about = edited(sent, self._begun)
         stream = io.BytesIO()
         # A cell waits for it: a twentieth more bytes than by level 6, in half the time
-        write_to(stream, sent, DEFLATE, 1, coarse=coarse)
+        write_to(stream, sent, DEFLATE, 1, coarse=coarse, deferred=about)
         return stream.getvalue()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:

@@ -18,6 +18,7 @@ from PIL import Image
 from web_client import soft_ball
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.extensions.web.notebook import mime_bundle, show_plotter
 from pyvista_vdi.extensions.web.placing import thinned
@@ -99,6 +100,26 @@ def test_a_horizontal_angle_becomes_the_vertical_one_and_other_entries_are_refus
 def test_the_widget_holds_a_file_of_the_vdi(widget, vdi, tmp_path):
     assert sent(widget, tmp_path).equals(vdi.with_precision("8-byte"))
     assert sent(VDIWidget(vdi, precision="exact"), tmp_path).equals(vdi)
+
+
+def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget, tmp_path):
+    kept = pvdi.generate(BALL, pvdi.Camera(*EYE), SIZE, classification="deferred")
+    look = {"cmap": "viridis", "opacity": [0, 0.1, 0.4, 0.9]}
+    widget = VDIWidget(kept, **look)
+    assert sent(widget, tmp_path).equals(kept.with_precision("8-byte"))
+    assert repr(kept) in kept._repr_mimebundle_()[0]["text/plain"]
+    image = pvdi.render(kept, kept.camera, **look)
+    np.testing.assert_array_equal(widget.screenshot(), pvdi.io.to_bytes(image))
+    with pytest.raises(UnsupportedError, match="leave out cmap, opacity"):
+        VDIWidget(vdi, **look)
+    page = open_widget(widget)
+    packed = pvdi.render(kept.with_precision("8-byte"), kept.camera, **look)
+    apart = np.abs(picture(page, SIZE, "viewers[0]") / 255 - packed).max(axis=2)
+    assert np.mean(apart <= 2 / 255) >= 0.999  # as of what has colours
+    assert page.page.get_by_label("Transfer function and clipping").count()
+    with pytest.raises(pvdi.InvalidVDIError, match="classified"):
+        VDIWidget(pvdi.VDISeries.of([kept]))
+    widget.close()
 
 
 def test_any_camera_can_be_set_and_none_that_shows_nothing(widget, vdi):
