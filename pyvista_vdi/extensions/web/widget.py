@@ -250,7 +250,7 @@ class VDIWidget(anywidget.AnyWidget):
         **look: Any,
     ) -> None:
         check_controls(controls)
-        self._precision, self._look = precision, look
+        self._precision, self._first_look = precision, look
         self._vdi = shown = self._accept(vdi)
         self._esm = self._script(shown)
         super().__init__(
@@ -319,9 +319,9 @@ class VDIWidget(anywidget.AnyWidget):
     def _accept(self, vdi: Any) -> Any:
         """Return what can be shown, or raise InvalidVDIError."""
         if isinstance(vdi, DeferredVDI):
-            self._begun = vdi.classified(**self._look)
+            self._begun = vdi.classified(**self._first_look)
             return vdi
-        refuse_look(self._look)
+        refuse_look(self._first_look)
         if isinstance(vdi, VDISeries | VDISet):
             as_vdi(vdi[0])  # refuses what has no colours
             return vdi

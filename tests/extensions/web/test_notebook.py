@@ -102,26 +102,6 @@ def test_the_widget_holds_a_file_of_the_vdi(widget, vdi, tmp_path):
     assert sent(VDIWidget(vdi, precision="exact"), tmp_path).equals(vdi)
 
 
-def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget, tmp_path):
-    kept = pvdi.generate(BALL, pvdi.Camera(*EYE), SIZE, classification="deferred")
-    look = {"cmap": "viridis", "opacity": [0, 0.1, 0.4, 0.9]}
-    widget = VDIWidget(kept, **look)
-    assert sent(widget, tmp_path).equals(kept.with_precision("8-byte"))
-    assert repr(kept) in kept._repr_mimebundle_()[0]["text/plain"]
-    image = pvdi.render(kept, kept.camera, **look)
-    np.testing.assert_array_equal(widget.screenshot(), pvdi.io.to_bytes(image))
-    with pytest.raises(UnsupportedError, match="leave out cmap, opacity"):
-        VDIWidget(vdi, **look)
-    page = open_widget(widget)
-    packed = pvdi.render(kept.with_precision("8-byte"), kept.camera, **look)
-    apart = np.abs(picture(page, SIZE, "viewers[0]") / 255 - packed).max(axis=2)
-    assert np.mean(apart <= 2 / 255) >= 0.999  # as of what has colours
-    assert page.page.get_by_label("Transfer function and clipping").count()
-    with pytest.raises(pvdi.InvalidVDIError, match="classified"):
-        VDIWidget(pvdi.VDISeries.of([kept]))
-    widget.close()
-
-
 def test_any_camera_can_be_set_and_none_that_shows_nothing(widget, vdi):
     assert widget.camera == viewer_camera(vdi.camera)
     told = []
@@ -521,6 +501,26 @@ def open_widget(open_page):
         return page
 
     return open_widget
+
+
+def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget, tmp_path):
+    kept = pvdi.generate(BALL, pvdi.Camera(*EYE), SIZE, classification="deferred")
+    look = {"cmap": "viridis", "opacity": [0, 0.1, 0.4, 0.9]}
+    widget = VDIWidget(kept, **look)
+    assert sent(widget, tmp_path).equals(kept.with_precision("8-byte"))
+    assert repr(kept) in kept._repr_mimebundle_()[0]["text/plain"]
+    image = pvdi.render(kept, kept.camera, **look)
+    np.testing.assert_array_equal(widget.screenshot(), pvdi.io.to_bytes(image))
+    with pytest.raises(UnsupportedError, match="leave out cmap, opacity"):
+        VDIWidget(vdi, **look)
+    page = open_widget(widget)
+    packed = pvdi.render(kept.with_precision("8-byte"), kept.camera, **look)
+    apart = np.abs(picture(page, SIZE, "viewers[0]") / 255 - packed).max(axis=2)
+    assert np.mean(apart <= 2 / 255) >= 0.999  # as of what has colours
+    assert page.page.get_by_label("Transfer function and clipping").count()
+    with pytest.raises(pvdi.InvalidVDIError, match="classified"):
+        VDIWidget(pvdi.VDISeries.of([kept]))
+    widget.close()
 
 
 def test_the_view_draws_and_shares_its_camera(open_widget, widget, vdi):
