@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag
-from pyvista_vdi.model.classification import BLENDINGS, Classification, refuse_keywords
+from pyvista_vdi.model.classification import BLENDINGS, IN_PLACE, Classification, refuse_keywords
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, as_volume
@@ -124,6 +124,10 @@ def render(
     view = Camera.from_any(camera)
     given: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
     if look and any(_keeps_values(each) for each in given):
+        # Have a value look the same in all of them: what is not said is of all their ranges
+        ends = {each.value_range for each in given if _keeps_values(each)}
+        if len(ends) > 1 and not look.keys() & {"clim", *IN_PLACE}:
+            look["clim"] = (min(low for low, _ in ends), max(high for _, high in ends))
         given = [
             each.classified(**look, device=device) if _keeps_values(each) else each
             for each in given

@@ -217,7 +217,7 @@ def generate(
     if deferral.deferred:
         look.require_no_look()
         deferral.refuse_target(target)
-    from pyvista_vdi.generation.deferred import generate_deferred, unclassified
+    from pyvista_vdi.generation.deferred import generate_deferred, unclassified, warn_of_range
 
     request = GenerationRequest(
         volume=read,
@@ -234,9 +234,11 @@ def generate(
     from pyvista_vdi.quality.probe import generate_anywhere
 
     if deferral.deferred:
-        return generate_deferred(  # type: ignore[return-value]
+        kept = generate_deferred(
             request, deferral, lambda asked: generate_anywhere(asked, target, client)
         )
+        warn_of_range(kept, read)
+        return kept  # type: ignore[no-any-return]
     vdi = generate_anywhere(request, target, client)
     if target:
         from pyvista_vdi.quality.dial import warn_missed

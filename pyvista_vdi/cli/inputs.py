@@ -50,7 +50,8 @@ _OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")
 OF_A_STORE = ("level", "channel", "time_index", "series")
 
 #: Options that say what is read, and how a volume looks.
-OF_ANY_VOLUME = (*_OF_A_VOLUME, *OF_A_STORE, "tf", "transfer_function", *CLASSIFICATION)
+OF_NO_LOOK = (*_OF_A_VOLUME, *OF_A_STORE)
+OF_ANY_VOLUME = (*OF_NO_LOOK, "tf", "transfer_function", *CLASSIFICATION)
 
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")

@@ -16,7 +16,7 @@ from PIL import Image
 
 from pyvista_vdi.api import read, render, render_volume
 from pyvista_vdi.cli.inputs import (
-    OF_ANY_VOLUME,
+    OF_NO_LOOK,
     PLACE,
     camera,
     classification,
@@ -25,6 +25,7 @@ from pyvista_vdi.cli.inputs import (
     measuring,
     read_volume,
     refuse,
+    with_look,
 )
 from pyvista_vdi.cli.steps import in_order
 from pyvista_vdi.cli.text import mebibytes, printable
@@ -187,8 +188,8 @@ def _shown(
             None,
             size,
         )
-    refuse(options, OF_ANY_VOLUME, "volumes", f"{printable(options.file)} is a VDI: ")
-    found = read(options.file)
+    refuse(options, OF_NO_LOOK, "volumes", f"{printable(options.file)} is a VDI: ")
+    found = with_look(options, read(options.file), options.file)
     in_time = isinstance(found, VDICollection) and found.times is not None
     steps = len(found) if in_time else None
     first = found[0] if in_time else found

@@ -1,12 +1,13 @@
 """Volume to a VDI that keeps values, by the same marches: a transfer function that keeps them."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_external
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import as_range
 from pyvista_vdi.model.deferred import DeferredVDI, importance_points, lengths_of
@@ -18,6 +19,7 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Volume
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
 #: whatever lies before it: 1 - 2^-36 n is 1 for the voxels n of any ray.
@@ -33,6 +35,9 @@ _LOW_END = 2.0**-4
 #: Spreads below what float32 holds of a mean of squares are none; shares this near to 1 are 1.
 _LEAST_SPREAD = 5e-4
 _WHOLE = 1e-3
+#: Points that are looked at of a volume; how many times as wide as their values a range may be.
+#: And the share of the least, and of the largest, that are left out.
+_SAMPLED, _NARROW, _FEW = 2**16, 20, 1e-4
 #: Supersegments that are converted at a time.
 _PIECE = 2**16
 
@@ -86,7 +91,11 @@ def generate_deferred(
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidArgumentError(
             f"value_range must be two finite scalars, low < high; got {asked!r}"
-            + (": the volume has one value only" if deferral.value_range is None else "")
+            + (
+                ", as the volume's: give value_range=(low, high)"
+                if deferral.value_range is None
+                else ""
+            )
         )
     points = importance_points(deferral.importance, (low, high))
     given = {each.name: getattr(options, each.name) for each in fields(options)}
@@ -136,6 +145,33 @@ def generate_deferred(
         "importance": points,
     }
     return DeferredVDI.of_lists(lists, about).with_precision(options.precision)
+
+
+def warn_of_range(kept: DeferredVDI, volume: Volume) -> None:
+    """Warn where a VDI's range of values holds none of a volume's, or all in a small part of it."""
+    if volume.chunks is not None:  # nothing is read for it
+        return
+    low, high = kept.value_range
+    if not kept.n_supersegments:
+        least, largest = volume.finite_range()
+        warn_external(
+            f"this VDI is empty: there is nothing from {low:g} to {high:g} in view; the values of "
+            f"the volume go from {least:g} to {largest:g}"
+        )
+        return
+    step = math.ceil((volume.array.size / _SAMPLED) ** (1 / 3))
+    values = volume.array[::step, ::step, ::step].astype(np.float64)
+    values = values[(values >= low) & (values <= high)]
+    if not values.size:
+        return
+    least = np.quantile(values, _FEW, method="higher")
+    largest = np.quantile(values, 1 - _FEW, method="lower")
+    if 0 < _NARROW * (largest - least) < high - low:
+        warn_external(
+            f"nearly all values lie from {least:g} to {largest:g}, a small part of the "
+            f"range from {low:g} to {high:g}, of which a deferred VDI keeps shares: give a "
+            "value_range that is not much wider than what is to be seen"
+        )
 
 
 def _keeping(

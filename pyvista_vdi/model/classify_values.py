@@ -169,15 +169,26 @@ def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) ->
     if not (np.isfinite(least) and np.isfinite(largest) and least < largest):
         return
     low, high = deferred.value_range
-    values = np.linspace(least, largest, 4097)
-    opacity = looked_up(transfer_function, values)[1]
-    # A value at an end of the range is kept
-    outside = opacity[(values < low) | (values > high)].sum()
+    # Sample at the function's nodes, too, which may span a small part of the volume's range
+    nodes = np.linspace(*transfer_function.scalar_range, len(transfer_function.opacities))
+    places = np.concatenate([np.linspace(least, largest, 4097), nodes.clip(least, largest)])
+    values = np.unique(places)
+    if len(values) < 2:
+        return
+    opacity = looked_up(transfer_function, values)[1] * np.gradient(values)
+    kept, what, remedy = (values >= low) & (values <= high), f"outside {low:g} to {high:g}", ""
+    if deferred.importance is not None and (opacity[kept] > 0).any():
+        points, weights = np.transpose(deferred.importance)
+        weighed = np.interp(values, points, weights) > 0
+        if not weighed[kept & (opacity > 0)].all():
+            what, remedy = f"{what}, or of importance 0", " and an importance above 0 there"
+            kept &= weighed
+    outside = opacity[~kept].sum()
     if outside > 1e-3 * opacity.sum():
         warn_external(
-            f"the transfer function shows values outside {low:g} to {high:g}, which this VDI does "
-            f"not keep: {outside / opacity.sum():.1%} of its opacity from {least:g} to "
-            f"{largest:g}; generate with a wider value_range, or lower the opacity there"
+            f"the transfer function shows values {what}, which this VDI does not keep: "
+            f"{outside / opacity.sum():.1%} of its opacity from {least:g} to {largest:g}; generate "
+            f"with a wider value_range{remedy}, or lower the opacity there"
         )
 
 

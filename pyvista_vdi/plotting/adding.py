@@ -13,7 +13,7 @@ import pyvista as pv
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
-from pyvista_vdi.generation.deferred import generate_deferred, unclassified
+from pyvista_vdi.generation.deferred import generate_deferred, unclassified, warn_of_range
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -270,7 +270,9 @@ def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, 
     }
     plain |= {"resolution": None, "resample": None, "mask": None, "camera": None}
     look = replace(asked.look, interpolation="nearest")
-    return generate_deferred(request, asked.deferral), replace(asked, look=look, **plain)
+    kept = generate_deferred(request, asked.deferral)
+    warn_of_range(kept, read)
+    return kept, replace(asked, look=look, **plain)
 
 
 def _deferred_shown(deferred: DeferredVDI, asked: Addition) -> _Shown:

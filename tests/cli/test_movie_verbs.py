@@ -178,7 +178,7 @@ def test_a_film_has_its_frames(saved, capsys, tmp_path, suffix):
         ("movie v.vdi -o v.gif --path a.json", "two views at least"),
         ("movie v.vdi -o absent/v.gif --turn 9", "absent"),
         ("movie v.vdi -o v.gif --path a b --azimuth 9", "--azimuth is"),
-        ("turntable v.vdi -o v.gif --cmap bone", "--cmap is for volumes"),
+        ("turntable v.vdi -o v.gif --cmap bone", "--cmap bone is for VDIs that keep values"),
         ("turntable v.vdi -o v.gif --fps 0", "above 0"),
         ("turntable v.vdi -o v.gif --fps 60", "0.01 to 50 frames a second"),
     ],

@@ -229,3 +229,22 @@ def test_rgba_has_nothing_left_to_classify(runtime):
         pvdi.generate(
             pvdi.Volume(colors), camera, (NX, NY), classification="deferred", device=runtime
         )
+
+
+def test_a_range_that_fits_no_values_is_warned_of(default_runtime):
+    rng = np.random.default_rng(2)
+    array = (rng.random(EDGES[::-1]) * 200).astype(np.float32)
+    _, camera = columns(array)
+
+    def made(values, **how):
+        volume = pvdi.Volume(values)
+        return pvdi.generate(volume, camera, (NX, NY), classification="deferred", **how)
+
+    made(array, value_range=(0, 1000))
+    with pytest.warns(VDIWarning, match="a small part of the range from 0 to 65535"):
+        made(array, value_range=(0, 65535))
+    with pytest.warns(VDIWarning, match="this VDI is empty: there is nothing from 300 to 400"):
+        made(array, value_range=(300, 400))
+    filled = np.where(np.arange(array.size).reshape(array.shape) == 5, np.float32(1e20), array)
+    with pytest.warns(VDIWarning, match="nearly all values lie from .* to 1e\\+20"):
+        made(filled.astype(np.float32))

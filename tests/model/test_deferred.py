@@ -189,6 +189,21 @@ def test_entrances_for_colours_name_the_remedy(tmp_path):
         pvdi.render(made.classified(transfer_function=LOOKS), made.camera, cmap="bone")
 
 
+def test_what_importance_leaves_out_is_warned_of():
+    made = deferred(importance=[(100, 0), (200, 0), (200, 1), (300, 1)])
+    with pytest.warns(VDIWarning, match=r"or of importance 0.*100\.0% of its opacity"):
+        made.classified(cmap="bone", opacity=[0, 1, 0], clim=(110, 190))
+
+
+@pytest.mark.filterwarnings("ignore:the transfer function shows values outside")
+def test_one_look_of_several_is_over_all_their_ranges(default_runtime):
+    low, high = deferred(value_range=(0, 300)), deferred(value_range=(100, 400))
+    look = {"cmap": "bone", "opacity": "linear"}
+    picture = pvdi.render([low, high], low.camera, **look)
+    over_all = pvdi.render([low, high], low.camera, clim=(0, 400), **look)
+    assert np.array_equal(picture, over_all)
+
+
 def test_render_takes_the_look(default_runtime):
     made = deferred()
     picture = pvdi.render(made, made.camera, transfer_function=LOOKS)

@@ -115,3 +115,18 @@ def test_a_mapper_names_the_remedy(default_runtime, plotter):
     kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
     with pytest.raises(InvalidVDIError, match="classified"):
         pvdi.VDIMapper().SetInputData(kept)
+
+
+def test_picks_and_the_vdi_have_the_look_of_now(default_runtime, plotter):
+    actor = plotter.add_vdi(volume(), classification="deferred", cmap="bone", opacity="linear")
+    plotter.render()
+    opacity = actor.prop.GetScalarOpacity()
+    opacity.RemoveAllPoints()
+    opacity.AddPoint(200, 0)
+    opacity.AddPoint(255, 1)
+    before = actor.vdi.n_supersegments
+    hit = actor.pick(24, 18)
+    plotter.render()
+    assert before == actor.vdi.n_supersegments < actor.deferred.n_supersegments
+    assert (hit and hit.value) == ((now := actor.pick(24, 18)) and now.value)
+    assert isinstance(actor.deferred, pvdi.DeferredVDI)

@@ -214,7 +214,8 @@ def _look_of(actor: Any) -> Any:
     several = actor.series or actor.vdi_set
     if several is None:
         return look_of(actor)
-    return several, len(several), actor.opacity_multiplier  # sets may grow
+    classified_at = None if several.value_range is None else actor.GetProperty().GetMTime()
+    return several, len(several), actor.opacity_multiplier, classified_at  # sets may grow
 
 
 def _shown_of(actor: Any) -> Any:

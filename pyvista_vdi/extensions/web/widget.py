@@ -252,6 +252,8 @@ class VDIWidget(anywidget.AnyWidget):
         check_controls(controls)
         self._precision, self._first_look = precision, look
         self._vdi = shown = self._accept(vdi)
+        if not isinstance(shown, DeferredVDI):
+            refuse_look(look)
         self._esm = self._script(shown)
         super().__init__(
             _file=self._encoded(shown),
@@ -321,7 +323,6 @@ class VDIWidget(anywidget.AnyWidget):
         if isinstance(vdi, DeferredVDI):
             self._begun = vdi.classified(**self._first_look)
             return vdi
-        refuse_look(self._first_look)
         if isinstance(vdi, VDISeries | VDISet):
             as_vdi(vdi[0])  # refuses what has no colours
             return vdi

@@ -6,6 +6,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, warn_external
 from pyvista_vdi.model.collection import VDICollection
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
@@ -85,6 +86,16 @@ class VDIActorMethods(PlayingMethods):
     @vdi.setter
     def vdi(self: Any, vdi: VDI) -> None:
         self._mapper_for(" that could show a VDI").SetVDI(vdi)
+
+    @property
+    def deferred(self: Any) -> DeferredVDI | None:
+        """The values that the property classifies, to be saved as such; ``None`` where it has none.
+
+        Of a series they are those of the step that is shown.
+        """
+        mapper = self.GetMapper()
+        shown = None if mapper is None else mapper.driver.input
+        return None if shown is None else shown.deferred  # type: ignore[no-any-return]
 
     @property
     def vdi_set(self: Any) -> VDICollection | None:

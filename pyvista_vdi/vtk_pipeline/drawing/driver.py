@@ -359,6 +359,8 @@ class Driver(Deciding):
         It is of the view that the first picture had, or that somebody chose; ``None`` before.
         """
         source = self.input
+        if source is not None and source.deferred is not None and source.last() is not None:
+            return source.vdi()  # in the colours that its property has by now
         if not isinstance(source, SourceInput):
             return None if source is None else source.last()
         if source.source.GetCamera() is not None and source.source.GetWindowSize() is not None:
