@@ -32,7 +32,7 @@ from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.metrics import over_background
+from pyvista_vdi.model.metrics import check_background, over_background
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, whole_file
 
@@ -397,7 +397,8 @@ def _jpeg(pixels: NDArray[np.uint8], size: Sequence[int]) -> bytes:
 
 def _view_of(vdi: VDI, background: Sequence[float]) -> View:
     """Return what shows a VDI from its generating view, which is still to be added."""
-    percents = " ".join(f"{100 * channel:g}%" for channel in background)
+    behind = check_background(background)
+    percents = " ".join(f"{100 * channel:g}%" for channel in behind)
     still = np.rint(over_background(_from_generating_view(vdi), background) * 255)
     return View(None, f"rgb({percents})", still.astype(np.uint8), vdi.picture_size)
 

@@ -12,6 +12,7 @@ from browsers import LONG
 from PIL import Image, JpegImagePlugin
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.page import page as page_of
 
@@ -158,6 +159,12 @@ def test_damaged_data_are_a_sentence(vdi, open_file, tmp_path):
     assert "damaged" in page.evaluate("viewer.status.message")
     with pytest.raises(pvdi.errors.VDIFileError, match="damaged"):
         pvdi.read(tmp_path / "a.html")
+
+
+def test_a_background_that_is_no_colour_is_refused(vdi, tmp_path):
+    with pytest.raises(InvalidArgumentError, match=r"three numbers from 0 to 1; got 'black'"):
+        vdi.save(tmp_path / "a.html", background="black")
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_page_is_small_and_text(vdi):
