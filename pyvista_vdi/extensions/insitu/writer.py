@@ -236,14 +236,18 @@ class InSitu:
                     "append=True to go on"
                 )
             at = self._checked_time(at)
-            own = Volume(values, self._grid.spacing, self._grid.origin).load()
+            own: Any = None  # read where something follows from all of it
+            ends = (np.nan, np.nan)
+            if self._function is None or self._deferral.deferred:
+                own = Volume(values, self._grid.spacing, self._grid.origin).load()
             if self._function is None:
                 self._function = self._looks.transfer_function_of(own)
-            finite = np.isfinite(own.array).any()
-            ends = own.finite_range() if finite else (np.nan, np.nan)
+            if self._deferral.deferred and np.isfinite(own.array).any():
+                ends = own.finite_range()
         assert self._function is not None
-        low, high = zip(*self._comm.allgather(ends), strict=True)
-        ends = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
+        if self._deferral.deferred:
+            low, high = zip(*self._comm.allgather(ends), strict=True)
+            ends = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
 
         def make(asked: GenerationRequest) -> Any:
             return generate_on_mpi(
@@ -262,7 +266,7 @@ class InSitu:
         whole: Any = SimpleNamespace(
             spacing=self._grid.spacing,
             default_unit_distance=self._grid.default_unit_distance,
-            rgba=own.rgba,
+            rgba=own is not None and own.rgba,
             chunks=None,
             finite_range=lambda: ends,
         )
