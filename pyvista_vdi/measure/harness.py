@@ -411,13 +411,14 @@ class Bench:
         steps["volume_skipping"] = partial(self._volume_frame, camera, self.voxel)
         return steps | {name: partial(self._vtk_frame, name, camera) for name in self.vtk}
 
-    def queued(self, vdi: VDI, camera: Camera, count: int) -> dict[str, float]:
+    def queued(self, made: Mapping[str, VDI], camera: Camera, count: int) -> dict[str, float]:
         """Return the median seconds of a frame of ours of which ``count`` are enqueued at once.
 
         Each of another view, a ten-thousandth of a degree on, and left on the device: what the
-        host does for a frame is in it, what brings its picture there is not.
+        host does for a frame is in it, what brings its picture there is not. ``made``: the VDI as
+        ``exact``, and packed by its precisions, as :meth:`timed_generation` returns it.
         """
-        prepared = prepared_vdi(self.runtime, vdi)
+        prepared = {precision: prepared_vdi(self.runtime, vdi) for precision, vdi in made.items()}
         views = [camera.azimuth(1e-4 * n) for n in range(count)]
         requests = [FrameRequest(view, self.size) for view in views]
         plain = [replace(each, options=RenderOptions(skip_empty=False)) for each in requests]
@@ -432,11 +433,13 @@ class Bench:
                 self.runtime.finish()
 
             work: dict[str, Step] = {
-                "vdi": partial(frames, draw, prepared, plain),
-                "vdi_skipping": partial(frames, draw, prepared, requests),
+                "vdi": partial(frames, draw, prepared["exact"], plain),
+                "vdi_skipping": partial(frames, draw, prepared["exact"], requests),
                 "volume": partial(frames, draw_medium, media[False], plain),
                 "volume_skipping": partial(frames, draw_medium, media[True], requests),
             }
+            for precision in made.keys() - {"exact"}:
+                work[f"vdi_{precision}"] = partial(frames, draw, prepared[precision], requests)
             times = take_turns(work, _QUEUES, warm_up=False)
         return {name: statistics.median(taken["clock"]) / count for name, taken in times.items()}
 

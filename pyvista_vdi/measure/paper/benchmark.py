@@ -31,7 +31,7 @@ from pyvista_vdi.measure.harness import (
     sizes_of,
 )
 from pyvista_vdi.measure.paper.datasets import DEFAULT_SEED, Dataset, find_dataset, label_of
-from pyvista_vdi.measure.paper.report import paper_targets
+from pyvista_vdi.measure.paper.report import PACKED, paper_targets
 from pyvista_vdi.measure.results import Results
 from pyvista_vdi.model.options import check_max_supersegments
 from pyvista_vdi.model.vdi import VDI
@@ -63,7 +63,8 @@ class Plan:
     longest lists, the paper's N_S; ``angles`` degrees of ``Azimuth`` from V_O. There are so many
     ``repeats`` of frames of each candidate at each view, and ``generations`` of each VDI.
     ``preview`` is data set, window, N_S and angle of Table 2; None leaves it out. ``queued`` frames
-    are also enqueued at once and left on the device. ``seed`` is that of the procedural volumes.
+    are also enqueued at once and left on the device, and as many of the packed VDI. ``seed`` is
+    that of the procedural volumes.
     """
 
     profile: str
@@ -216,12 +217,15 @@ class _Rows:
             self._results.data["system"]["opengl"] = bench.opengl
         return bench
 
-    def _vdi(self, name: str, size: tuple[int, int], limit: int) -> tuple[VDI, Times]:
-        bench = self._benches(name, size)
-        made, seconds = bench.timed_generation(self._plan.generations, max_supersegments=limit)
-        return made["exact"], seconds["generate"]
+    def _vdi(
+        self, name: str, size: tuple[int, int], limit: int
+    ) -> tuple[dict[str, VDI], dict[str, Times]]:
+        packed = PACKED if self._plan.queued else ()
+        return self._benches(name, size).timed_generation(
+            self._plan.generations, max_supersegments=limit, precisions=packed
+        )
 
-    def _made(self, case: Case) -> tuple[Bench, VDI, Times]:
+    def _made(self, case: Case) -> tuple[Bench, dict[str, VDI], dict[str, Times]]:
         key = (case.volume, case.window_size)
         self._volumes(case.volume)  # before what is made of it: loading closes what was
         return self._benches(*key), *self._vdis(*key, case.chosen["max_supersegments"])
@@ -231,27 +235,27 @@ class _Rows:
         return {**self._datasets[case.volume].describe(volume), "load_seconds": seconds}
 
     def _vdi_row(self, case: Case) -> dict[str, Any]:
-        _, vdi, seconds = self._made(case)
-        return {"generation_seconds": seconds, **sizes_of(vdi)}
+        _, made, seconds = self._made(case)
+        return {"generation_seconds": seconds["generate"], **sizes_of(made["exact"])}
 
     def _view_row(self, case: Case) -> dict[str, Any]:
         """Compare the pictures of one view, and time everybody's frames."""
-        bench, vdi, _ = self._made(case)
-        camera = case.camera(bench.view)
+        bench, made, _ = self._made(case)
+        camera, vdi = case.camera(bench.view), made["exact"]
         reference, near_vtk = bench.reference(camera), bench.near_vtk(camera)
         frames, count = bench.frames(camera, vdi), self._plan.queued
         return {
             "vdi_to_volume": accuracy(bench.draw(vdi, camera), reference),
             "volume_to_vtk_gpu": near_vtk,
             "seconds": take_turns(frames, self._plan.repeats, runtime=self._runtime),
-            **({"queued_seconds": bench.queued(vdi, camera, count)} if count else {}),
+            **({"queued_seconds": bench.queued(made, camera, count)} if count else {}),
             "left_out": {name: str(error) for name, error in bench.left_out.items()},
         }
 
     def _preview_row(self, case: Case) -> dict[str, Any]:
         """Keep each target rate of the paper's Table 2 in both ways, and look at the pictures."""
-        bench, vdi, _ = self._made(case)
-        camera = case.camera(bench.view)
+        bench, made, _ = self._made(case)
+        camera, vdi = case.camera(bench.view), made["exact"]
         reference, whole = bench.reference(camera), bench.draw(vdi, camera)
         frame = {"full": partial(bench.draw, vdi, camera)}
         full = take_turns(frame, self._plan.repeats, runtime=self._runtime)["full"]

@@ -26,6 +26,9 @@ from pyvista_vdi.measure.results import (
 #: What a row is of; a VDI has no angle.
 _ROW = ("data set", "window", "N_S", "angle")
 
+#: Precisions of packed VDIs whose frames are enqueued, too.
+PACKED = ("16-byte", "8-byte")
+
 #: Columns of Table 1 beside the times.
 _FIGURES = (
     *("speed-up f", "paper", "speed-up f_e", "paper", "f_e / faster VTK"),
@@ -161,24 +164,28 @@ def _queued(data: dict[str, Any]) -> Iterator[str]:
         "Frames that stay on the device",
         f"Frames a second of {data['plan']['queued']} that are enqueued one after the other, each "
         "of another view; in brackets, milliseconds that the driver's events say for the kernels. "
-        "Over volume: the VDI's better rate over `render_volume` without skipping, and the "
-        f"paper's ({paper_tables()['device']}).",
+        "16-byte, 8-byte: the VDI with packed supersegments, f_e. Over volume: the VDI's better "
+        "rate over `render_volume` without skipping, and the paper's "
+        f"({paper_tables()['device']}).",
     )
     ours = list(CANDIDATES)[:4]
     rows = []
     for row, paper in views:
         rates = {name: 1 / row["queued_seconds"][name] for name in ours}
         kernels = {name: median(row["seconds"][name], "device") for name in ours}
+        packed = [row["queued_seconds"].get(f"vdi_{precision}") for precision in PACKED]
         rows.append(
             [
                 *_named(row),
                 *(f"{rates[name]:.0f} ({milliseconds(kernels[name])})" for name in ours),
+                *(number(seconds and 1 / seconds, ".0f") for seconds in packed),
                 number(getattr(paper, "fps_skipping", None), ".0f"),
                 ratio(max(rates["vdi"], rates["vdi_skipping"]), rates["volume"]),
                 number(getattr(paper, "speed_up_skipping", None), ".1f"),
             ]
         )
-    heads = (*_ROW, *(CANDIDATES[name] for name in ours), "paper, f_e", "over volume", "paper")
+    columns = (*(CANDIDATES[name] for name in ours), *PACKED)
+    heads = (*_ROW, *columns, "paper, f_e", "over volume", "paper")
     yield from (*table(heads, rows), "")
 
 
