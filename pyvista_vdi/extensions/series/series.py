@@ -16,6 +16,7 @@ import numpy as np
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classification import IN_PLACE, Look
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, each_of
@@ -212,7 +213,7 @@ class VDISeries(VDICollection):
         VDIFileError
             If the target cannot be written.
         InvalidArgumentError
-            If an option is out of its range.
+            If an option is out of its range, or one is a look, which :meth:`classified` takes.
         """
         return registry.method("VDISeries.save")(self, path, **options)  # type: ignore[no-any-return]
 
@@ -271,6 +272,21 @@ def check_range(vdi: Any, first: tuple[float, float] | None, which: str) -> None
         raise InvalidVDIError(
             f"the VDIs of one series or set keep values of one range, or all have colours: {which} "
             f"{said}, and the first {of_first}; generate them with the same value_range"
+        )
+
+
+def refuse_look(vdis: VDICollection, options: Iterable[str]) -> None:
+    """Raise InvalidArgumentError if a look is among the options that a file is written with."""
+    look = ", ".join(name for name in options if name in (*Look.declared, *IN_PLACE))
+    if look:
+        raise InvalidArgumentError(
+            f"save() takes no look, got {look}: "
+            + (
+                "these VDIs have their colours already"
+                if vdis.value_range is None
+                else f"what keeps values is written as it is; give {look} to classified(), and "
+                "save what it returns"
+            )
         )
 
 

@@ -369,7 +369,7 @@ class VDISet(VDICollection):
         VDIFileError
             If the target cannot be written.
         InvalidArgumentError
-            If an option is out of its range.
+            If an option is out of its range, or one is a look, which :meth:`classified` takes.
         """
         return registry.method("VDISet.save")(self, path, **options)  # type: ignore[no-any-return]
 

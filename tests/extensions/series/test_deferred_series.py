@@ -117,6 +117,10 @@ def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
     series = pvdi.VDISeries.of(alone)
     with pytest.raises(InvalidVDIError, match="no colours yet"):
         series.save(tmp_path / "run.html")
+    for vdis, says in ((series, "classified"), (series.classified(**LOOK), "colours already")):
+        for name in ("run.vdis", "run.html"):
+            with pytest.raises(InvalidArgumentError, match=rf"cmap, opacity: .*{says}"):
+                vdis.save(tmp_path / name, cmap="bone", opacity="linear")
     with pytest.raises(InvalidArgumentError, match="tolerance"):
         series.save(tmp_path / "run.vdis", tolerance=0.01)
     with pytest.raises(UnsupportedError, match="16-byte"):
