@@ -113,6 +113,8 @@ class SeriesWriter:
                 self._steps.begin(stream)
         else:
             self._steps.go_on(self._begun)
+            if self._make is not None:
+                self._begun.check_kept(self._make.deferral)
         self._stream: BinaryIO | None = self.path.open("r+b")
         if self._begun is None:
             self._stream.seek(0, os.SEEK_END)

@@ -113,6 +113,47 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
         pvdi.VDISeries.of([alone[0], other])
 
 
+@pytest.mark.parametrize(
+    ("kept", "says"),
+    [
+        ({"value_range": (3, 1)}, r"value_range must be.*\(3, 1\)"),
+        ({"value_range": "wide"}, "value_range must be.*wide"),
+        ({"importance": [1, -1]}, "importance must be"),
+        ({"value_range": RANGE, "importance": [(0, 0), (300, 0)]}, "importance is 0 over all"),
+        ({"importance": "much"}, "importance must be.*much"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused_before_anything_is_written(kept, says, tmp_path):
+    with pytest.raises(InvalidArgumentError, match=says):
+        pvdi.SeriesWriter(tmp_path / "a.vdis", CAMERA, SIZE, classification="deferred", **kept)
+    assert not list(tmp_path.iterdir())
+    points = {"classification": "deferred", "importance": [(500, 0), (600, 1)]}
+    pvdi.SeriesWriter(tmp_path / "a.vdis", CAMERA, SIZE, **points).close()  # the range is a step's
+
+
+def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
+    path = tmp_path / "run.vdis"
+    path.write_bytes(saved.read_bytes())
+    for importance in ([2, 1], None):
+        kept = {**KEPT, "importance": importance}
+        with pytest.raises(
+            InvalidArgumentError, match=r"importance=\(\(20\.0, 1\.0\), .*same only"
+        ):
+            pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **kept)
+    other = pvdi.DeferredVDI.of_lists(alone[0].lists, {**alone[0].about, "importance": None})
+    with (
+        pvdi.SeriesWriter(path, append=True) as out,
+        pytest.raises(InvalidArgumentError, match="same only; got None"),
+    ):
+        out.append(other, 9.0)
+    assert path.read_bytes() == saved.read_bytes()
+    with pytest.raises(InvalidVDIError, match="this run keeps values from 0"):
+        pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **{**KEPT, "value_range": (0, 9)})
+    with pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT) as out:
+        out.append(next(volumes()), 9.0)
+    assert len(pvdi.read(path)) == 5
+
+
 def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
     series = pvdi.VDISeries.of(alone)
     with pytest.raises(InvalidVDIError, match="no colours yet"):
