@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Iterable, Sequence, Sized
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -143,12 +144,16 @@ def generate_series(
         warn_missed(vdis[-1])
     again: Sequence[Volume] | None = None
     if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
-        again = Called(lambda i: make.volume(steps[i]), range(len(vdis)))
+        again = Called(partial(_volume_at, make, steps), range(len(vdis)))
     if not vdis:
         raise InvalidArgumentError("there is no step: pass at least one volume")
     series = VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)
     series._maker = make
     return series
+
+
+def _volume_at(make: StepMaker, steps: Any, i: int) -> Volume:
+    return make.volume(steps[i])
 
 
 class StepMaker:

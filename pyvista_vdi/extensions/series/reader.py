@@ -151,6 +151,7 @@ class StepsReader(Sequence[VDI]):
         try:
             self._path = Path(path)
             self._stream: BinaryIO = opened(self._path)
+            self._pickled_as = self._path.absolute()
             weakref.finalize(self, self._stream.close)
             self._file_bytes = self._stream.seek(0, os.SEEK_END)
         except (OSError, ValueError, TypeError) as error:
@@ -183,6 +184,9 @@ class StepsReader(Sequence[VDI]):
         except BaseException:
             self._stream.close()
             raise
+
+    def __reduce__(self) -> Any:
+        return type(self), (self._pickled_as,)
 
     @property
     def times(self) -> tuple[float, ...]:

@@ -31,7 +31,7 @@ class VDISeries(VDICollection):
 
     Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` from a ``.vdis`` file,
     whose steps are decoded when they are asked for, or by :meth:`of` from VDIs at hand. It can be
-    read from several threads at once.
+    read from several threads at once, and pickled: one that was read, as the name of its file.
 
     Parameters
     ----------
@@ -137,8 +137,7 @@ class VDISeries(VDICollection):
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISeries:
         """Return a series of what a function makes of each step, when that is asked for."""
-        make = lru_cache(_KEPT)(lambda i: function(self[i]))
-        return VDISeries(Called(make, range(len(self))), self.times)
+        return VDISeries(Made(function, self, _KEPT), self.times)
 
     def nearest(self, time: float) -> int:
         """Return the index of the step whose time is nearest; of two, the earlier.
@@ -250,6 +249,17 @@ class Called(Sequence[Any]):
         return (
             Called(self._function, chosen) if isinstance(index, slice) else self._function(chosen)
         )
+
+
+class Made(Called):
+    """What a function makes of each of several VDIs; those that were asked for last are kept."""
+
+    def __init__(self, function: Callable[[VDI], VDI], vdis: Sequence[VDI], kept: int) -> None:
+        super().__init__(lru_cache(kept)(lambda i: function(vdis[i])), range(len(vdis)))
+        self._given = function, vdis, kept
+
+    def __reduce__(self) -> Any:
+        return type(self), self._given
 
 
 def as_step(vdi: Any) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from command_line import complaint, run
@@ -48,6 +50,8 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path, 
     view = CAMERA.azimuth(12)
     expected = pvdi.render(baked, view)
     assert np.array_equal(pvdi.render(found.classified(**LOOK), view), expected)
+    pickled = pickle.loads(pickle.dumps(found.classified(**LOOK)))
+    assert np.array_equal(pvdi.render(pickled, view), expected)
     assert np.array_equal(pvdi.render(found, view, **LOOK), expected)
     picked = [pvdi.pick(each, view, (30, 25), **LOOK) for each in (found, views[0])]
     assert picked[0] == picked[1]
