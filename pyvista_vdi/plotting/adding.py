@@ -251,6 +251,13 @@ def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, 
     array = asked.array
     array.require_composite()
     asked.deferral.refuse_target(asked.target)
+    _refuse_of_values(asked.look)
+    fixed = {"coverage": asked.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
+    for name in (name for name, given in fixed.items() if given):
+        raise UnsupportedError(
+            f"{name} cannot be given with classification='deferred': that VDI is made once, of "
+            f"what the view shows, and the volume is let go of; leave {name} out, or classification"
+        )
     image, name = as_image(volume, array.scalars, asked.resolution)
     read = as_volume(image, name, array.preference)
     view = asked.camera or framing_camera(plotter, read.bounds)
@@ -275,11 +282,24 @@ def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, 
     return kept, replace(asked, look=look, **plain)
 
 
+def _refuse_of_values(look: Looks) -> None:
+    """Refuse what of a look no deferred VDI can honour."""
+    lacking = {
+        "shade": "shade=True needs the volume's gradients, which a deferred VDI does not keep",
+        "categories": "categories are of single values, and a deferred VDI keeps means of them",
+    }
+    for name, why in lacking.items():
+        if getattr(look, name):
+            raise UnsupportedError(
+                f"{why}: leave {name} out, or add the volume without classification='deferred'"
+            )
+
+
 def _deferred_shown(deferred: DeferredVDI, asked: Addition) -> _Shown:
     """Return values with the property that classifies them, as ``add_volume`` makes it."""
     look, place = asked.look, asked.place
-    told = {n: v for n, v in look.given.items() if n in ("shade", "categories", "interpolation")}
-    asked.refuse_with_a_vdi(told)
+    _refuse_of_values(look)
+    asked.refuse_with_a_vdi({n: v for n, v in look.given.items() if n == "interpolation"})
     table = look.lookup_table(np.array(deferred.value_range))
     prop = look.volume_property(table, deferred.unit_distance)
     shown = DeferredInput(deferred, prop)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, UnsupportedError
+from pyvista_vdi.errors import InvalidVDIError, UnsupportedError, VDIWarning
 
 pv = pytest.importorskip("pyvista")
 
@@ -100,8 +100,8 @@ def test_a_file_takes_a_look_and_its_picture_is_that_of_the_classified_vdi(
 @pytest.mark.parametrize(
     ("asked", "error", "says"),
     [
-        ({"shade": True}, UnsupportedError, "shade"),
-        ({"categories": True}, UnsupportedError, "categories"),
+        ({"shade": True}, UnsupportedError, "shade=True needs the volume's gradients"),
+        ({"categories": True}, UnsupportedError, "categories are of single values"),
         ({"max_supersegments": 5}, UnsupportedError, "max_supersegments"),
     ],
 )
@@ -110,6 +110,34 @@ def test_what_values_cannot_honour_is_refused(default_runtime, plotter, asked, e
     with pytest.raises(error, match=says):
         plotter.add_vdi(kept, **asked)
     assert not plotter.renderer.actors
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ({"shade": True}, "shade=True needs the volume's gradients"),
+        ({"categories": True}, "categories are of single values"),
+        ({"coverage": "view"}, "coverage cannot be given with classification"),
+        ({"draw": "volume"}, "draw cannot be given with classification"),
+    ],
+)
+def test_it_is_refused_before_anything_is_generated(
+    default_runtime, plotter, monkeypatch, asked, says
+):
+    monkeypatch.setattr("pyvista_vdi.plotting.adding.generate_deferred", None)
+    with pytest.raises(UnsupportedError, match=says):
+        plotter.add_vdi(volume(), classification="deferred", **asked)
+
+
+def test_shading_that_is_switched_on_later_is_warned_of_and_left_out(default_runtime, plotter):
+    actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
+    before = seen(plotter)
+    actor.prop.shade = True
+    with pytest.warns(VDIWarning, match=r"shade = True.*needs gradients.*drawn without"):
+        after = seen(plotter)
+    assert np.array_equal(before, after)
+    actor.prop.GetScalarOpacity().AddPoint(100, 1.0)  # is seen all the same, and nothing is said
+    assert np.abs(seen(plotter) - before).mean() > 0.2
 
 
 def test_a_mapper_names_the_remedy(default_runtime, plotter):
