@@ -159,7 +159,9 @@ def added(
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
         first = vdi_from_image(first)
-    if asked.deferral.given and not isinstance(first, VDI | DeferredVDI) and several is None:
+    if asked.deferral.given and (several is not None or isinstance(first, VDI | DeferredVDI)):
+        _refuse_deferral(first, asked.deferral)
+    elif asked.deferral.given:
         first, asked = _deferred(first, asked, plotter)
     if isinstance(first, DeferredVDI):
         shown = _deferred_shown(first, asked)
@@ -244,6 +246,22 @@ def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
         table.annotations = annotations
     title = str(shown.metadata.get("scalars") or "Data")
     return _Shown(shown, table, table.scalar_range, title, bar=bar)
+
+
+def _refuse_deferral(vdi: VDI | DeferredVDI, deferral: Deferral) -> None:
+    """Say that what is kept was decided when a VDI was made of the volume."""
+    names = ", ".join(sorted(deferral.given))
+    if isinstance(vdi, DeferredVDI):
+        low, high = vdi.value_range
+        what = f"this one keeps values from {low:g} to {high:g} already"
+        remedy = "; cmap, opacity and clim say how it looks"
+    else:
+        what = "this one has its colours"
+        remedy = ", or add the volume, or a file of it that keeps values, in its place"
+    raise UnsupportedError(
+        f"{names} cannot be given with a VDI: what is kept is said where one is made of a volume, "
+        f"and {what}: leave {names} out{remedy}"
+    )
 
 
 def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, Addition]:

@@ -129,6 +129,22 @@ def test_it_is_refused_before_anything_is_generated(
         plotter.add_vdi(volume(), classification="deferred", **asked)
 
 
+def test_what_is_kept_cannot_be_said_of_a_vdi_nor_values_be_set_as_one(default_runtime, plotter):
+    kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
+    colours = kept.classified(cmap="bone")
+    for vdi, says in (
+        (kept, r"keeps values from 0 to 254 already: leave classification out; cmap, opacity"),
+        (colours, "has its colours: leave classification out, or add the volume"),
+        (pvdi.VDISeries.of([kept]), "keeps values from 0 to 254 already"),
+    ):
+        with pytest.raises(UnsupportedError, match=says):
+            plotter.add_vdi(vdi, classification="deferred")
+    actor = plotter.add_vdi(colours)
+    with pytest.raises(InvalidVDIError, match=r"vdi\.classified\(.*plotter\.add_vdi\(vdi, cmap"):
+        actor.vdi = kept
+    assert actor.vdi is colours
+
+
 def test_shading_that_is_switched_on_later_is_warned_of_and_left_out(default_runtime, plotter):
     actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
     before = seen(plotter)
