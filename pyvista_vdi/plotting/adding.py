@@ -175,7 +175,9 @@ def added(
     thing = shown.thing if several is None else several
     if isinstance(thing, VDI | VDICollection | DeferredInput):
         mapper.SetInputData(thing)
-        mapper.driver.input.prop = shown.prop  # which classifies what keeps values
+        if shown.prop is not None:  # which classifies what keeps values
+            mapper.driver.input.prop = shown.prop
+            mapper.driver.input.vdi()  # refuse now what cannot be classified, and warn once
     else:
         mapper.SetInputConnection(thing.GetOutputPort())
     actor.mapper = mapper
@@ -321,7 +323,6 @@ def _deferred_shown(deferred: DeferredVDI, asked: Addition) -> _Shown:
     table = look.lookup_table(np.array(deferred.value_range))
     prop = look.volume_property(table, deferred.unit_distance)
     shown = DeferredInput(deferred, prop)
-    shown.vdi()  # refuse now what cannot be classified
     title = str(deferred.metadata.get("scalars") or "Data")
     return _Shown(shown, table, table.scalar_range, title, prop, place.show_scalar_bar)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -127,6 +128,22 @@ def test_it_is_refused_before_anything_is_generated(
     monkeypatch.setattr("pyvista_vdi.plotting.adding.generate_deferred", None)
     with pytest.raises(UnsupportedError, match=says):
         plotter.add_vdi(volume(), classification="deferred", **asked)
+
+
+@pytest.mark.parametrize("as_series", [False, True])
+def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, as_series):
+    deferred = {"classification": "deferred", "value_range": (50, 200)}
+    shown, kept = volume(), deferred
+    if as_series:
+        one = pvdi.generate(shown, plotter.camera, (48, 36), **deferred)
+        shown, kept = pvdi.VDISeries.of([one]), {}
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        plotter.add_vdi(shown, cmap="bone", **kept)
+        seen(plotter)
+    assert [str(each.message)[:43] for each in said] == [
+        "the transfer function shows values outside "
+    ]
 
 
 def test_what_is_kept_cannot_be_said_of_a_vdi_nor_values_be_set_as_one(default_runtime, plotter):

@@ -14,6 +14,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
@@ -295,6 +296,7 @@ class DeferredInput(Input):
         super().__init__()
         self.deferred, self.prop = deferred, prop
         self._made_at: Any = None
+        self._look: TransferFunction | None = None  # of the VDI that was made last
         self._left_out: list[str] = []
 
     def vdi(self) -> VDI:
@@ -311,7 +313,8 @@ class DeferredInput(Input):
                     "switch it off, or add the volume without classification='deferred'"
                 )
             self._left_out = asked
-            self._vdi = classify_on_device(self.deferred, look)
+            if self._vdi is None or self._look != look:  # the time stamp alone says little
+                self._vdi, self._look = classify_on_device(self.deferred, look), look
             self._made_at = stamp
         return self._vdi
 
