@@ -273,10 +273,12 @@ def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, 
     asked.deferral.refuse_target(asked.target)
     _refuse_of_values(asked.look)
     fixed = {"coverage": asked.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
-    for name in (name for name, given in fixed.items() if given):
+    refused = " and ".join(each for each, given in fixed.items() if given)
+    if refused:
         raise UnsupportedError(
-            f"{name} cannot be given with classification='deferred': that VDI is made once, of "
-            f"what the view shows, and the volume is let go of; leave {name} out, or classification"
+            f"{refused} cannot be given with classification='deferred': that VDI is made once, of "
+            f"what the view shows, and the volume is let go of; leave {refused} out, or "
+            "classification"
         )
     image, name = as_image(volume, array.scalars, asked.resolution)
     read = as_volume(image, name, array.preference)

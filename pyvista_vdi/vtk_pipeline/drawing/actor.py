@@ -86,7 +86,8 @@ class VDIActorMethods(PlayingMethods):
     @vdi.setter
     def vdi(self: Any, vdi: VDI) -> None:
         mapper = self._mapper_for(" that could show a VDI")
-        if isinstance(vdi, DeferredVDI):
+        given: Any = vdi
+        if isinstance(given, DeferredVDI):
             raise InvalidVDIError(
                 "a DeferredVDI has no colours yet: set actor.vdi = vdi.classified(cmap=..., "
                 "opacity=...), or add it by plotter.add_vdi(vdi, cmap=..., opacity=...), whose "

@@ -68,6 +68,14 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path, 
     assert "no colours yet" in complaint(capsys, "convert", saved, "-o", tmp_path / "a.html")
     run(capsys, "convert", saved, "-o", tmp_path / "a.vdiset", "--cmap", "bone")
     assert pvdi.read(tmp_path / "a.vdiset").value_range is None
+    for verb, target in (("render", "-o"), ("view", "--screenshot")):
+        picture = tmp_path / f"{verb}.png"
+        assert "no colours yet: give --cmap" in complaint(capsys, verb, saved, target, picture)
+        run(capsys, verb, saved, target, picture, "--cmap", "bone")
+        message = complaint(
+            capsys, verb, tmp_path / "a.vdiset", target, picture, "--opacity", "linear"
+        )
+        assert "has its look, and --opacity linear" in message
 
 
 def test_its_property_is_followed_in_a_plotter(plotter, saved):
