@@ -140,7 +140,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ("info no.vdi", "is not a VDI file"),
         ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing is for volumes"),
         ("view a.vdi --scalars x --screenshot b.png", "--scalars is for volumes"),
-        ("view a.vdi --cmap bone --screenshot b.png", "cmap cannot be given with"),
+        ("view a.vdi --cmap bone --screenshot b.png", "a.vdi has its look, and --cmap bone"),
         ("info none.nrrd", "none.nrrd does not exist"),
         ("render a.vdi -o a.gif", "the name must end in .png"),
         ("render a.vdi -o no/a.png", "no does not exist; create it"),
