@@ -146,10 +146,13 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
         ({"importance": [1, -1]}, "importance must be"),
         ({"value_range": RANGE, "importance": [(0, 0), (300, 0)]}, "importance is 0 over all"),
         ({"importance": "much"}, "importance must be.*much"),
+        ({"tolerance": 0.1}, "a tolerance is of colours"),
+        ({"precision": "16-byte"}, "no 16-byte supersegments"),
+        ({"ambient_occlusion": pvdi.AmbientOcclusion()}, "ambient occlusion follows"),
     ],
 )
 def test_what_cannot_be_kept_is_refused_before_anything_is_written(kept, says, tmp_path):
-    with pytest.raises(InvalidArgumentError, match=says):
+    with pytest.raises((InvalidArgumentError, UnsupportedError), match=says):
         pvdi.SeriesWriter(tmp_path / "a.vdis", CAMERA, SIZE, classification="deferred", **kept)
     assert not list(tmp_path.iterdir())
     points = {"classification": "deferred", "importance": [(500, 0), (600, 1)]}
