@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -35,7 +36,7 @@ def classified_each(collection: VDICollection, look: Mapping[str, Any]) -> VDICo
             "classification='deferred' makes"
         )
     table, device = _table_of(look, ends), look.get("device")
-    made: Any = lambda vdi: classify_on_device(vdi, table, device)  # noqa: E731
+    made: Any = partial(classify_on_device, transfer_function=table, device=device)  # is pickled
     return collection._mapped(made)
 
 

@@ -41,8 +41,6 @@ def generate(options: argparse.Namespace) -> int:
     looks = Classification.composited(arguments, "generate")  # refused before the volume is read
     kept = kept_values(options)
     deferred = Deferral(**kept).deferred
-    if deferred:
-        looks.require_no_look()
     occlusion = ambient_occlusion(options)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)

@@ -13,10 +13,10 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any, TypeVar
 
-from pyvista_vdi.cli.text import mebibytes, printable
+from pyvista_vdi.cli.text import mebibytes, plain_number, printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, stores, volumes
-from pyvista_vdi.io.files import holds
+from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import StoredVolume, is_store
 from pyvista_vdi.io.volumes import list_volumes
 from pyvista_vdi.io.volumes.in_file import placed
@@ -149,7 +149,7 @@ def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: st
     for name in names:
         value = getattr(options, name, None)
         if value is not None and value is not False:
-            raise UnsupportedError(f"{why}--{name.replace('_', '-')} is for {what}: leave it out")
+            raise UnsupportedError(f"{why}{as_option(name)} is for {what}: leave it out")
 
 
 def volume_name(options: argparse.Namespace) -> str:
@@ -174,9 +174,70 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def kept_values(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that say what is kept where scalars are classified afterwards."""
+    """Return the arguments that say what is kept where scalars are classified afterwards.
+
+    What goes with none of that is refused, by the options' names.
+    """
     given = {name: getattr(options, name) for name in declared(Deferral)}
-    return {name: value for name, value in given.items() if value is not None}
+    kept = {name: value for name, value in given.items() if value is not None}
+    if kept.get("classification") == "deferred":
+        _refuse_with_values(options)
+    else:
+        for name in [name for name in kept if name != "classification"]:
+            separator = " " if name == "value_range" else ","
+            values = separator.join(map(plain_number, kept[name]))
+            raise InvalidArgumentError(
+                f"{as_option(name)} {values} says what is kept to be classified afterwards: give "
+                f"--classification deferred as well, or leave {as_option(name)} out"
+            )
+    return kept
+
+
+def _refuse_with_values(options: argparse.Namespace) -> None:
+    """Refuse what VDIs that keep values cannot have, before a volume is read."""
+
+    def given(*names: str) -> str:
+        values = {name: getattr(options, name, None) for name in names}
+        return ", ".join(as_option(n) for n, value in values.items() if value not in (None, False))
+
+    found = format_named(options.output)
+    if found is not None and not found.values and found.holds == "VDI":
+        raise InvalidArgumentError(
+            f"--classification deferred keeps values, and {found.suffix} files hold colours: write "
+            "a .vdi file, of which 'pyvista-vdi convert' with --cmap makes one, or leave "
+            "--classification out"
+        )
+    if given("shade"):
+        raise UnsupportedError(
+            "--shade needs the volume's gradients, which --classification deferred does not keep: "
+            "leave out one of them"
+        )
+    look = given("tf", "transfer_function", *(n for n in CLASSIFICATION if n != "interpolation"))
+    if look:
+        raise InvalidArgumentError(
+            f"--classification deferred keeps values, whatever their look: give {look} to "
+            "'pyvista-vdi render', view or convert of what is written"
+        )
+    occlusion = given("ambient_occlusion", "occlusion_radius", "occlusion_strength")
+    if occlusion:
+        raise UnsupportedError(
+            f"{occlusion}: ambient occlusion follows from opacities, which --classification "
+            "deferred does not keep: leave it out"
+        )
+    if target := given("quality", "target_ssim", "target_fps", "max_bytes"):
+        raise UnsupportedError(
+            f"{target}: settings are chosen by a look, which --classification deferred does not "
+            "have: give --max-supersegments"
+        )
+    if options.precision == "16-byte":
+        raise UnsupportedError(
+            "--precision 16-byte is none of VDIs that keep values: choose exact or 8-byte"
+        )
+
+
+def as_option(name: str) -> str:
+    """Return an argument's name as the command line has it."""
+    return f"--{name.replace('_', '-')}"
 
 
 def has_vtk(options: argparse.Namespace) -> bool:
@@ -302,7 +363,15 @@ def file_options(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def with_look(options: argparse.Namespace, found: Any, file: str, *, colors: bool = True) -> Any:
-    """Return what was read, classified as the options ask where it keeps values.
+    """Return what was read, classified as the options ask where it keeps values."""
+    look = look_for(options, found, file, colors=colors)
+    return found.classified(**look) if look else found
+
+
+def look_for(
+    options: argparse.Namespace, found: Any, file: str, *, colors: bool = True
+) -> dict[str, Any]:
+    """Return the look that the options give what was read, where it keeps values.
 
     Where it does not, a look is refused, and where ``colors`` are needed the lack of one.
     """
@@ -313,16 +382,16 @@ def with_look(options: argparse.Namespace, found: Any, file: str, *, colors: boo
                 f"{printable(file)} keeps values, which have no colours yet: give --cmap, "
                 "--opacity, --tf or --transfer-function"
             )
-        return found.classified(**look) if look else found
+        return look
     for name in ("tf", "transfer_function", *CLASSIFICATION):
         value = getattr(options, name, None)
         if value is not None:
             text = " ".join(map(str, value)) if isinstance(value, list | tuple) else value
             raise UnsupportedError(
-                f"{printable(file)} has its look, and --{name.replace('_', '-')} {text} is for "
+                f"{printable(file)} has its look, and {as_option(name)} {text} is for "
                 "VDIs that keep values: leave it out"
             )
-    return found
+    return {}
 
 
 def say_vdi(options: argparse.Namespace, vdi: VDI | DeferredVDI, more: str = "") -> None:

@@ -15,6 +15,7 @@ from pyvista_vdi.cli.inputs import (
     classification,
     is_series,
     is_volume,
+    look_for,
     measuring,
     part,
     read_volume,
@@ -85,7 +86,8 @@ def view(options: argparse.Namespace) -> int:
         shown = read(options.file)
         vdi = _at(shown, options.time)
         size = options.size or vdi.picture_size
-        _show(shown, vdi.camera, size, classification(options), options, screenshot)
+        look = look_for(options, shown, options.file)
+        _show(shown, vdi.camera, size, look, options, screenshot)
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0

@@ -159,7 +159,9 @@ def added(
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
         first = vdi_from_image(first)
-    if asked.deferral.given and not isinstance(first, VDI | DeferredVDI) and several is None:
+    if asked.deferral.given and (several is not None or isinstance(first, VDI | DeferredVDI)):
+        _refuse_deferral(first, asked.deferral)
+    elif asked.deferral.given:
         first, asked = _deferred(first, asked, plotter)
     if isinstance(first, DeferredVDI):
         shown = _deferred_shown(first, asked)
@@ -173,7 +175,9 @@ def added(
     thing = shown.thing if several is None else several
     if isinstance(thing, VDI | VDICollection | DeferredInput):
         mapper.SetInputData(thing)
-        mapper.driver.input.prop = shown.prop  # which classifies what keeps values
+        if shown.prop is not None:  # which classifies what keeps values
+            mapper.driver.input.prop = shown.prop
+            mapper.driver.input.vdi()  # refuse now what cannot be classified, and warn once
     else:
         mapper.SetInputConnection(thing.GetOutputPort())
     actor.mapper = mapper
@@ -246,11 +250,36 @@ def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
     return _Shown(shown, table, table.scalar_range, title, bar=bar)
 
 
+def _refuse_deferral(vdi: VDI | DeferredVDI, deferral: Deferral) -> None:
+    """Say that what is kept was decided when a VDI was made of the volume."""
+    names = ", ".join(sorted(deferral.given))
+    if isinstance(vdi, DeferredVDI):
+        low, high = vdi.value_range
+        what = f"this one keeps values from {low:g} to {high:g} already"
+        remedy = "; cmap, opacity and clim say how it looks"
+    else:
+        what = "this one has its colours"
+        remedy = ", or add the volume, or a file of it that keeps values, in its place"
+    raise UnsupportedError(
+        f"{names} cannot be given with a VDI: what is kept is said where one is made of a volume, "
+        f"and {what}: leave {names} out{remedy}"
+    )
+
+
 def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, Addition]:
     """Generate a deferred VDI for the plotter's view, and say what is left to be honoured."""
     array = asked.array
     array.require_composite()
     asked.deferral.refuse_target(asked.target)
+    _refuse_of_values(asked.look)
+    fixed = {"coverage": asked.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
+    refused = " and ".join(each for each, given in fixed.items() if given)
+    if refused:
+        raise UnsupportedError(
+            f"{refused} cannot be given with classification='deferred': that VDI is made once, of "
+            f"what the view shows, and the volume is let go of; leave {refused} out, or "
+            "classification"
+        )
     image, name = as_image(volume, array.scalars, asked.resolution)
     read = as_volume(image, name, array.preference)
     view = asked.camera or framing_camera(plotter, read.bounds)
@@ -275,15 +304,27 @@ def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, 
     return kept, replace(asked, look=look, **plain)
 
 
+def _refuse_of_values(look: Looks) -> None:
+    """Refuse what of a look no deferred VDI can honour."""
+    lacking = {
+        "shade": "shade=True needs the volume's gradients, which a deferred VDI does not keep",
+        "categories": "categories are of single values, and a deferred VDI keeps means of them",
+    }
+    for name, why in lacking.items():
+        if getattr(look, name):
+            raise UnsupportedError(
+                f"{why}: leave {name} out, or add the volume without classification='deferred'"
+            )
+
+
 def _deferred_shown(deferred: DeferredVDI, asked: Addition) -> _Shown:
     """Return values with the property that classifies them, as ``add_volume`` makes it."""
     look, place = asked.look, asked.place
-    told = {n: v for n, v in look.given.items() if n in ("shade", "categories", "interpolation")}
-    asked.refuse_with_a_vdi(told)
+    _refuse_of_values(look)
+    asked.refuse_with_a_vdi({n: v for n, v in look.given.items() if n == "interpolation"})
     table = look.lookup_table(np.array(deferred.value_range))
     prop = look.volume_property(table, deferred.unit_distance)
     shown = DeferredInput(deferred, prop)
-    shown.vdi()  # refuse now what cannot be classified
     title = str(deferred.metadata.get("scalars") or "Data")
     return _Shown(shown, table, table.scalar_range, title, prop, place.show_scalar_bar)
 

@@ -140,7 +140,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ("info no.vdi", "is not a VDI file"),
         ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing is for volumes"),
         ("view a.vdi --scalars x --screenshot b.png", "--scalars is for volumes"),
-        ("view a.vdi --cmap bone --screenshot b.png", "cmap cannot be given with"),
+        ("view a.vdi --cmap bone --screenshot b.png", "a.vdi has its look, and --cmap bone"),
         ("info none.nrrd", "none.nrrd does not exist"),
         ("render a.vdi -o a.gif", "the name must end in .png"),
         ("render a.vdi -o no/a.png", "no does not exist; create it"),
@@ -509,6 +509,29 @@ def test_looks_and_their_changes(asked, looks, occlusion):
     options = parser.parse(f"generate a -o b.vdi {asked}".split())
     assert inputs.classification(options) == looks
     assert inputs.ambient_occlusion(options) == occlusion
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ("-o b.vdi --cmap bone --n-colors 9", "give --n-colors, --cmap to 'pyvista-vdi render'"),
+        ("-o b.vdi --tf soft", "give --tf to 'pyvista-vdi render'"),
+        ("-o b.vdi --shade", "--shade needs the volume's gradients"),
+        ("-o b.vdi --quality high", "give --max-supersegments"),
+        ("-o b.vdi --occlusion-radius 3", "--occlusion-radius: ambient occlusion"),
+        ("-o b.vdi --precision 16-byte", "--precision 16-byte is none"),
+        ("-o b.exr", ".exr files hold colours: write a .vdi file"),
+    ],
+)
+def test_what_values_cannot_have_is_refused_by_options_names(
+    asked, says, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    words = f"generate none.nrrd {asked} --classification deferred".split()
+    assert says in complaint(capsys, *words)  # before the volume is looked for
+    message = complaint(capsys, "generate", "none.nrrd", "-o", "b.vdi", "--importance", "1,2")
+    assert message.startswith("--importance 1,2 says what is kept")
+    assert not list(tmp_path.iterdir())
 
 
 def test_help_loads_nothing_slow():

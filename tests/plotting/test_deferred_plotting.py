@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import gc
 import itertools
+import warnings
 
 import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, UnsupportedError
+from pyvista_vdi.errors import InvalidVDIError, UnsupportedError, VDIWarning
 
 pv = pytest.importorskip("pyvista")
 
@@ -100,8 +101,8 @@ def test_a_file_takes_a_look_and_its_picture_is_that_of_the_classified_vdi(
 @pytest.mark.parametrize(
     ("asked", "error", "says"),
     [
-        ({"shade": True}, UnsupportedError, "shade"),
-        ({"categories": True}, UnsupportedError, "categories"),
+        ({"shade": True}, UnsupportedError, "shade=True needs the volume's gradients"),
+        ({"categories": True}, UnsupportedError, "categories are of single values"),
         ({"max_supersegments": 5}, UnsupportedError, "max_supersegments"),
     ],
 )
@@ -110,6 +111,66 @@ def test_what_values_cannot_honour_is_refused(default_runtime, plotter, asked, e
     with pytest.raises(error, match=says):
         plotter.add_vdi(kept, **asked)
     assert not plotter.renderer.actors
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ({"shade": True}, "shade=True needs the volume's gradients"),
+        ({"categories": True}, "categories are of single values"),
+        ({"coverage": "view"}, "coverage cannot be given with classification"),
+        ({"draw": "volume"}, "draw cannot be given with classification"),
+    ],
+)
+def test_it_is_refused_before_anything_is_generated(
+    default_runtime, plotter, monkeypatch, asked, says
+):
+    monkeypatch.setattr("pyvista_vdi.plotting.adding.generate_deferred", None)
+    with pytest.raises(UnsupportedError, match=says):
+        plotter.add_vdi(volume(), classification="deferred", **asked)
+
+
+@pytest.mark.parametrize("as_series", [False, True])
+def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, as_series):
+    deferred = {"classification": "deferred", "value_range": (50, 200)}
+    shown, kept = volume(), deferred
+    if as_series:
+        one = pvdi.generate(shown, plotter.camera, (48, 36), **deferred)
+        shown, kept = pvdi.VDISeries.of([one]), {}
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        plotter.add_vdi(shown, cmap="bone", **kept)
+        seen(plotter)
+    assert [str(each.message)[:43] for each in said] == [
+        "the transfer function shows values outside "
+    ]
+
+
+def test_what_is_kept_cannot_be_said_of_a_vdi_nor_values_be_set_as_one(default_runtime, plotter):
+    kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
+    colours = kept.classified(cmap="bone")
+    for vdi, says in (
+        (kept, r"keeps values from 0 to 254 already: leave classification out; cmap, opacity"),
+        (colours, "has its colours: leave classification out, or add the volume"),
+        (pvdi.VDISeries.of([kept]), "keeps values from 0 to 254 already"),
+    ):
+        with pytest.raises(UnsupportedError, match=says):
+            plotter.add_vdi(vdi, classification="deferred")
+    actor = plotter.add_vdi(colours)
+    with pytest.raises(InvalidVDIError, match=r"vdi\.classified\(.*plotter\.add_vdi\(vdi, cmap"):
+        actor.vdi = kept
+    assert actor.vdi is colours
+
+
+def test_shading_that_is_switched_on_later_is_warned_of_and_left_out(default_runtime, plotter):
+    actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
+    before = seen(plotter)
+    actor.prop.shade = True
+    with pytest.warns(VDIWarning, match=r"shade = True.*needs gradients.*drawn without"):
+        after = seen(plotter)
+    assert np.array_equal(before, after)
+    actor.prop.GetScalarOpacity().AddPoint(100, 1.0)  # is seen all the same, and nothing is said
+    assert np.abs(seen(plotter) - before).mean() > 0.2
 
 
 def test_a_mapper_names_the_remedy(default_runtime, plotter):

@@ -23,6 +23,7 @@ from pyvista_vdi.extensions.large.on_mpi import (
     together,
 )
 from pyvista_vdi.extensions.series.continuing import check_goes_on, checked_way, refused
+from pyvista_vdi.extensions.series.generate import checked_deferral
 from pyvista_vdi.extensions.series.series import checked_time
 from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
@@ -180,6 +181,7 @@ class InSitu:
             self._function = unclassified(self._looks.interpolation)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
+        self._deferral = checked_deferral(self._deferral, self._options)
         points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
         of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
         self._grid = Grid(points, of.spacing, of.origin, of.direction)

@@ -72,10 +72,8 @@ def series(options: argparse.Namespace) -> int:
     if kinds[0] != "series":
         steps = _timed(steps, options.times)
     looks = classification(options)
-    asked = Classification.composited(looks, "series")  # refused before a volume is read
+    Classification.composited(looks, "series")  # refused before a volume is read
     looks |= kept_values(options)
-    if Deferral(**kept_values(options)).deferred:
-        asked.require_no_look()
     target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
     # A writer's file grows step by step: it gets its name when it is whole, and all have been read
     with (

@@ -12,6 +12,8 @@ from pyvista_vdi.extensions.series.reader import StepsReader
 from pyvista_vdi.extensions.series.series import check_range, range_of
 from pyvista_vdi.io.vdi_file.description import to_json
 from pyvista_vdi.model.checks import as_flag
+from pyvista_vdi.model.deferred import importance_points
+from pyvista_vdi.model.options import Deferral
 
 #: What a VDI's metadata say that must be the same in all steps.
 _SAME = ("transfer_function", "lights", "ambient_occlusion")
@@ -68,6 +70,13 @@ class Begun(StepsReader):
                     f"with the same only; got {value!r}"
                 )
 
+    def check_kept(self, deferral: Deferral) -> None:
+        """Raise InvalidVDIError or InvalidArgumentError if other values would be kept."""
+        if deferral.deferred and deferral.value_range is not None:
+            check_range(deferral, range_of(self.info()), "this run")
+            points = importance_points(deferral.importance, deferral.value_range)
+            _check_importance(self._path, self.info(), points)
+
     def check(self, step: Any) -> None:
         """Raise InvalidArgumentError if a VDI is not of this series."""
         check_goes_on(self._path, self.info(), step)
@@ -104,6 +113,7 @@ def check_goes_on(path: Any, first: Any, step: Any) -> None:
                 f"{now}; give the same, or begin another file"
             )
     check_range(step, range_of(first), "this step")
+    _check_importance(path, first, getattr(step, "importance", None))
     for name in _SAME:
         before, now = (json.loads(to_json(vdi.metadata.get(name))) for vdi in (first, step))
         if before != now:
@@ -111,3 +121,13 @@ def check_goes_on(path: Any, first: Any, step: Any) -> None:
                 f"{path} cannot be gone on with: its {name.replace('_', ' ')} is another than that "
                 "of this step; give the same classification (clim, too), or begin another file"
             )
+
+
+def _check_importance(path: Any, first: Any, points: Any) -> None:
+    """Raise InvalidArgumentError if values are kept by another importance than before."""
+    before = getattr(first, "importance", None)
+    if points != before:
+        raise InvalidArgumentError(
+            f"{path} was written with importance={before}, as points (value, weight), and goes on "
+            f"with the same only; got {points}"
+        )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
-from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.series.series import VDISeries, refuse_look
 from pyvista_vdi.extensions.series.steps_writer import write
 from pyvista_vdi.io.files import format_named
 from pyvista_vdi.io.progress import Pieces, Progress
@@ -18,6 +18,7 @@ from pyvista_vdi.model.vdi import VDI
 
 def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Path:
     """Write a file of a series, or a page that plays it: see :meth:`VDISeries.save`."""
+    refuse_look(series, options)
     found = format_named(path)
     if found is not None and found.page:
         as_vdi(series[0])  # refuses what has no colours

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Iterable, Sequence, Sized
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidArgumentTypeError,
+    UnsupportedError,
     naming,
     warn_external,
     with_article,
@@ -20,8 +22,9 @@ from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_time
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import check_callback
+from pyvista_vdi.model.checks import as_range, check_callback
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.deferred import importance_points
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import (
     GENERATION_NAMES,
@@ -142,12 +145,16 @@ def generate_series(
         warn_missed(vdis[-1])
     again: Sequence[Volume] | None = None
     if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
-        again = Called(lambda i: make.volume(steps[i]), range(len(vdis)))
+        again = Called(partial(_volume_at, make, steps), range(len(vdis)))
     if not vdis:
         raise InvalidArgumentError("there is no step: pass at least one volume")
     series = VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)
     series._maker = make
     return series
+
+
+def _volume_at(make: StepMaker, steps: Any, i: int) -> Volume:
+    return make.volume(steps[i])
 
 
 class StepMaker:
@@ -171,10 +178,10 @@ class StepMaker:
         looks = {n: v for n, v in given.items() if n not in others}
         self._looks = Classification.composited(looks, function, others)
         self._target = QualityTarget(**{n: given[n] for n in _DIAL if n in given})
-        self._deferral = Deferral(**{n: given[n] for n in _DEFERRAL if n in given})
-        if self._deferral.deferred:
+        self.deferral = Deferral(**{n: given[n] for n in _DEFERRAL if n in given})
+        if self.deferral.deferred:
             self._looks.require_no_look()
-            self._deferral.refuse_target(self._target)
+            self.deferral.refuse_target(self._target)
             self._table: TransferFunction | None = unclassified(self._looks.interpolation)
         else:
             self._table = None
@@ -182,6 +189,7 @@ class StepMaker:
         if not self._target:
             options.setdefault("precision", default_precision)
         self._options = GenerationOptions(**options)
+        self.deferral = checked_deferral(self.deferral, self._options)
         self._grid = {n: given[n] for n in _GRID if given.get(n) is not None}
         self._chosen: dict[str, Any] = {}
         self._max_bytes = self._target.max_bytes
@@ -209,9 +217,9 @@ class StepMaker:
             progress,
             {"classification": self._looks.describe(), "scalars": volume.name, **self._chosen},
         )
-        if self._deferral.deferred:
-            kept = generate_deferred(request, self._deferral, self._anywhere)
-            self._deferral = dataclasses.replace(self._deferral, value_range=kept.value_range)
+        if self.deferral.deferred:
+            kept = generate_deferred(request, self.deferral, self._anywhere)
+            self.deferral = dataclasses.replace(self.deferral, value_range=kept.value_range)
             return kept  # type: ignore[return-value]
         vdi = self._anywhere(request)
         if self._target:
@@ -248,6 +256,31 @@ class StepMaker:
             max_supersegments=chosen["max_supersegments"],
             precision=chosen["precision"],
         )
+
+
+def checked_deferral(deferral: Deferral, options: GenerationOptions) -> Deferral:
+    """Return what is to be kept, or raise now what generation would raise of it for any volume."""
+    if not deferral.deferred:
+        return deferral
+    if options.precision == "16-byte":
+        raise UnsupportedError(
+            "a DeferredVDI has no 16-byte supersegments: choose 'exact' or '8-byte'"
+        )
+    ends = deferral.value_range
+    if ends is None:  # that of the first step: any that the points of importance lie in
+        points = importance_points(deferral.importance, (0.0, 1.0)) or ((0.0, 1.0),)
+        ends = points[0][0], max(points[-1][0], points[0][0] + 1)
+    request = GenerationRequest(
+        Volume(np.zeros((2, 2, 2), np.uint8), (1.0, 1.0, 1.0)),
+        unclassified("nearest"),
+        Camera((0, 0, 1), (0, 0, 0), (0, 1, 0)),
+        (1, 1),
+        options,
+    )
+    generate_deferred(request, dataclasses.replace(deferral, value_range=ends), lambda _: None)
+    if deferral.value_range is None:
+        return deferral
+    return dataclasses.replace(deferral, value_range=as_range(ends))
 
 
 def _steps(

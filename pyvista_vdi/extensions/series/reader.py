@@ -42,7 +42,7 @@ from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import MAX_DESCRIPTION_BYTES
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_range
-from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.deferred import DeferredVDI, importance_points
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 
@@ -91,6 +91,12 @@ class SeriesInfo:
     def value_range(self) -> tuple[float, float] | None:
         """Least and largest value of steps that keep values."""
         return None if self.deferred is None else as_range(self.deferred.get("value_range"))
+
+    @property
+    def importance(self) -> tuple[tuple[float, float], ...] | None:
+        """Points (value, weight) by which steps that keep values were cut; None: 1 everywhere."""
+        ends = self.value_range
+        return ends and importance_points((self.deferred or {}).get("importance"), ends)
 
 
 _Value = TypeVar("_Value")
@@ -145,6 +151,7 @@ class StepsReader(Sequence[VDI]):
         try:
             self._path = Path(path)
             self._stream: BinaryIO = opened(self._path)
+            self._pickled_as = self._path.absolute()
             weakref.finalize(self, self._stream.close)
             self._file_bytes = self._stream.seek(0, os.SEEK_END)
         except (OSError, ValueError, TypeError) as error:
@@ -177,6 +184,9 @@ class StepsReader(Sequence[VDI]):
         except BaseException:
             self._stream.close()
             raise
+
+    def __reduce__(self) -> Any:
+        return type(self), (self._pickled_as,)
 
     @property
     def times(self) -> tuple[float, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classification import IN_PLACE, Look
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, each_of
@@ -30,7 +31,7 @@ class VDISeries(VDICollection):
 
     Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` from a ``.vdis`` file,
     whose steps are decoded when they are asked for, or by :meth:`of` from VDIs at hand. It can be
-    read from several threads at once.
+    read from several threads at once, and pickled: one that was read, as the name of its file.
 
     Parameters
     ----------
@@ -136,8 +137,7 @@ class VDISeries(VDICollection):
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISeries:
         """Return a series of what a function makes of each step, when that is asked for."""
-        make = lru_cache(_KEPT)(lambda i: function(self[i]))
-        return VDISeries(Called(make, range(len(self))), self.times)
+        return VDISeries(Made(function, self, _KEPT), self.times)
 
     def nearest(self, time: float) -> int:
         """Return the index of the step whose time is nearest; of two, the earlier.
@@ -212,7 +212,7 @@ class VDISeries(VDICollection):
         VDIFileError
             If the target cannot be written.
         InvalidArgumentError
-            If an option is out of its range.
+            If an option is out of its range, or one is a look, which :meth:`classified` takes.
         """
         return registry.method("VDISeries.save")(self, path, **options)  # type: ignore[no-any-return]
 
@@ -251,6 +251,17 @@ class Called(Sequence[Any]):
         )
 
 
+class Made(Called):
+    """What a function makes of each of several VDIs; those that were asked for last are kept."""
+
+    def __init__(self, function: Callable[[VDI], VDI], vdis: Sequence[VDI], kept: int) -> None:
+        super().__init__(lru_cache(kept)(lambda i: function(vdis[i])), range(len(vdis)))
+        self._given = function, vdis, kept
+
+    def __reduce__(self) -> Any:
+        return type(self), self._given
+
+
 def as_step(vdi: Any) -> Any:
     """Return a VDI, its VTK form or a DeferredVDI as such; InvalidVDIError if it is none."""
     return vdi if isinstance(vdi, DeferredVDI) else as_vdi(vdi)
@@ -271,6 +282,21 @@ def check_range(vdi: Any, first: tuple[float, float] | None, which: str) -> None
         raise InvalidVDIError(
             f"the VDIs of one series or set keep values of one range, or all have colours: {which} "
             f"{said}, and the first {of_first}; generate them with the same value_range"
+        )
+
+
+def refuse_look(vdis: VDICollection, options: Iterable[str]) -> None:
+    """Raise InvalidArgumentError if a look is among the options that a file is written with."""
+    look = ", ".join(name for name in options if name in (*Look.declared, *IN_PLACE))
+    if look:
+        raise InvalidArgumentError(
+            f"save() takes no look, got {look}: "
+            + (
+                "these VDIs have their colours already"
+                if vdis.value_range is None
+                else f"what keeps values is written as it is; give {look} to classified(), and "
+                "save what it returns"
+            )
         )
 
 

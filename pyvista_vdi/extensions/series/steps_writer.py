@@ -168,11 +168,7 @@ class StepsWriter:
         check_range(vdi, self._range, f"number {len(self)}")
         packed = vdi.with_precision(self._precision)
         if isinstance(packed, DeferredVDI):
-            if self._tolerance:
-                raise InvalidArgumentError(
-                    f"a tolerance is of colours and opacities, which a DeferredVDI does not have; "
-                    f"got {self._tolerance}: leave it out"
-                )
+            self.require_no_tolerance()
             new = self._written(packed.lists, packed.about)
         else:
             new = self._written(packed)
@@ -191,6 +187,14 @@ class StepsWriter:
                 self._known = [new]
             elif new.depth < MOST_DECODED:
                 self._known = [self._known[0], new]
+
+    def require_no_tolerance(self) -> None:
+        """Raise InvalidArgumentError where steps keep values, which a tolerance is not for."""
+        if self._tolerance:
+            raise InvalidArgumentError(
+                "a tolerance is of colours and opacities, which a DeferredVDI does not have; "
+                f"got {self._tolerance}: leave it out"
+            )
 
     def finish(self, stream: BinaryIO) -> None:
         """Write the index."""

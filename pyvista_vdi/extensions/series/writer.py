@@ -106,6 +106,8 @@ class SeriesWriter:
                 "SeriesWriter", camera, window_size, precision, device=device, **options
             )
         self._steps = StepsWriter(precision, tolerance, key_every, compression, level)
+        if self._make is not None and self._make.deferral.deferred:
+            self._steps.require_no_tolerance()
         self.path = check_writable(with_suffix(as_path(path), (layout.SUFFIX,), "a series"))
         self._begun = Begun.of(self.path, append, overwrite)
         if self._begun is None:
@@ -113,6 +115,8 @@ class SeriesWriter:
                 self._steps.begin(stream)
         else:
             self._steps.go_on(self._begun)
+            if self._make is not None:
+                self._begun.check_kept(self._make.deferral)
         self._stream: BinaryIO | None = self.path.open("r+b")
         if self._begun is None:
             self._stream.seek(0, os.SEEK_END)

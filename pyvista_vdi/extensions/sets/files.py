@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.extensions.series.layout import index_bytes
 from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
+from pyvista_vdi.extensions.series.series import refuse_look
 from pyvista_vdi.extensions.series.steps_writer import StepsWriter
 from pyvista_vdi.extensions.series.steps_writer import write_all as write_parts
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
@@ -70,6 +71,7 @@ class SetReader(StepsReader):
 
 def save(vdi_set: VDISet, path: str | os.PathLike[str], **options: Any) -> Path:
     """Write a file of a set, or a page that shows it: see :meth:`VDISet.save`."""
+    refuse_look(vdi_set, options)
     found = format_named(path)
     if found is not None and found.page:
         as_vdi(vdi_set[0])  # refuses what has no colours

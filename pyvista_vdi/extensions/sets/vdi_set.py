@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol, overload
 
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
-from pyvista_vdi.extensions.series.series import Called, as_step, check_range, range_of
+from pyvista_vdi.extensions.series.series import Made, as_step, check_range, range_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.collection import VDICollection
@@ -49,7 +48,8 @@ class VDISet(VDICollection):
     """The VDIs of one scene from many views V_O: a sequence of :class:`VDI`.
 
     Made by :func:`pyvista_vdi.generate_set`, by :func:`pyvista_vdi.read` from a ``.vdiset`` file,
-    whose VDIs are decoded when they are asked for, or by :meth:`of` from VDIs at hand.
+    whose VDIs are decoded when they are asked for, or by :meth:`of` from VDIs at hand; one that was
+    read is pickled as the name of its file.
     :func:`pyvista_vdi.render`, :func:`pyvista_vdi.pick` and ``Plotter.add_vdi`` take it as they
     take a VDI, and look at that which was made nearest to the view.
 
@@ -207,9 +207,8 @@ class VDISet(VDICollection):
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISet:
         """Return a set of what a function makes of each VDI, when that is asked for."""
-        make = lru_cache(_KEPT)(lambda i: function(self[i]))
         found = VDISet(
-            Called(make, range(len(self))),
+            Made(function, self, _KEPT),
             self.cameras,
             window_size=self.window_size,
             bounds=self.bounds,
@@ -369,7 +368,7 @@ class VDISet(VDICollection):
         VDIFileError
             If the target cannot be written.
         InvalidArgumentError
-            If an option is out of its range.
+            If an option is out of its range, or one is a look, which :meth:`classified` takes.
         """
         return registry.method("VDISet.save")(self, path, **options)  # type: ignore[no-any-return]
 

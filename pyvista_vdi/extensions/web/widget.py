@@ -324,7 +324,13 @@ class VDIWidget(anywidget.AnyWidget):
             self._begun = vdi.classified(**self._first_look)
             return vdi
         if isinstance(vdi, VDISeries | VDISet):
-            as_vdi(vdi[0])  # refuses what has no colours
+            if vdi.value_range is not None:
+                of = "series" if isinstance(vdi, VDISeries) else "set"
+                raise InvalidVDIError(
+                    f"this {of} keeps values, which have no colours yet, and a widget edits those "
+                    f"of one VDI alone: pass {of}.classified(cmap=..., opacity=...)"
+                )
+            as_vdi(vdi[0])
             return vdi
         return as_vdi(vdi)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, warn_external
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, warn_external
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
@@ -85,7 +85,15 @@ class VDIActorMethods(PlayingMethods):
 
     @vdi.setter
     def vdi(self: Any, vdi: VDI) -> None:
-        self._mapper_for(" that could show a VDI").SetVDI(vdi)
+        mapper = self._mapper_for(" that could show a VDI")
+        given: Any = vdi
+        if isinstance(given, DeferredVDI):
+            raise InvalidVDIError(
+                "a DeferredVDI has no colours yet: set actor.vdi = vdi.classified(cmap=..., "
+                "opacity=...), or add it by plotter.add_vdi(vdi, cmap=..., opacity=...), whose "
+                "look can be changed"
+            )
+        mapper.SetVDI(vdi)
 
     @property
     def deferred(self: Any) -> DeferredVDI | None:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.errors import InvalidVDIError, warn_external
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
@@ -22,6 +23,9 @@ from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_p
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build
+
+#: What of a transfer function no list of values can honour, and how a property has it.
+_OF_GRADIENTS = {"shading": "shading (shade = True)", "gradient_opacities": "gradient opacity"}
 
 
 class Input:
@@ -292,13 +296,25 @@ class DeferredInput(Input):
         super().__init__()
         self.deferred, self.prop = deferred, prop
         self._made_at: Any = None
+        self._look: TransferFunction | None = None  # of the VDI that was made last
+        self._left_out: list[str] = []
 
     def vdi(self) -> VDI:
-        """Return the VDI that the property makes of the values now."""
+        """Return the VDI that the property makes of the values now; warn of what it leaves out."""
         stamp = self.stamp()
         if self._vdi is None or self._made_at != stamp:
             look = transfer_function_from_property(self.prop)
-            self._vdi = classify_on_device(self.deferred, look)
+            asked = [name for name in _OF_GRADIENTS if getattr(look, name) is not None]
+            look = look.replace(**dict.fromkeys(asked))
+            if asked and asked != self._left_out:
+                warn_external(
+                    f"{' and '.join(_OF_GRADIENTS[name] for name in asked)} of the volume property "
+                    "needs gradients, which a deferred VDI does not keep: it is drawn without; "
+                    "switch it off, or add the volume without classification='deferred'"
+                )
+            self._left_out = asked
+            if self._vdi is None or self._look != look:  # the time stamp alone says little
+                self._vdi, self._look = classify_on_device(self.deferred, look), look
             self._made_at = stamp
         return self._vdi
 

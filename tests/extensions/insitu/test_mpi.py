@@ -277,6 +277,13 @@ def test_what_an_earlier_run_wrote_is_kept_or_gone_on_with(name, tmp_path, scene
         ),
         ("x.vdis", (8, 8), {"clim": (0, 1)}, InvalidArgumentError, "three whole numbers"),
         ("x.vdis", (8, 8, 8), {"clim": (0, 1), "colour": "red"}, TypeError, "colour"),
+        (
+            "x.vdis",
+            (8, 8, 8),
+            {"classification": "deferred", "value_range": (3, 1)},
+            InvalidArgumentError,
+            "value_range must be",
+        ),
     ],
 )
 def test_what_is_missing_is_said(name, dimensions, options, error, message, tmp_path):

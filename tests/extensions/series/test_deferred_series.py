@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -83,6 +84,30 @@ def test_a_look_is_that_of_each_step_alone_and_of_one_range(alone, saved):
         pvdi.read(saved).classified(colourmap="bone")
 
 
+def test_it_is_pickled_by_the_name_of_its_file(alone, saved, tmp_path, monkeypatch):
+    def again(series):
+        return pickle.loads(pickle.dumps(series))
+
+    with monkeypatch.context() as elsewhere:
+        elsewhere.chdir(saved.parent)
+        series = pvdi.read(saved.name)
+    assert len(pickle.dumps(series)) < 1000
+    assert again(series).times == TIMES
+    assert all_equal(again(series), alone)
+    assert all_equal(again(series[1:3]), alone[1:3])
+    shown = [step.classified(**LOOK) for step in alone]
+    assert all_equal(again(series.classified(**LOOK)), shown)
+    assert all_equal(again(series.classified(**LOOK)[2:]), shown[2:])
+    made = pvdi.generate_series(list(volumes()), CAMERA, SIZE, TIMES, **KEPT)
+    assert again(made).generate(2).equals(alone[2])
+    moved = tmp_path / "moved.vdis"
+    moved.write_bytes(saved.read_bytes())
+    pickled = pickle.dumps(pvdi.read(moved))
+    moved.unlink()
+    with pytest.raises(VDIFileError, match=r"moved\.vdis cannot be read"):
+        pickle.loads(pickled)
+
+
 def test_without_a_range_that_of_the_first_step_is_all_s(default_runtime):
     series = pvdi.generate_series(
         [pvdi.Volume(np.arange(64.0).reshape(4, 4, 4) * k) for k in (1, 2)],
@@ -113,10 +138,58 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
         pvdi.VDISeries.of([alone[0], other])
 
 
+@pytest.mark.parametrize(
+    ("kept", "says"),
+    [
+        ({"value_range": (3, 1)}, r"value_range must be.*\(3, 1\)"),
+        ({"value_range": "wide"}, "value_range must be.*wide"),
+        ({"importance": [1, -1]}, "importance must be"),
+        ({"value_range": RANGE, "importance": [(0, 0), (300, 0)]}, "importance is 0 over all"),
+        ({"importance": "much"}, "importance must be.*much"),
+        ({"tolerance": 0.1}, "a tolerance is of colours"),
+        ({"precision": "16-byte"}, "no 16-byte supersegments"),
+        ({"ambient_occlusion": pvdi.AmbientOcclusion()}, "ambient occlusion follows"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused_before_anything_is_written(kept, says, tmp_path):
+    with pytest.raises((InvalidArgumentError, UnsupportedError), match=says):
+        pvdi.SeriesWriter(tmp_path / "a.vdis", CAMERA, SIZE, classification="deferred", **kept)
+    assert not list(tmp_path.iterdir())
+    points = {"classification": "deferred", "importance": [(500, 0), (600, 1)]}
+    pvdi.SeriesWriter(tmp_path / "a.vdis", CAMERA, SIZE, **points).close()  # the range is a step's
+
+
+def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
+    path = tmp_path / "run.vdis"
+    path.write_bytes(saved.read_bytes())
+    for importance in ([2, 1], None):
+        kept = {**KEPT, "importance": importance}
+        with pytest.raises(
+            InvalidArgumentError, match=r"importance=\(\(20\.0, 1\.0\), .*same only"
+        ):
+            pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **kept)
+    other = pvdi.DeferredVDI.of_lists(alone[0].lists, {**alone[0].about, "importance": None})
+    with (
+        pvdi.SeriesWriter(path, append=True) as out,
+        pytest.raises(InvalidArgumentError, match="same only; got None"),
+    ):
+        out.append(other, 9.0)
+    assert path.read_bytes() == saved.read_bytes()
+    with pytest.raises(InvalidVDIError, match="this run keeps values from 0"):
+        pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **{**KEPT, "value_range": (0, 9)})
+    with pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT) as out:
+        out.append(next(volumes()), 9.0)
+    assert len(pvdi.read(path)) == 5
+
+
 def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
     series = pvdi.VDISeries.of(alone)
     with pytest.raises(InvalidVDIError, match="no colours yet"):
         series.save(tmp_path / "run.html")
+    for vdis, says in ((series, "classified"), (series.classified(**LOOK), "colours already")):
+        for name in ("run.vdis", "run.html"):
+            with pytest.raises(InvalidArgumentError, match=rf"cmap, opacity: .*{says}"):
+                vdis.save(tmp_path / name, cmap="bone", opacity="linear")
     with pytest.raises(InvalidArgumentError, match="tolerance"):
         series.save(tmp_path / "run.vdis", tolerance=0.01)
     with pytest.raises(UnsupportedError, match="16-byte"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from command_line import complaint, run
@@ -48,6 +50,8 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path, 
     view = CAMERA.azimuth(12)
     expected = pvdi.render(baked, view)
     assert np.array_equal(pvdi.render(found.classified(**LOOK), view), expected)
+    pickled = pickle.loads(pickle.dumps(found.classified(**LOOK)))
+    assert np.array_equal(pvdi.render(pickled, view), expected)
     assert np.array_equal(pvdi.render(found, view, **LOOK), expected)
     picked = [pvdi.pick(each, view, (30, 25), **LOOK) for each in (found, views[0])]
     assert picked[0] == picked[1]
@@ -64,6 +68,14 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path, 
     assert "no colours yet" in complaint(capsys, "convert", saved, "-o", tmp_path / "a.html")
     run(capsys, "convert", saved, "-o", tmp_path / "a.vdiset", "--cmap", "bone")
     assert pvdi.read(tmp_path / "a.vdiset").value_range is None
+    for verb, target in (("render", "-o"), ("view", "--screenshot")):
+        picture = tmp_path / f"{verb}.png"
+        assert "no colours yet: give --cmap" in complaint(capsys, verb, saved, target, picture)
+        run(capsys, verb, saved, target, picture, "--cmap", "bone")
+        message = complaint(
+            capsys, verb, tmp_path / "a.vdiset", target, picture, "--opacity", "linear"
+        )
+        assert "has its look, and --opacity linear" in message
 
 
 def test_its_property_is_followed_in_a_plotter(plotter, saved):

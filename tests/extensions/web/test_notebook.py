@@ -518,8 +518,10 @@ def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget, tmp_
     apart = np.abs(picture(page, SIZE, "viewers[0]") / 255 - packed).max(axis=2)
     assert np.mean(apart <= 2 / 255) >= 0.999  # as of what has colours
     assert page.page.get_by_label("Transfer function and clipping").count()
-    with pytest.raises(pvdi.InvalidVDIError, match="classified"):
-        VDIWidget(pvdi.VDISeries.of([kept]))
+    several = {"series": pvdi.VDISeries.of([kept]), "set": pvdi.VDISet.of([kept])}
+    for name, vdis in several.items():
+        with pytest.raises(pvdi.InvalidVDIError, match=rf"this {name} keeps.*{name}\.classified"):
+            VDIWidget(vdis, **look)
     widget.close()
 
 
