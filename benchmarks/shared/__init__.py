@@ -47,6 +47,8 @@ def parser_of(
         help="cases that speak for all, in five minutes at most on two cores (default)",
     )
     extent.add_argument("--whole", action="store_true", help="every case")
+    help_of_only = "every case with this in its name (may be repeated), as a sample"
+    extent.add_argument("--only", action="append", default=[], metavar="TEXT", help=help_of_only)
     parser.set_defaults(whole=False)
     parser.add_argument("--out", type=Path, default=RESULTS, metavar="FOLDER")
     parser.add_argument("--redo", action="store_true", help="measure what is there as well")
@@ -73,13 +75,18 @@ def execute(
 ) -> Results:
     """Measure a sample of the cases, or all, and write ``KIND.json`` and ``.md`` (``_sample``).
 
-    Cases whose volume is not at hand are left out and named. A sample is ``drawn``, or has
-    ``count`` of them by the strata of ``key``, or without a key all cases of so many scenes (volume
-    and look), which can be compared. ``rooms`` are those whose code decides the figures; ``report``
-    yields the lines of the tables, of the results and of all cases.
+    Cases whose volume is not at hand are left out and named. A sample is of those that ``--only``
+    names, or ``drawn``, or has ``count`` of them by the strata of ``key``, or without a key all
+    cases of so many scenes (volume and look), which can be compared. ``rooms`` are those whose code
+    decides the figures; ``report`` yields the lines of the tables, of the results and of all cases.
     """
     every = at_hand(cases)
-    if options.whole or drawn:
+    if options.only:
+        chosen = [case for case in every if any(text in case.name for text in options.only)]
+        if not chosen:
+            names = ", ".join(repr(case.name) for case in every[:3])
+            raise SystemExit(f"No case has any of {options.only} in its name: they are {names} ...")
+    elif options.whole or drawn:
         chosen = every if options.whole else list(drawn)
     elif key is not None:
         chosen = sample(every, count, key)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import lru_cache
 from importlib.resources import files
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from pyvista_vdi.device import Profile, Runtime
@@ -123,26 +123,40 @@ def provenance(rooms: Iterable[str]) -> dict[str, Any]:
 def room_hash(room: str) -> str:
     """Return the first 16 digits of the SHA-256 of a room's kernels and modules.
 
-    Comments, docstrings and white space do not count: they change no figure.
-
-    Raises InvalidArgumentError if there is no such room.
+    See :func:`sources_hash`. Raises InvalidArgumentError if there is no such room.
     """
-    digest = hashlib.sha256()
     package, kernels = (Path(str(files(name))) for name in ("pyvista_vdi", "pyvista_vdi.opencl"))
-    found = [
-        (f"{kind}{path.relative_to(folder).as_posix()}", path)
+    found = {
+        f"{kind}{path.relative_to(folder).as_posix()}": path.read_text(encoding="utf-8")
         for kind, folder in (("", package / room), ("opencl/", kernels / room))
         for path in folder.rglob("*")
         if path.suffix in _STRIPPED and "__pycache__" not in path.parts
-    ]
+    }
     if not found:
         raise InvalidArgumentError(
             f"{room!r} is no folder of pyvista_vdi/ or opencl/: name one, such as 'raycasting'"
         )
-    for name, path in sorted(found):
-        text = _STRIPPED[path.suffix](path.read_text(encoding="utf-8"))
-        digest.update(f"{name}\0{' '.join(text.split())}\0".encode())
+    return sources_hash(found)
+
+
+def sources_hash(sources: Mapping[str, str]) -> str:
+    """Return the first 16 digits of the SHA-256 of sources, texts by their paths in a room.
+
+    Kernels' paths begin with ``opencl/``. Comments, docstrings and white space do not count: they
+    change no figure. Nor do files that are neither kernels nor modules.
+    """
+    digest = hashlib.sha256()
+    for name, text in sorted(sources.items()):
+        suffix = PurePosixPath(name).suffix
+        if suffix in _STRIPPED:
+            digest.update(f"{name}\0{_words(suffix, text)}\0".encode())
     return digest.hexdigest()[:16]
+
+
+@lru_cache(maxsize=2**12)  # most sources are the same in many commits
+def _words(suffix: str, text: str) -> str:
+    """Return what of a source counts, a space between any two words."""
+    return " ".join(_STRIPPED[suffix](text).split())
 
 
 def outdated(measured: Mapping[str, Any]) -> list[str]:

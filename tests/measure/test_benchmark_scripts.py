@@ -192,6 +192,14 @@ def test_a_sample_is_measured_once_and_the_whole_is_another_file(no_data, tmp_pa
     assert (tmp_path / "asked.md").read_text().startswith("# asked\n\n12 of 12 cases.\n\n2.5\n")
 
 
+def test_only_cases_that_are_named(no_data, tmp_path):
+    measured = []
+    assert run(tmp_path, measured, only=["steep, case 3", "case 5"]).data["extent"] == "sample"
+    assert measured == ["brain, steep, case 3", "brain, soft, case 5", "brain, steep, case 5"]
+    with pytest.raises(SystemExit, match="No case has any of .'case 7'. in its name: they are"):
+        run(tmp_path, [], only=["case 7"])
+
+
 def test_a_sample_of_scenes_has_all_cases_of_each(no_data, tmp_path):
     cases = [Case("brain", look, what=f"case {k}") for k in range(3) for look in "abcdef"]
     found = shared.execute(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import shutil
+import subprocess
 import sys
 from importlib.resources import files
 from pathlib import Path
@@ -75,11 +76,18 @@ def test_figures_hold_what_every_picture_passes_through():
     assert (found["commit"] is None) or (place.parent / ".git").exists()
 
 
-@pytest.mark.skipif(not TOOL.is_file(), reason="tools/ is not beside the tests")
-def test_the_check_names_figures_older_than_what_they_measured(tmp_path):
+@pytest.fixture
+def tool():
+    """tools/figures.py as a module."""
+    if not TOOL.is_file():
+        pytest.skip("tools/ is not beside the tests")
     specification = importlib.util.spec_from_file_location("figures", TOOL)
     tool = sys.modules["figures"] = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(tool)
+    return tool
+
+
+def test_the_check_names_figures_older_than_what_they_measured(tool, tmp_path):
     measured = clock.provenance(["raycasting"])
     (tmp_path / "now.json").write_text(json.dumps({"measured": measured}))
     measured["sources"]["raycasting"] = "0" * 16
@@ -101,3 +109,40 @@ def test_the_check_names_figures_older_than_what_they_measured(tmp_path):
         "docs/a.md:2": ("whatever it measured: its results are not kept",),
         "docs/decisions/b.md:1": ("volume",),  # of a commit that is not there
     }
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not there")
+def test_a_figure_is_as_old_as_its_latest_sample(package, tool, tmp_path):
+    def committed():
+        git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b"]
+        for command in (["init", "-q"], ["add", "."], ["commit", "-qm", "a"]):
+            subprocess.run([*git, *command], check=True)
+        command = [*git, "rev-parse", "--short=9", "HEAD"]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    (tmp_path / "docs").mkdir()
+    before = {"sources": {"room": clock.room_hash("room")}}
+    (tmp_path / "old.json").write_text(json.dumps({"measured": before}))
+    first = committed()
+    kernel = package[1] / "half.cl"
+    kernel.write_text(kernel.read_text().replace("x / 2", "x * .5f"))
+    second = committed()
+    kernel.write_text(kernel.read_text() + "// a remark more\n")
+    marks = [
+        f"measured: {first} room",
+        f"measured: {second} room",
+        f"measured: {first} room (a sample at {second}: SSIM within .0003)",
+        f"measured: {second} room (a sample at {first}: SSIM within .0003)",
+        "figures: old.json",
+        f"figures: old.json (a sample at {second}: within 3 %)",
+        "figures: old.json (needs a GPU)",
+        f"measured: {second} room (a sample of two cases)",
+    ]
+    (tmp_path / "README.md").write_text("".join(f"<!-- {mark} -->\n" for mark in marks))
+    found = list(tool.figures(tmp_path))
+    assert [each.older_than for each in found[:-1]] == [
+        *(("room",), (), (), ("room",)),
+        *(("room",), (), ("room",)),
+    ]
+    assert "neither a sample nor" in found[-1].older_than[0]
+    assert [each.needs_gpu for each in found] == [False] * 6 + [True, False]
