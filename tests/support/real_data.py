@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
 from pyvista_vdi import examples
 from pyvista_vdi.errors import DataNotFoundError
+
+#: Whether hours are taken in place of a sample: all cases of the standard table, 10,000 frames.
+TEST_WHOLE = os.environ.get("PYVISTA_VDI_TEST_WHOLE") == "1"
 
 
 def require_data(name, *, as_volume=True):
