@@ -6,8 +6,7 @@ PYVISTA_VDI_TEST_DEVICES
     Comma separated parts of "platform / device": tests that need a device run on those that
     contain one; "all": on every usable one. By default on the one that users get.
 PYVISTA_VDI_TEST_WHOLE
-    "1": the slow tests measure all cases of the standard table and draw 10,000 frames, which takes
-    more than an hour, in place of samples.
+    "1": the slow tests measure all cases of the standard table, an hour, in place of a sample.
 PYVISTA_VDI_REQUIRE_DEVICE
     "1": having no usable device is a failure, as in CI; otherwise such tests are skipped.
 PYVISTA_VDI_REQUIRE_INSTALLED

@@ -9,7 +9,7 @@ import pytest
 from pyvista_vdi import examples
 from pyvista_vdi.errors import DataNotFoundError
 
-#: Whether hours are taken in place of a sample: all cases of the standard table, 10,000 frames.
+#: Whether an hour is taken for all cases of the standard table in place of a sample.
 TEST_WHOLE = os.environ.get("PYVISTA_VDI_TEST_WHOLE") == "1"
 
 

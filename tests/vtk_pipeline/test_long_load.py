@@ -7,7 +7,6 @@ import sys
 
 import pytest
 from long_load import BOUND, Load, Outcome, Sample
-from real_data import TEST_WHOLE
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
@@ -31,12 +30,11 @@ def test_a_hundred_and_twenty_frames(default_runtime):
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_thousands_of_frames(default_runtime):
-    """Nightly 3,000, of which the last fifth may hold 16 MiB more: 8 KiB a frame and less pass."""
-    frames = 10_000 if TEST_WHOLE else 3_000
-    outcome = Load(frames).run()
+def test_ten_thousand_frames(default_runtime):
+    """Of 3,000 the allocator's own memory still grows by 30 MB."""
+    outcome = Load(10_000).run()
     assert outcome.troubles() == []
-    assert outcome.generations > frames // 50
+    assert outcome.generations > 200
 
 
 @pytest.mark.parametrize("name", ["resident", "device", "files", "threads", "error", "nan", "left"])
