@@ -251,7 +251,7 @@ def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
 
 
 def _refuse_deferral(vdi: VDI | DeferredVDI, deferral: Deferral) -> None:
-    """Say that what is kept was decided when a VDI was made of the volume."""
+    """Refuse to change what is kept: it was decided when a VDI was made of the volume."""
     names = ", ".join(sorted(deferral.given))
     if isinstance(vdi, DeferredVDI):
         low, high = vdi.value_range
