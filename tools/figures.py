@@ -99,9 +99,8 @@ def changed_since(checkout: Path, commit: str, rooms: tuple[str, ...]) -> tuple[
 def room_then(checkout: Path, commit: str, room: str) -> str | None:
     """Return the hash of a commit's folder, as results have it; ``None`` without the commit."""
 
-    def git(*command: str, given: bytes = b"") -> bytes:
-        found = subprocess.run(["git", "-C", checkout, *command], input=given, capture_output=True)
-        return found.stdout
+    def git(*command: str) -> bytes:
+        return subprocess.run(["git", "-C", checkout, *command], capture_output=True).stdout
 
     folders = {f"pyvista_vdi/{room}/": "", f"opencl/{room}/": "opencl/"}
     sources = {}

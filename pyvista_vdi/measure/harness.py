@@ -416,7 +416,7 @@ class Bench:
 
         Each of another view, a ten-thousandth of a degree on, and left on the device: what the
         host does for a frame is in it, what brings its picture there is not. ``made``: the VDI as
-        ``exact``, and packed by its precisions, as :meth:`timed_generation` returns it.
+        ``exact``, and packed by its precisions.
         """
         prepared = {precision: prepared_vdi(self.runtime, vdi) for precision, vdi in made.items()}
         views = [camera.azimuth(1e-4 * n) for n in range(count)]
@@ -438,7 +438,7 @@ class Bench:
                 "volume": partial(frames, draw_medium, media[False], plain),
                 "volume_skipping": partial(frames, draw_medium, media[True], requests),
             }
-            for precision in made.keys() - {"exact"}:
+            for precision in [name for name in made if name != "exact"]:
                 work[f"vdi_{precision}"] = partial(frames, draw, prepared[precision], requests)
             times = take_turns(work, _QUEUES, warm_up=False)
         return {name: statistics.median(taken["clock"]) / count for name, taken in times.items()}

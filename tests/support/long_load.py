@@ -83,9 +83,8 @@ class Outcome:
             early, late = self.grown(name)
             if late > early + (RESIDENT_GROWTH if name == "resident" else 0):
                 found.append(f"{name} grew from {early} to {late}")
-        # Less than nothing: what was there before this run has been let go of meanwhile
-        left = max(s.device for s in self.between)
-        if left > 0:
+        left = sorted({s.device for s in self.between})
+        if left != [0]:
             found.append(f"{left} bytes stayed on the device when a volume was removed")
         if not self.worst_error <= BOUND:
             found.append(f"the error reached {self.worst_error:.3g}, the bound is {BOUND}")
