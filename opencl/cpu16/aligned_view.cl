@@ -11,9 +11,8 @@
 #define LANES 16
 #include "lib/compositing.cl"
 #include "lib/transpose.cl"
-#include "lib/list_space.cl"
+#include "cpu16/codes.cl"
 #include "raycasting/frame.cl"
-#include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Lane p * PACKET_BUNDLES + n has place p in the n-th bundle: vectors of bundles become vectors of
@@ -172,16 +171,6 @@ inline float8 faces_of_bundle(__global const ulong *faces, const PacketLists *li
     return vload8(0, (__global const float *)(faces + entry_at(lists, n, k)));
 }
 
-// depth_of_code of raycasting/supersegments.cl.
-inline Real depths_of_codes(const Lists *in, const PacketLists *lists, Uint codes,
-                            float depth_origin)
-{
-    const Real offset =
-        TO_REAL(lists->origin + AS_INT(codes & DEPTH_CODES) * lists->stride) * in->depth_step;
-    const Real before = DEPTH == PARALLEL ? offset : fmax(offset, in->nearest_offset);
-    return depth_coordinate(before, depth_origin);
-}
-
 // The k-th supersegments of all lists.
 inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k,
                                 float depth_origin)
@@ -205,8 +194,9 @@ inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k
                      from[at_lane[12]], from[at_lane[13]], from[at_lane[14]], from[at_lane[15]]));
         at.words[0] = (Uint)(low_lanes.even, high_lanes.even);
         at.words[1] = (Uint)(low_lanes.odd, high_lanes.odd);
-        at.front = depths_of_codes(in, lists, at.words[0], depth_origin);
-        at.back = depths_of_codes(in, lists, at.words[0] >> 14, depth_origin);
+        at.front = depths_of_codes(in, lists->origin, lists->stride, at.words[0], depth_origin);
+        at.back =
+            depths_of_codes(in, lists->origin, lists->stride, at.words[0] >> 14, depth_origin);
     } else {
         const Real of_01 = (Real)(faces_of_bundle(in->faces, lists, 0, k),
                                   faces_of_bundle(in->faces, lists, 1, k));
@@ -218,22 +208,12 @@ inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k
     return at;
 }
 
-// Their media: medium_of of raycasting/supersegments.cl.
+// Their media.
 inline Real4 packet_media(const Lists *in, const PacketLists *lists, int k, PacketFaces at)
 {
     if (PACKED == 0)
         return numbers_at(in->media, lists, k);
-    const Uint low = at.words[0], high = at.words[1];
-    if (PACKED == 16)
-        return REAL4(TO_REAL(high & 2047) * (1.0f / 2047.0f),
-                     TO_REAL(high >> 11 & 2047) * (1.0f / 2047.0f),
-                     TO_REAL(high >> 22) * (1.0f / 1023.0f), AS_REAL(low));
-    const Uint tau = low >> 28 | (high & 255) << 4;
-    const Uint thickness = (low >> 14 & DEPTH_CODES) - (low & DEPTH_CODES);
-    const Real optical_depth = select((Real)(0.0f), AS_REAL((tau + TAU_BASE - 1) << 16), tau > 0);
-    return REAL4(TO_REAL(high >> 8 & 255) * (1.0f / 255.0f),
-                 TO_REAL(high >> 16 & 255) * (1.0f / 255.0f), TO_REAL(high >> 24) * (1.0f / 255.0f),
-                 fmin(optical_depth * lists->per_code / TO_REAL(thickness), FLT_MAX));
+    return media_of_words(at.words[0], at.words[1], lists->per_code);
 }
 
 KERNEL_OF_LANES void raycast_aligned_view(

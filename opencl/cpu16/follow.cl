@@ -21,7 +21,7 @@ __attribute__((always_inline)) inline void follow(Made *made, const Paths *paths
             if (!ANY(at.active))
                 break;
         }
-        Crossings crossing = next_crossings(&at, paths, &sense, lists);
+        Crossings crossing = next_crossings(&at, paths, &sense, lists, frame->depth_origin);
         if (ANY(crossing.meets)) {
             Real from, to;
             const Real4 medium = media_crossed(&at, &crossing, &sense, lists, &from, &to);

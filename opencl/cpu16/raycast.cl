@@ -1,7 +1,6 @@
 // The picture of raycasting/raycast.cl, a block of 4 x 4 rays in a work-item
 // (docs/decisions/blocks.md).
 #define LANES 16
-#define PACKED 0
 #define OFFSET_T int
 #include "cpu16/walk.cl"
 #include "lib/compositing.cl"

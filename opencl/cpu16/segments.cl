@@ -1,6 +1,5 @@
 // The segments of multi_vdi/segments.cl, a block of 4 x 4 rays in a work-item.
 #define LANES 16
-#define PACKED 0
 #define OFFSET_T int
 #define SEGMENT_ROWS 1
 #include "cpu16/walk.cl"

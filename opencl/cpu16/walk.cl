@@ -2,7 +2,7 @@
 // go away from V_O or come back: each turn, each ray makes a guess, meets a supersegment or leaves
 // a list, or the last two.
 //
-// Lists are of supersegments of 24 bytes, with OFFSET_T int. What one ray has, and sixteen:
+// Offsets are OFFSET_T int. What one ray has, and sixteen:
 //
 //   raycasting/walk.cl         here
 //   Path, begin_path           Paths, begin_paths; a Sense beside them, as all share `away`
@@ -144,12 +144,12 @@ typedef struct {
 } Crossings;
 
 inline Crossings next_crossings(Cursors *at, const Paths *paths, const Sense *sense,
-                                const Lists *lists)
+                                const Lists *lists, float depth_origin)
 {
     Crossings crossing;
     crossing.list = lists_at(lists, at->i, at->j, at->active);
     crossing.found = search_on(&at->search, lists, &crossing.list, at->depth, at->active,
-                               sense->away, &crossing.face);
+                               sense->away, depth_origin, &crossing.face);
     crossing.r_u = crossings(&paths->u, at->i);
     crossing.r_v = crossings(&paths->v, at->j);
     crossing.r_next = HIGHER_OF(

@@ -125,6 +125,8 @@ class Device(Turns):
         self.info: DeviceInfo = candidate.info
         self.is_cpu = candidate.info.kind == "CPU"
         self._device = candidate.device
+        #: Floats of its longest vectors.
+        self.vector_floats = int(candidate.device.native_vector_width_float)
         self.cl: Any = opencl()
         try:
             self._context = context or self.cl.Context([self._device])

@@ -46,8 +46,8 @@ Pause: TypeAlias = Callable[[], object]
 TILES = 16
 TILE_SIZE = 24
 
-#: Most pixels of a coarse picture in one launch, so that a frame does not wait long for its end.
-_COARSE_LAUNCH = 2048
+#: Most pixels of a coarse picture in one launch: a frame may have to wait for its end.
+_COARSE_LAUNCH = 8192
 #: Distance of an eye from the centre, in diagonals of the bounds, below which it has no direction.
 _AT_CENTRE = 1e-6
 

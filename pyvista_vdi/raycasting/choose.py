@@ -48,13 +48,13 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     a picture   all else                                               ``raycast``, ONE_LIST=0
     ==========  =====================================================  ========================
 
-    Lists *suit blocks* that have 24-byte supersegments, offsets of 32 bits, and rays in float32. Of
-    pictures, *CPU* also means rays in float32, and sums that need not carry what they round off
-    (COMPENSATED below 2). The reasons are in docs/decisions/index.md.
+    Lists *suit blocks* that have offsets of 32 bits, and rays in float32. Of pictures, *CPU* also
+    means rays in float32, and sums that need not carry what they round off (COMPENSATED below 2).
+    The reasons are in docs/decisions/index.md.
     """
     prepared, options = scene.prepared, scene.options
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
-    depth = {"DEPTH": lists["DEPTH"]}
+    short = {"DEPTH": lists["DEPTH"], "PACKED": lists["PACKED"]}
     compensated = summation(options.preview_samples or prepared.most_media)
     sums = {"COMPENSATED": compensated}
     walk = {
@@ -62,7 +62,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         "SKIP_EMPTY": int(options.skip_empty and prepared.occupancy.worthwhile),
     }
     double_float, cropped = prepared.double_float, walk["CROPPED"]
-    suit_blocks = not double_float and not prepared.packed and not prepared.long_offsets
+    suit_blocks = not double_float and not prepared.long_offsets
 
     if options.preview_samples is not None:
         switches = {**lists, **sums, "CROPPED": cropped}
@@ -73,7 +73,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     # What rays cross of one of several VDIs
     if scene.segments and device.is_cpu and suit_blocks:
         blocks = kernels.SEGMENTS_OF_BLOCKS
-        return Variant(blocks, {**depth, **walk}, 0, GROUP // LANES, {}, LANES)
+        return Variant(blocks, {**short, **walk}, 0, GROUP // LANES, {}, LANES)
     if scene.segments:
         switches = {**lists, **walk, "SEGMENT_ROWS": int(device.is_cpu)}
         return Variant(kernels.SEGMENTS, switches, 0, GROUP, {})
@@ -109,14 +109,14 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
 
     # Rays that have many lists in common
-    packets = scene.packets(or_blocks=in_blocks) if uncropped else None
+    packets = scene.packets if uncropped else None
     if packets is not None:
         ways = {"UPRIGHT": int(packets.upright), "SWEEP_V": int(packets.sweep_v)}
         switches = {**lists, **sums, **ways, "SKIP_EMPTY": walk["SKIP_EMPTY"]}
         across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
         return Variant(kernels.RAYCAST_PACKETS, switches, packets.items, LANES, across, LANES)
     if in_blocks:
-        return by_columns(kernels.RAYCAST_BLOCKS, {**depth, **walk, **sums}, LANES)
+        return by_columns(kernels.RAYCAST_BLOCKS, {**short, **walk, **sums}, LANES)
     return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 0})
 
 

@@ -24,9 +24,8 @@ LANES = BLOCK_RAYS
 MARGIN = math.ceil(STEEPEST * LANES)
 #: Lists that a ray crosses before its light ends, over those that lie between a packet's first and
 #: last ray, from which packets are faster: what they have in common (docs/decisions/packets.md).
-LEAST_IN_COMMON = 4.5
-#: The same where rays that are not in packets cannot be in blocks, either.
-LEAST_IN_COMMON_WITHOUT_BLOCKS = 1.8
+#: Where a device has vectors of 16 floats, and where shorter ones, of which packets use more.
+LEAST_IN_COMMON, LEAST_IN_COMMON_OF_SHORT_VECTORS = 4.5, 10.0
 #: Pixels along the shorter edge of what is drawn from which packets are faster.
 LEAST_PIXELS = 200
 #: Lists of a VDI that are asked how far light gets in them; of values, which are classified for it.
@@ -48,27 +47,29 @@ class Packets(NamedTuple):
 
 
 def packets_of(
+    generating: Camera,
+    view: Camera,
     size: tuple[int, int],
     part: Rectangle,
     coordinates: NDArray[np.float64],
     planes: NDArray[np.float64],
-    epipole: NDArray[np.float64],
     lit: float,
     *,
-    or_blocks: bool,
+    long_vectors: bool,
 ) -> Packets | None:
     """Return the packets of a part of a frame; None if another kernel is faster.
 
     ``coordinates`` are the forms of (u, v, depth, denominator), float64 (4, 6), ``planes`` those
-    that rays are clipped to, float64 (n, 6). ``epipole`` is :func:`epipole_of`'s, and ``lit``
-    :func:`share_lit`'s. ``or_blocks``: whether rays that are in no packets are followed in blocks.
+    that rays are clipped to, float64 (n, 6). ``lit`` is :func:`share_lit`'s. ``long_vectors``:
+    whether the device's hold 16 floats.
     """
     if min(part.x1 - part.x0, part.y1 - part.y0) < LEAST_PIXELS:
         return None
+    epipole = epipole_of(generating, view, size)
     # The line through the window's centre leads along the rows, or along the columns
     upright = abs(epipole[1]) > abs(epipole[0])
     crossed, across_packet = _lists_crossed(size, coordinates, planes, upright)
-    least = LEAST_IN_COMMON if or_blocks else LEAST_IN_COMMON_WITHOUT_BLOCKS
+    least = LEAST_IN_COMMON if long_vectors else LEAST_IN_COMMON_OF_SHORT_VECTORS
     if lit * crossed.sum() < least * across_packet.sum():
         return None
     along, across = (part.x0, part.x1), (part.y0, part.y1)

@@ -18,7 +18,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.raycasting.kernels import FRAME
-from pyvista_vdi.raycasting.packets import LANES, Packets, epipole_of, packets_of
+from pyvista_vdi.raycasting.packets import LANES, Packets, packets_of
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
@@ -185,20 +185,19 @@ class Scene:
             in_bundles=prepared.packed != 8,
         )
 
-    def packets(self, *, or_blocks: bool) -> Packets | None:
-        """Return how the rays are dealt to packets; None if another kernel is faster.
-
-        ``or_blocks``: whether that is the one for blocks of 4 x 4 rays, or that for single rays.
-        """
+    @property
+    def packets(self) -> Packets | None:
+        """How the rays are dealt to packets; None if another kernel is faster."""
         forms = self.forms.astype(np.float64)
         return packets_of(
+            self.prepared.camera,
+            self.camera,
             self.size,
             self.part,
             forms[:_COORDINATE_FORMS],
             forms[PLANE_FORMS : PLANE_FORMS + self.planes],
-            epipole_of(self.prepared.camera, self.camera, self.size),
             self.prepared.lit,
-            or_blocks=or_blocks,
+            long_vectors=self.prepared.runtime.vector_floats >= 16,
         )
 
     @contextlib.contextmanager

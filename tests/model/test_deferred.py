@@ -173,6 +173,7 @@ def test_words_of_add_volume_classify_over_the_range_of_values():
     assert vdi.metadata["opacity_unit_distance"] == 2
 
 
+@pytest.mark.extension("deep_exr")
 def test_entrances_for_colours_name_the_remedy(tmp_path):
     made = deferred()
     for call in (
@@ -216,6 +217,7 @@ def test_render_takes_the_look(default_runtime):
     assert np.array_equal(both, pvdi.render([vdi, vdi], made.camera))
 
 
+@pytest.mark.extension("sets")
 def test_generating_a_set_of_values_is_refused_by_name():
     volume = pvdi.Volume(np.zeros((4, 4, 4), np.float32))
     with pytest.raises(TypeError, match="'classification': values in place of colours are kept by"):
@@ -262,6 +264,7 @@ def test_what_a_file_says_of_values_is_checked(key, value, says, tmp_path):
         pvdi.read(path)
 
 
+@pytest.mark.extension("deep_exr", "web")
 def test_convert_classifies_and_info_says_which_kind(tmp_path, capsys):
     pytest.importorskip("pyvista")
     path = deferred().save(tmp_path / "kept.vdi")

@@ -130,7 +130,9 @@ def test_it_is_refused_before_anything_is_generated(
         plotter.add_vdi(volume(), classification="deferred", **asked)
 
 
-@pytest.mark.parametrize("as_series", [False, True])
+@pytest.mark.parametrize(
+    "as_series", [False, pytest.param(True, marks=pytest.mark.extension("series"))]
+)
 def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, as_series):
     deferred = {"classification": "deferred", "value_range": (50, 200)}
     shown, kept = volume(), deferred
@@ -146,6 +148,7 @@ def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, 
     ]
 
 
+@pytest.mark.extension("series")
 def test_what_is_kept_cannot_be_said_of_a_vdi_nor_values_be_set_as_one(default_runtime, plotter):
     kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
     colours = kept.classified(cmap="bone")

@@ -180,6 +180,7 @@ def test_the_end_of_a_plotter_ends_the_reading(store):
         found._worker.put(None)
 
 
+@pytest.mark.extension("series")
 def test_the_dial_and_series_take_the_level_that_the_view_requires(store):
     far = pvdi.Camera(position=(31.5, 31.5, 900), focal_point=(31.5, 31.5, 31.5), view_up=(0, 1, 0))
     size, look = (40, 30), {"clim": (0, 255)}
@@ -194,6 +195,7 @@ def test_the_dial_and_series_take_the_level_that_the_view_requires(store):
     assert asked[0].bounds == pvdi.open_volume(store).bounds != chosen.bounds
 
 
+@pytest.mark.extension("sets")
 def test_a_set_takes_the_finest_level_that_a_view_requires(store):
     at = {"focal_point": (31.5, 31.5, 31.5), "view_up": (0, 1, 0)}
     near, far = (pvdi.Camera(position=(31.5, 31.5, 31.5 + d), **at) for d in (300, 900))

@@ -178,7 +178,7 @@ def deal_rays(patch, runtime, dealt):
     several VDIs; in the other ways rays that stay in lists of their own are drawn from these.
     """
     least = 0.0 if dealt == "packets" else math.inf
-    for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_WITHOUT_BLOCKS", "LEAST_PIXELS"):
+    for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_OF_SHORT_VECTORS", "LEAST_PIXELS"):
         patch.setattr(packets, name, least)
     if dealt == "one by one":
         patch.setattr(runtime, "is_cpu", False)
