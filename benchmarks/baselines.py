@@ -1,7 +1,7 @@
 """Rays in the world beside ours: time by N_S, lists, angle and emptiness; SSIM and memory.
 
 They (``baselines/``) draw the same VDI as ours; frames end on the host, raycast alone. Tests hold
-their pictures to the oracle. See docs/baselines.md, which has the paper's other baselines as well.
+their pictures to the oracle. docs/decisions/baselines.md has the paper's other baselines as well.
 """
 
 from __future__ import annotations

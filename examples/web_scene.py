@@ -16,7 +16,7 @@ import pyvista as pv
 
 from pyvista_vdi import examples
 
-target = Path(sys.argv[1] if len(sys.argv) > 1 else "web_scene.html")
+target = Path(sys.argv[1] if len(sys.argv) > 1 else "web_scene").with_suffix(".html")
 
 volume = examples.load_brain()
 x, y, z = volume.center

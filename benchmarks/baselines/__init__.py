@@ -1,1 +1,4 @@
-"""A renderer that the paper compares itself with, as an honest test renderer: docs/baselines.md."""
+"""A renderer that the paper compares itself with, as an honest test renderer.
+
+docs/decisions/baselines.md says which.
+"""
