@@ -456,11 +456,18 @@ PYTHON_MUTANTS = (
         ("raycasting",),
     ),
     _m(
-        "variant: packed lists are drawn in blocks",
-        CHOOSE,
-        "not double_float and not prepared.packed and not prepared.long_offsets",
-        "not double_float and not prepared.long_offsets",
-        ("raycasting", "model"),
+        "variant: vectors of 8 floats are taken for long",
+        SCENE,
+        "vector_floats >= 16",
+        "vector_floats >= 8",
+        ("raycasting",),
+    ),
+    _m(
+        "lists in vectors: the scale of codes is read from the word before",
+        "opencl/cpu16/lists.cl",
+        "list->first - 1, asks",
+        "list->first - 2, asks",
+        ("model",),
     ),
     _m(
         "variant: every view is taken for V_O's",

@@ -239,7 +239,7 @@ def test_the_same_question_has_the_same_answer(scene):
 
 
 def test_coarse_pictures_are_made_in_bands(scene):
-    vdi, camera, size = scene.vdi("coarse"), VIEW.azimuth(33), (400, 300)
+    vdi, camera, size = scene.vdi("coarse"), VIEW.azimuth(33), (1000, 750)
     calls = []
     scene.estimator().estimate(vdi, camera, size, pause=lambda: calls.append(1))
     assert len(calls) > 2 * TILES + 2
