@@ -61,13 +61,13 @@ def pressed(page, name, *keys):
 
 
 def tabbed(page):
-    """Where Tab goes from the picture, until it leaves the viewer."""
+    """Where Tab goes from the picture, until it leaves the viewer or is back, as in windows."""
     page.evaluate("viewer.shadowRoot.querySelector('canvas').focus()")
-    names = []
+    picture, names = page.evaluate(FOCUSED), []
     while True:
         page.page.keyboard.press("Tab")
         name = page.evaluate(FOCUSED)
-        if name is None:
+        if name in (None, picture):
             return names
         names.append(name)
         assert len(names) < 50
