@@ -137,8 +137,6 @@ def declared():
                 kinds = [str(kind).split(" if ") for kind in declaration.arguments.values()]
                 options = {each.removeprefix("not ") for kind in kinds for each in kind[1:]}
                 own = {"OFFSET_T": "int", **OPTIONS.get(room, {}), **OF_KERNELS.get(name, {})}
-                if name.endswith("BLOCKS"):  # of whole supersegments alone
-                    options = {each for each in options if "PACKED" not in each}
                 values = [dict([each.split("=")]) for each in sorted(options) if "=" in each]
                 valued = {key for each in values for key in each}
                 switches = {key: 1 for key in options if "=" not in key and key not in valued}

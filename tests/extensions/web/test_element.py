@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from browsers import COUNTING, in_base64
-from real_data import TEST_WHOLE
 from rewriting import described
 from skimage.io import imread
 
@@ -348,8 +347,7 @@ def test_elements_come_and_go(vdi, data, open_page):
 
 @pytest.mark.slow
 def test_memory_stays_flat_over_frames_and_swaps(data, open_page):
-    """2000 frames, or 10,000 with PYVISTA_VDI_TEST_WHOLE, and 200 other VDIs, whose textures
-    replace those before."""
+    """Ten thousand frames, and two hundred other VDIs, whose textures replace those before."""
     page = open_page((64, 36), before=COUNTING)
     page.load(data)
     page.evaluate(
@@ -379,7 +377,7 @@ def test_memory_stays_flat_over_frames_and_swaps(data, open_page):
 
     page.evaluate("use(500, 20)")
     objects, used = memory()
-    page.evaluate(f"use({10000 if TEST_WHOLE else 2000}, 200)")
+    page.evaluate("use(10000, 200)")
     objects_after, used_after = memory()
     assert objects_after == objects
     # Compiled code comes and goes. The 200 VDIs, if kept, would be some 40 MB
