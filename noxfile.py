@@ -39,7 +39,7 @@ def tests(session: nox.Session) -> None:
 @nox.session
 def coverage(session: nox.Session) -> None:
     """Run them and report the branch coverage of the package, all its processes counted."""
-    session.install(".[test]", "coverage>=7.10")
+    session.install("-e", ".[test]", "coverage>=7.10")
     folder = Path(session.create_tmp())
     settings = folder / "coveragerc"
     settings.write_text(
