@@ -13,6 +13,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any, TypeVar
 
+from pyvista_vdi import registry
 from pyvista_vdi.cli.text import mebibytes, plain_number, printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, stores, volumes
@@ -358,8 +359,22 @@ def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
     given = of_the_file(options)
+    written = format_named(options.output)
+    for name, argument in (
+        ("precision", "precision"),
+        ("standard_channels", "exact"),
+        ("linear", "linear"),
+    ):
+        if written is not None and argument not in written.write_options:
+            of = [each.suffix for each in registry.formats() if argument in each.write_options]
+            refuse(options, (name,), f"{' and '.join(of)}, not {printable(options.output)}")
     check_write_options(options.output, given)
     return given
+
+
+def keeps_values(found: Any) -> bool:
+    """Whether what was read keeps values, so that a look can be given."""
+    return getattr(found, "value_range", None) is not None
 
 
 def with_look(options: argparse.Namespace, found: Any, file: str, *, colors: bool = True) -> Any:
@@ -375,7 +390,7 @@ def look_for(
 
     Where it does not, a look is refused, and where ``colors`` are needed the lack of one.
     """
-    if getattr(found, "value_range", None) is not None:
+    if keeps_values(found):
         look = classification(options)
         if colors and not look:
             raise UnsupportedError(

@@ -15,12 +15,12 @@ from pyvista_vdi.cli.inputs import (
     classification,
     is_series,
     is_volume,
+    keeps_values,
     look_for,
     measuring,
     part,
     read_volume,
     refuse,
-    with_look,
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -47,7 +47,10 @@ def render(options: argparse.Namespace) -> int:
     with measuring("rendering") as bar:
         for k, file in enumerate(options.files):
             found = read(file, progress=part(bar, k * share, (k + 1) * share, "reading"))
-            vdis.append(with_look(options, _at(found, options.time), file))
+            vdis.append(_at(found, options.time))
+        # A look is for those that keep values, and is over the ranges of all of them
+        asks = next((k for k, vdi in enumerate(vdis) if keeps_values(vdi)), 0)
+        look = look_for(options, vdis[asks], options.files[asks])
         bar(0.5, "drawing")
         first = vdis[0]
         view = camera(options, first.camera)
@@ -60,6 +63,7 @@ def render(options: argparse.Namespace) -> int:
             model_transforms=transforms if several else None,
             transmittance_cutoff=options.transmittance_cutoff,
             device=options.device,
+            **look,
         )
     write_png(to_bytes(image, options.background), target)
     print(f"{printable(options.output)}: {image.shape[1]} x {image.shape[0]}")

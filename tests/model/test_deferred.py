@@ -290,7 +290,12 @@ def test_convert_classifies_and_info_says_which_kind(tmp_path, capsys):
     assert "has its look" in capsys.readouterr().err
     assert main(["convert", str(path), "-o", str(tmp_path / "none.exr")]) != 0
     assert "keeps values, which have no colours yet: give --cmap" in capsys.readouterr().err
-    assert main(["render", str(path), "-o", str(tmp_path / "none.png")]) != 0
+    seen, picture = str(tmp_path / "seen.vdi"), str(tmp_path / "none.png")
+    assert main(["render", str(path), "-o", picture]) != 0
     assert "give --cmap" in capsys.readouterr().err
+    # Of several, those that keep values take it
+    assert main(["render", seen, str(path), "-o", picture]) != 0
+    assert "kept.vdi keeps values" in capsys.readouterr().err
+    assert main(["render", seen, str(path), "--cmap", "bone", "-o", picture]) == 0
     with zipfile.ZipFile(path) as archive:
         assert json.loads(archive.read("vdi.json"))["format"] == "pyvista-vdi-deferred"
