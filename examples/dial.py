@@ -35,7 +35,7 @@ def main() -> None:
     plotter.show(auto_close=False, interactive=False)  # the VDIs are made in this view
     for column in range(3):
         plotter.subplot(0, column)
-        plotter.camera.Azimuth(30)
+        plotter.camera.Azimuth(37)  # from obliquely above: by 30 degrees
     if not off_screen:
         plotter.show()
         return

@@ -105,6 +105,7 @@ def main() -> None:
         print(f"{COMM.size} ranks, {POINTS}^3 points, a VDI of {SIZE[0]} x {SIZE[1]} lists")
         print(f"solver: {1e3 * solving:.0f} ms a step; in situ: {1e3 * in_situ:.0f} ms a VDI,")
         print(f"every {EVERY} steps: {in_situ / EVERY / solving:.2f} of the solver's time")
+        print(f"written: {target}, {target.with_suffix('.vdis')}")
 
 
 if __name__ == "__main__":

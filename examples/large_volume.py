@@ -71,6 +71,7 @@ def main() -> None:
     write_png(to_bytes(picture, (1, 1, 1)), target)
     share = vdi.metadata["points_read"] / np.prod(volume.dimensions)
     print(f"{vdi.metadata['blocks']} blocks, each point read {share:.2g} times; {vdi!r}")
+    print(f"written: {target}")
 
 
 if __name__ == "__main__":

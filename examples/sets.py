@@ -1,7 +1,7 @@
 """A knot of fog seen from all sides: a set of VDIs, saved, opened without the volume, and turned.
 
-What one should see: a bright knot that makes one turn and tilts, with nothing that jumps when
-another VDI becomes the nearest.
+What one should see: a bright knot that makes one turn, with nothing that jumps when another VDI
+becomes the nearest.
 
 Off-screen (with a file name as argument, or PYVISTA_OFF_SCREEN=true) a movie of the turn is
 written; else a window opens, in which the mouse turns.

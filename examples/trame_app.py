@@ -37,6 +37,7 @@ class App:
                 self.vdi,
                 on_camera=lambda _: asyncio.ensure_future(self.follow()),
                 style="width: 100%; height: 100%; aspect-ratio: auto",
+                raw_attrs=['fit="1"'],  # narrow pages show all of it: the brain fits a square
             )
 
     def made_for(self, camera: pvdi.Camera) -> pvdi.VDI:

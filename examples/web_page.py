@@ -1,6 +1,6 @@
 """A VDI as one HTML file, which anyone opens: no Python, no server, no network.
 
-What one should see in a browser: a head, first coarse and a moment later sharp; it turns with the
+What one should see in a browser: a brain, first coarse and a moment later sharp; it turns with the
 left mouse button as in VTK, and loses accuracy the farther it is turned.
 
 The page is written to the file that the argument names (web_page.html without one).

@@ -1,6 +1,6 @@
 """A plotter's scene with a VDI as one HTML file, which anyone opens: no Python, no server.
 
-What one should see in a browser: a head, cut open, with a slice of the scan on the cut; a red
+What one should see in a browser: a brain, cut open, with a slice of the scan on the cut; a red
 sphere in it, half before the cut; an outline around it, a title and a scalar bar. It turns with
 the left mouse button as in VTK.
 

@@ -429,6 +429,16 @@ def test_the_limits_do_not_overlap_either():
     assert not one.overlaps(other)
 
 
+def test_an_axis_of_less_than_a_decade_has_numbers():
+    pytest.importorskip("matplotlib")
+    # Frames from .6 to 1.2, where 1 is the only 1, 2 or 5
+    figure = Tradeoff(made_up(*((one, 1.5 * frame, *rest) for one, frame, *rest in FOUR))).plot()
+    figure.canvas.draw()
+    for panel in figure.axes:
+        low, high = panel.get_xlim()
+        assert sum(low < x < high for x in panel.get_xticks()) >= 2
+
+
 def test_the_plot_is_written_whole(tmp_path):
     pytest.importorskip("matplotlib")
     path = Tradeoff(made_up(*FOUR)).save_plot(tmp_path / "a.png")

@@ -78,6 +78,7 @@ def run_example(name, folder):
     suffix = Path(arguments[0]).suffix if arguments else suffix
     target = folder / (arguments[0] if arguments else Path(name).with_suffix(suffix))
     assert list(folder.glob(f"*{suffix}")) == [target]
+    assert target.name in done.stdout
     return done.stdout, target
 
 

@@ -165,6 +165,19 @@ def test_what_is_missing_is_named(setting, message, expected_messages):
     assert said in expected_messages.GetOutput()
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), KeyError("x")])
+def test_what_is_no_error_of_this_package_is_said_by_its_kind(
+    error, expected_messages, monkeypatch
+):
+    def fail(*_):
+        raise error
+
+    source = ready_source()
+    monkeypatch.setattr(source, "_execute", fail)
+    behind(source).Update()  # from C++: nothing can be raised
+    assert f"VDISource: {type(error).__name__}" in expected_messages.GetOutput()
+
+
 def file_of(image, path, writer):
     writer.SetInputData(image)
     writer.SetFileName(str(path))

@@ -116,8 +116,8 @@ class Source:
         self.runtime = get_runtime(device)
         first = self.volume(0)
         self.bounds = first.bounds
-        self.range = first.finite_range()
-        self.transfer_function(Wish())  # refused now, not when a client has come
+        #: Of the transfer function; what is wrong with that is refused now, not to a client
+        self.range = self.transfer_function(Wish()).scalar_range
         checked_sample_distance(first, options.sample_distance)  # likewise
         named = {name: getattr(looks, name) for name in _NAMED}
         self.started_with = {n: v for n, v in named.items() if isinstance(v, str)}

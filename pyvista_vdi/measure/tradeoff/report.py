@@ -107,7 +107,13 @@ def draw(data: dict[str, Any], points: Sequence[Point]) -> Figure:
 
 
 def _draw_panel(panel: Axes, points: Sequence[Point], front: Sequence[Point], kind: str) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import (
+        AutoLocator,
+        FixedLocator,
+        FuncFormatter,
+        LogLocator,
+        NullFormatter,
+    )
 
     for one in points:
         x, y = _place(one, kind)
@@ -119,7 +125,9 @@ def _draw_panel(panel: Axes, points: Sequence[Point], front: Sequence[Point], ki
     panel.plot(*zip(*line, strict=True), drawstyle="steps-post", color="#aaaaaa", lw=1, zorder=1)
     panel.set(xscale="log", yscale="log")
     panel.grid(alpha=0.25, which="major")
-    panel.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5)))
+    least, most = panel.get_xlim()  # over less than 5 there may be one of 1, 2, 5, or none
+    locator = LogLocator(base=10, subs=(1, 2, 5)) if most / least > 5 else AutoLocator()
+    panel.xaxis.set_major_locator(locator)
     panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.yaxis.set_major_locator(FixedLocator([1 - ssim for ssim in _TICKS]))

@@ -102,7 +102,9 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
             self._error = error
             if not self._python_waits and not isinstance(error, Cancelled):
                 name = type(self).__name__
-                vtk.vtkOutputWindow.GetInstance().DisplayErrorText(f"{name}: {error}\n")
+                known = isinstance(error, VDIError)
+                said = error if known else f"{type(error).__name__}: {error}".rstrip(": ")
+                vtk.vtkOutputWindow.GetInstance().DisplayErrorText(f"{name}: {said}\n")
             if self.GetNumberOfOutputPorts():
                 vtk.vtkDataObject.GetData(outputs, 0).Initialize()
         return 1

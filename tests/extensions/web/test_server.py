@@ -524,6 +524,13 @@ def test_a_fixed_look_offers_no_other(default_runtime, tmp_path):
     assert code == 1008
 
 
+@pytest.mark.parametrize(("look", "shown"), [({}, None), ({"clim": (10, 90)}, [10, 90])])
+def test_pages_show_the_range_that_is_in_effect(look, shown, default_runtime, tmp_path):
+    with serve(HIGH, cmap="bone", **look) as server:
+        found = hello_of(server, tmp_path)["range"]
+    assert found == (list(HIGH.finite_range()) if shown is None else shown)
+
+
 def test_steps_are_any_object_with_a_length_and_items(default_runtime, tmp_path):
     class Steps:
         def __len__(self):
