@@ -44,8 +44,8 @@ def coverage(session: nox.Session) -> None:
     settings = folder / "coveragerc"
     settings.write_text(
         "[run]\nbranch = true\nparallel = true\nsource_pkgs = pyvista_vdi\npatch = subprocess\n"
-        "omit = */pytest-of-*\n"  # copies that tests of packaging make
         f"data_file = {folder / 'data'}\n"
+        "[report]\nomit = */pytest-of-*/*\n"  # copies that tests of packaging make
     )
     rc = f"--rcfile={settings}"
     session.run("coverage", "run", rc, "-m", "pytest", *session.posargs)

@@ -5,6 +5,8 @@ Environment
 PYVISTA_VDI_TEST_DEVICES
     Comma separated parts of "platform / device": tests that need a device run on those that
     contain one; "all": on every usable one. By default on the one that users get.
+PYVISTA_VDI_TEST_AS_GPU
+    "1": devices pass for GPUs, and clang checks each program for one (tests/support/as_gpu.py).
 PYVISTA_VDI_TEST_WHOLE
     "1": the slow tests measure all cases of the standard table, an hour, in place of a sample.
 PYVISTA_VDI_REQUIRE_DEVICE
@@ -28,6 +30,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import as_gpu
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -60,6 +63,8 @@ def pytest_configure() -> None:
     Before drivers are loaded: their compilers put back what they found.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if os.environ.get("PYVISTA_VDI_TEST_AS_GPU") == "1":
+        as_gpu.pretend()
 
 
 def pytest_sessionstart() -> None:
