@@ -39,15 +39,15 @@ def kept(seed, precision="exact"):
 @pytest.mark.parametrize("degrees", [0, 5, 30])
 def test_what_a_look_leaves_unwritten_is_never_seen(runtime, degrees, monkeypatch):
     """Lists move up where others are transparent; memory behind them may hold anything."""
-    made = runtime.result
+    made = type(runtime).result
 
-    def unwritten(*arguments, **options):
-        buffer = made(*arguments, **options)
+    def unwritten(self, *arguments, **options):
+        buffer = made(self, *arguments, **options)
         if buffer.name in ("supersegment media", "supersegment faces"):
             runtime.fill(buffer, np.float32(np.nan))
         return buffer
 
-    monkeypatch.setattr(runtime, "result", unwritten)
+    monkeypatch.setattr(type(runtime), "result", unwritten)
     z, y, x = np.mgrid[-1:1:24j, -1:1:24j, -1:1:24j]
     volume = pvdi.Volume(np.exp(-3 * (x**2 + y**2 + z**2)).astype(np.float32))
     camera = pvdi.Camera((11, -70, 30), (11, 11, 11), (0, 0, 1))
