@@ -345,28 +345,29 @@ def given_camera(options: argparse.Namespace) -> Camera | None:
     return from_json(options.camera_json, Camera.from_dict, "camera")
 
 
+#: Options that a file's writer takes as arguments; ``--level`` is that of a volume's store.
+_FILE_ARGUMENTS = {
+    "compression": "compression",
+    "compression_level": "level",
+    "precision": "precision",
+    "standard_channels": "exact",
+    "linear": "linear",
+}
+
+
 def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments of a file that were given; ``--level`` is that of a volume's store."""
-    names = {"compression": "compression", "compression_level": "level", "precision": "precision"}
-    given = {argument: getattr(options, name) for name, argument in names.items()}
-    if getattr(options, "standard_channels", False):
-        given["exact"] = False
-    if getattr(options, "linear", False):
-        given["linear"] = True
-    return {argument: value for argument, value in given.items() if value is not None}
+    """Return the arguments of a file that were given."""
+    given = {argument: getattr(options, name, None) for name, argument in _FILE_ARGUMENTS.items()}
+    given = {argument: v for argument, v in given.items() if v is not None and v is not False}
+    return given | {"exact": False} if "exact" in given else given
 
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
-    given = of_the_file(options)
-    written = format_named(options.output)
-    for name, argument in (
-        ("precision", "precision"),
-        ("standard_channels", "exact"),
-        ("linear", "linear"),
-    ):
-        if written is not None and argument not in written.write_options:
-            of = [each.suffix for each in registry.formats() if argument in each.write_options]
+    given, written = of_the_file(options), format_named(options.output)
+    for name, argument in _FILE_ARGUMENTS.items():
+        of = [each.suffix for each in registry.formats() if argument in each.write_options]
+        if of and written is not None and argument not in written.write_options:
             refuse(options, (name,), f"{' and '.join(of)}, not {printable(options.output)}")
     check_write_options(options.output, given)
     return given
