@@ -91,14 +91,6 @@ def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
     assert counts == before
 
 
-def test_the_volumes_of_the_scene_are_looked_for_once_a_frame(plotter, monkeypatch):
-    plotter.show(auto_close=False)
-    found = Counts()
-    found.watch(monkeypatch, driver, "volumes")
-    plotter.render()
-    assert found == {"volumes": 1}
-
-
 def test_what_moves_allocates_nothing(plotter, counts):
     plotter.show(auto_close=False)
     for _ in range(frame_module.KEPT + 1):
