@@ -173,7 +173,7 @@ def _raycast(frames: Sequence[Frame], levels: Sequence[_Levels]) -> OwnedImage:
 
 
 def _leveled(vdis: Sequence[VDI], levels: Sequence[_Levels]) -> tuple[Sequence[VDI], _Levels]:
-    """Return VDIs of other colours, each by its levels, and what makes of their picture that of all.
+    """Return VDIs in the colours of their levels, and what their picture is to be changed by.
 
     Colours of VDIs are 0 to 1: what leaves that is brought there with all others, and back after.
     """
@@ -233,7 +233,7 @@ def _overlapping(frames: Sequence[Frame]) -> list[list[Frame]]:
         touched = [g for g in groups if touched_by[list(g)].any()]
         groups = [g for g in groups if g not in touched]
         groups.append({i}.union(*touched))
-    # The nearest first: what of its box a mesh hides, in some samples of a pixel, shows no other VDI
+    # The nearest first: in samples of a pixel where a mesh hides its box, none is to be seen
     nearest = [frame.depths_of(frame.bounds)[0] for frame in frames]
     return [[frames[i] for i in sorted(g, key=lambda i: (nearest[i], i))] for g in groups]
 
