@@ -10,7 +10,7 @@ from pyvista.plotting.volume import Volume
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
-from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods, keep, let_go
+from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, weakly
 
@@ -103,20 +103,6 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         if vdi is None:
             return f"PlotterVDIActor(a volume, of which actor.vdi makes a VDI{hidden})"
         return f"PlotterVDIActor({vdi!r}{hidden})"
-
-    def SetMapper(self, mapper: Any) -> None:  # noqa: N802
-        """Set the mapper, and hold it: PyVista's lose their lookup table with the last reference.
-
-        Parameters
-        ----------
-        mapper : PlotterVDIMapper or None
-            Of this actor alone.
-        """
-        before = self.GetMapper()
-        super().SetMapper(mapper)
-        let_go(thing=before, owner=self)  # a copy's may be another's, still
-        if mapper is not None:
-            keep(mapper, self)
 
     def SetProperty(self, prop: Any) -> None:  # noqa: N802
         """Set the volume property, of which the VDI is made anew.
