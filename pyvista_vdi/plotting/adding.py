@@ -33,10 +33,11 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.prepared import framing_camera, prepared, require_grid
+from pyvista_vdi.plotting.prepared import framing_camera, prepared
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import Refinement
-from pyvista_vdi.plotting.volumes import as_image, held
+from pyvista_vdi.plotting.uniform import UniformGrid
+from pyvista_vdi.plotting.volumes import as_image, held, require_grid
 from pyvista_vdi.quality.dial import refuse_settings
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
@@ -152,9 +153,7 @@ def added(
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
-    volume, stored = prepared(
-        *(plotter, volume, asked.array.scalars, asked.resample, asked.mask, asked.progress_bar)
-    )
+    volume, stored = prepared(plotter, volume, asked)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
@@ -215,7 +214,7 @@ def added_blocks(
     """
     blocks = pv.wrap(blocks)
     for block in blocks.recursive_iterator(skip_none=True):
-        require_grid(block, asked.resample)
+        require_grid(block, uniform=asked.resample is None)
     actors: list[Any] = []
     maps = cycle(_MAPS)
     with _all_or_nothing(plotter, actors):
@@ -280,7 +279,10 @@ def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, 
             f"what the view shows, and the volume is let go of; leave {refused} out, or "
             "classification"
         )
-    image, name = as_image(volume, array.scalars, asked.resolution)
+    if isinstance(volume, UniformGrid):
+        image, name = volume.image, volume.name
+    else:
+        image, name = as_image(volume, array.scalars, asked.resolution)
     read = as_volume(image, name, array.preference)
     view = asked.camera or framing_camera(plotter, read.bounds)
     request = GenerationRequest(
@@ -333,17 +335,24 @@ def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | N
     """Return a source of VDIs of a volume, classified as ``add_volume`` would."""
     scalars, preference = asked.array.scalars, asked.array.preference
     look, place, source = asked.look, asked.place, VDISource()
-    image, array_name = as_image(volume, scalars, asked.resolution)
+    uniform = volume if isinstance(volume, UniformGrid) else None
+    if uniform is None:
+        image, array_name = as_image(volume, scalars, asked.resolution)
+        data = held(image)
+    else:
+        data, array_name = uniform.image, uniform.name
     asked.array.require_composite()
     told = {name: value for name, value in look.describe().items() if name in Look.declared}
     source.SetMetadata({"classification": {**asked.array.describe(), **told}})
-    data = held(image)
     named = None if array_name is None else data.GetPointData().GetArray(array_name)
     if named is not None and preference == "point":
         # As add_volume: another may be made the active one of the mapper's dataset
         data.GetPointData().SetActiveScalars(array_name)
         array_name = None
-    source.SetInputDataObject(data)
+    if uniform is None:
+        source.SetInputDataObject(data)
+    else:
+        source.SetInputConnection(uniform.GetOutputPort())
     source.SetScalars(array_name, preference)
     source.SetOptions(asked.options)
     source.SetTarget(asked.target)
@@ -355,8 +364,11 @@ def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | N
     if read.rgba:
         look, bar = look.of_rgba(), False
     look = replace(look, clim=range_to_classify(scalars, look.clim))
-    table = look.lookup_table(read.array)
     unit_distance = (read if stored is None else stored).default_unit_distance
+    values = read.array
+    if uniform is not None and asked.resample is not None:  # as add_volume, of the grid itself
+        values, unit_distance = uniform.values, uniform.unit_distance
+    table = look.lookup_table(values)
     prop = look.volume_property(table, unit_distance, rgba=read.rgba)
     look.light(prop)
     source.SetLights(plotter.renderer)
