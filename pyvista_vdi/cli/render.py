@@ -29,7 +29,7 @@ from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
@@ -53,13 +53,14 @@ def render(options: argparse.Namespace) -> int:
         look = look_for(options, vdis[asks], options.files[asks])
         bar(0.5, "drawing")
         first = vdis[0]
-        view = camera(options, first.camera)
+        own, size = picture_view(first)
+        view = camera(options, own)
         several = len(vdis) > 1
         transforms = [vdi.camera.model_transform for vdi in vdis]
         image = render_vdi(
             vdis if several else first,
             view,
-            options.size or first.picture_size,
+            options.size or size,
             model_transforms=transforms if several else None,
             transmittance_cutoff=options.transmittance_cutoff,
             device=options.device,
@@ -89,9 +90,9 @@ def view(options: argparse.Namespace) -> int:
     else:
         shown = read(options.file)
         vdi = _at(shown, options.time)
-        size = options.size or vdi.picture_size
+        own, size = picture_view(vdi)
         look = look_for(options, shown, options.file)
-        _show(shown, vdi.camera, size, look, options, screenshot)
+        _show(shown, own, options.size or size, look, options, screenshot)
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0
@@ -133,8 +134,7 @@ def _show(
         )
         if isinstance(shown, VDICollection) and shown.times is not None:
             _begin(actor, plotter, options, slider=screenshot is None)
-        aim(plotter.camera, camera)
-        plotter.camera_set = True
+        aim(plotter.camera, camera, camera.model_transform)
         plotter.renderer.reset_camera_clipping_range()
         if screenshot is None:
             plotter.show()
