@@ -404,4 +404,3 @@ def _all_or_nothing(plotter: Any, actors: Any) -> Iterator[None]:
         plotter.remove_actor(actors, reset_camera=False, render=False)
         plotter.camera_set = was_set
         raise
-

@@ -232,14 +232,13 @@ def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) ->
     for thing in things:
         if isinstance(thing, Volume):
             release_voxels(thing)
-        elif isinstance(thing, DeferredVDI):
-            release_values(thing)
-            with _lock:
-                gone: Any = _kept.pop(thing, None)
         elif thing is not None:
+            if isinstance(thing, DeferredVDI):
+                release_values(thing)
+            places: Any = _kept if isinstance(thing, DeferredVDI) else _prepared
             with _lock:
-                gone = _prepared.pop(thing, None)
-        gone = None  # buffers go without the lock
+                gone = places.pop(thing, None)
+            del gone  # without the lock
 
 
 class PreparedVDI:

@@ -6,6 +6,7 @@ VDI comes from, the workers behind the frames and the user's own functions.
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import weakref
@@ -22,13 +23,13 @@ from pyvista_vdi.quality import frame_state as fs
 from pyvista_vdi.quality.decide import busy, decide, growth
 from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, number_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.volume_picture import (
     VolumePicture,
     VolumePictures,
     prepared,
 )
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.inputs import ROUNDING, Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import View, size_of
 from pyvista_vdi.vtk_pipeline.interaction import browser
@@ -41,12 +42,19 @@ _log = logging.getLogger(__name__)
 
 #: Views that a VDI is made to serve, degrees from V_O, where its metadata do not say.
 _VIEW_CONE = 60.0
-#: What two equal sizes of pixels differ by at most.
-_ROUNDING = 1e-6
 
+
+#: By which VDIs are known: no other one has had the number.
+_numbers: weakref.WeakKeyDictionary[VDI, int] = weakref.WeakKeyDictionary()
+_next_number = itertools.count(1)
 
 #: What a frame can show.
 Shown: TypeAlias = VDI | VolumePicture | None
+
+
+def number_of(vdi: VDI) -> int:
+    """Return the number that a VDI is known by."""
+    return _numbers.get(vdi) or _numbers.setdefault(vdi, next(_next_number))
 
 
 class Deciding:
@@ -299,20 +307,10 @@ class Deciding:
 
         The source keeps it unless the frame is a tile.
         """
-        view = frame.view
-        assert view is not None
-        wanted, whole = source.source.MakeRequest(view), frame.full_size == view.size
-        camera, size = (view.camera, view.size) if whole else (frame.camera, frame.size)
-        generating, lists = wanted.generating
-        # What covers all of a volume that is near has larger lists than the picture has pixels
-        pixels = math.prod(
-            high / low
-            for high, low in zip(
-                generating.half_extent(lists), camera.half_extent(size), strict=True
-            )
-        )
-        if not whole or pixels * math.prod(size) > math.prod(lists) * (1 + _ROUNDING):
-            wanted = replace(wanted, generating=(camera, size))
+        assert frame.view is not None
+        whole = frame.full_size == frame.view.size
+        tile = None if whole else (frame.camera, frame.size)
+        wanted = source.exact_request(frame.view, tile)
         vdi = source.source.MakeVDI(wanted)
         if whole:
             source.source.TakeVDI(vdi, wanted)
@@ -382,7 +380,7 @@ class Deciding:
         assert frame is not None and frame.view is not None  # noqa: PT018
         of, options = (number_of(vdi), frame.view), self._options
         detail = magnification(vdi, frame.camera, frame.full_size)
-        if made.screen == frame.view and detail <= 1 + _ROUNDING:
+        if made.screen == frame.view and detail <= 1 + ROUNDING:
             return fs.Estimate(*of, ssim=1.0, options=options)
         runtime, background = get_runtime(made.device), frame.renderer.GetBackground()
         try:

@@ -26,13 +26,13 @@ from pyvista_vdi.raycasting.picking import FirstHit, Pick
 from pyvista_vdi.raycasting.prepared import release_from_devices
 from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.box import Box
-from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding
+from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding, number_of
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Drawn,
     Frame,
+    Matrix,
     consumers,
-    number_of,
     viewport,
     volumes,
 )
@@ -44,7 +44,7 @@ from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window, now
@@ -250,7 +250,8 @@ class Driver(Deciding):
         parts = [] if self.input is None else self.input.parts()
         if len(parts) < 2 or parts[0][0] is not frame.vdi:
             return frame
-        return replace(frame, parts=tuple(parts))
+        blend = tuple((number_of(vdi), weight) for vdi, weight in parts)
+        return replace(frame, parts=tuple(parts), blend=blend)
 
     def preview_size(self, frame: Frame) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
@@ -400,6 +401,21 @@ class Driver(Deciding):
         elif self.state.settings.automatic_view:
             return source.of_view(source.view_for(*seen))
         return source.last()
+
+    def vdi_of_view(self, renderer: Any, matrix: Matrix) -> VDI | None:
+        """Return a VDI of exactly what a renderer shows of an actor of that matrix, (4, 4).
+
+        It is made beside the one that is there; without the volume, or where nobody but
+        ``actor.regenerate()`` may make another, it is that one.
+        """
+        source = self.input
+        if not isinstance(source, SourceInput) or self.state.settings.regenerate == "never":
+            return self.vdi_asked_for()
+        source.note_scene(self.renderers(), matrix)
+        wanted = source.exact_request(renderer_view(renderer, matrix))
+        made = source.source.GetCurrentRequest()
+        same = made is not None and made.key == wanted.key
+        return source.last() if same else source.source.MakeVDI(wanted)
 
     def values_asked_for(self) -> DeferredVDI | None:
         """Return the values that are classified, made now if they are not; ``None`` of none."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -56,15 +54,6 @@ _GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6
 _PLANE_SLACK = 1e-9
 
 
-_numbers: weakref.WeakKeyDictionary[VDI, int] = weakref.WeakKeyDictionary()
-_next = itertools.count(1)
-
-
-def number_of(vdi: VDI) -> int:
-    """Return the number that a VDI is known by, which no other one has had."""
-    return _numbers.get(vdi) or _numbers.setdefault(vdi, next(_next))
-
-
 @dataclass(frozen=True, eq=False)
 class Frame:
     """What a renderer's frame asks of a VDI. It lives no longer than the frame: it holds VTK's.
@@ -92,6 +81,7 @@ class Frame:
     effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
     few_lists: VDI | None = None  # raycast in place of the VDI in a preview: every second list
     parts: tuple[tuple[VDI, float], ...] = ()  # what the picture is blended of, with weights
+    blend: tuple[tuple[int, float], ...] = ()  # the same by numbers
     lit_from: Camera | None = None  # whose light falls on a shaded volume, in place of the VDI's
     bounds: tuple[float, ...] = ()  # of what is seen, model frame
     options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
@@ -154,9 +144,8 @@ class Frame:
     @property
     def key(self) -> Any:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
-        parts = tuple((number_of(vdi), weight) for vdi, weight in self.parts)
-        of = (self.camera, self.size, self.full_size, self.options, self.lit_from)
-        return (*of, parts, self.few_lists is None)
+        of = (self.camera, self.size, self.full_size, self.options)
+        return (*of, self.lit_from, self.blend, self.few_lists is None)
 
     @property
     def preview(self) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,9 +23,12 @@ from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
-from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build
+
+#: What two equal sizes of pixels differ by at most.
+ROUNDING = 1e-6
 
 #: What of a transfer function no list of values can honour, and how a property has it.
 _OF_GRADIENTS = {"shading": "shading (shade = True)", "gradient_opacities": "gradient opacity"}
@@ -41,7 +46,10 @@ class Input:
     #: The volume property that classifies values, where they are kept.
     prop: Any = None
     #: What remedies a view that the VDI does not serve, where there is no source.
-    remedy = "without its volume it cannot be made anew"
+    remedy = (
+        "without its volume it cannot be made anew, and its own view is "
+        "plotter.camera = vdi.camera.to_pyvista()"
+    )
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
 
@@ -272,6 +280,22 @@ class SourceInput(Input):
         if made is None or made.key != wanted.key:
             source.TakeVDI(source.MakeVDI(wanted), wanted, view=False)
         return source.GetCurrentVDI()  # type: ignore[return-value]
+
+    def exact_request(
+        self, view: View, tile: tuple[Camera, tuple[int, int]] | None = None
+    ) -> Request:
+        """Return what a VDI of exactly a view's picture is made of, or of a tile of it.
+
+        What covers all of a volume that is near would have larger lists than that has pixels.
+        """
+        wanted = self.source.MakeRequest(view)
+        camera, size = tile or (view.camera, view.size)
+        generating, lists = wanted.generating
+        extents = zip(generating.half_extent(lists), camera.half_extent(size), strict=True)
+        pixels = math.prod(size) * math.prod(high / low for high, low in extents)
+        if tile is not None or pixels > math.prod(lists) * (1 + ROUNDING):
+            wanted = replace(wanted, generating=(camera, size))
+        return wanted
 
     def forget_view(self) -> None:
         """Wait for the view of another frame, where that of a frame was taken."""
