@@ -241,7 +241,7 @@ class RanksVDISource(VDISource):
             comm=comm,
             device=request.device,
             name=part.name,
-            metadata=request.metadata,
+            metadata=request.generation.metadata,
         )
         return comm.bcast(vdi)  # type: ignore[no-any-return]
 

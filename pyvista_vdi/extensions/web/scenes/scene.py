@@ -56,7 +56,7 @@ class Scene:
 
     vdi: VDI | None  # the first one, if there is one
     actors: list[Any]  # those that show VDIs, the first one's first
-    state: Any  # of :func:`state_of`
+    state: Any  # of :func:`state_of`, where the viewer goes on to follow the renderer
     data: bytes  # all the rest, as scene.js takes it
     background: str  # as CSS has it
     left_out: list[str]  # what is not shown, by name
@@ -107,7 +107,8 @@ def scene_of(
 ) -> Scene:
     """Return what a renderer that has been drawn shows, for the viewer.
 
-    ``names``: what its props are called. ``camera``: the viewer begins with its view.
+    ``names``: what its props are called. ``camera``: the viewer begins with its view, of which
+    VDIs are made where their volumes are at hand.
     ``needs_vdi``: one without VDIs is refused by UnsupportedError.
     """
     called, packed, left_out = Names(names or {}, renderer), _Packed(), _environment(renderer)
@@ -124,8 +125,9 @@ def scene_of(
         known = True
         for part, matrix in parts_of(prop):
             if isinstance(part, VDIActorMethods):
-                if part.vdi is not None:  # type: ignore[attr-defined]
-                    bodies.append(_body(part, matrix, missing))
+                vdi = _vdi_of(part, renderer if camera else None, matrix)
+                if vdi is not None:
+                    bodies.append((vdi, _limits(part, vdi.bounds, matrix, missing)))
                     actors.append(part)
             elif (solid := _solid(part)) is not None:
                 shapes += shapes_of(solid, matrix, packed.keep, missing)
@@ -170,7 +172,7 @@ def scene_of(
     return Scene(
         vdi=bodies[0][0] if bodies else None,
         actors=actors,
-        state=state_of(renderer),
+        state=None if camera else state_of(renderer),
         data=packed.deflated(head),
         background=_background(renderer, left_out),
         left_out=list(dict.fromkeys(left_out)),
@@ -213,19 +215,29 @@ def _is_plain(prop: Any) -> bool:
     return prop.GetMapper() is not None and not changed and not any(map(prop.IsA, _NOT_PLAIN))
 
 
-def _body(actor: Any, matrix: Any, missing: list[str]) -> tuple[VDI, dict[str, Any]]:
+def _vdi_of(actor: Any, renderer: Any, matrix: NDArray[np.float64]) -> VDI | None:
+    """Return an actor's VDI as it is shown: of the renderer's view, if one is given."""
+    mapper = actor.GetMapper()
+    begins = renderer is not None and mapper is not None
+    vdi = mapper.driver.vdi_of_view(renderer, matrix) if begins else actor.vdi
+    return None if vdi is None else thinned(vdi, actor.opacity_multiplier)
+
+
+def _limits(
+    actor: Any, bounds: Sequence[float], matrix: NDArray[np.float64], missing: list[str]
+) -> dict[str, Any]:
+    """Return where a VDI is, and the planes that cut it."""
     planes = planes_of(actor)
     cropping = Cropping.from_any(actor.GetMapper())
     if cropping is not None:
-        sides = _sides(cropping, actor.vdi.bounds, matrix)
+        sides = _sides(cropping, bounds, matrix)
         if sides is None or len(planes) + len(sides) > MOST_PLANES:
             missing.append("cropping")
         else:
             planes += sides
     if len(planes) > MOST_PLANES:
         missing.append(f"{len(planes) - MOST_PLANES} of its clipping planes")
-    vdi = thinned(actor.vdi, actor.opacity_multiplier)
-    return vdi, {"planes": planes[:MOST_PLANES], "matrix": matrix.tolist()}
+    return {"planes": planes[:MOST_PLANES], "matrix": matrix.tolist()}
 
 
 def _sides(
