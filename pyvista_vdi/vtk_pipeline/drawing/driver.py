@@ -148,6 +148,9 @@ class Driver(Deciding):
             if actor is not None:  # whose shader the copy has
                 place_image(actor, 0, (0, 0), (1, 1))
             return
+        origin, size = viewport(renderer)
+        if min(size) == 0:  # beside the tile of a picture that is drawn
+            return
         # VTK asks for four where the actor's property says that they are dependent
         components = 1 if actor.GetProperty().GetIndependentComponents() else 4
         if self.box.components != components:
@@ -169,7 +172,6 @@ class Driver(Deciding):
         if window.GetInteractor() is not None:
             of_window.listen(window.GetInteractor(), Grabbing)
         unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
-        origin, size = viewport(renderer)
         place_image(actor, unit, origin, size)
         if drawn.smooth:
             self._scissor.narrow(window, shown_box(drawn.image, origin, size))
