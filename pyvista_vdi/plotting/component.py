@@ -147,7 +147,8 @@ class AddVDI(Component):
             view is drawn. With VDIs nothing is generated, and arguments that
             only a volume can honour are refused; where nobody has set the camera, the plotter opens
             from the VDI's own view, ``plotter.camera = vdi.camera.to_pyvista()``. A
-            :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``, ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
+            :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``,
+            ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
         scalars : str or numpy.ndarray, optional
             Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
         clim : float or (float, float), optional

@@ -201,8 +201,8 @@ def _frame(state: FrameState, f: FrameAsked) -> Decision:
         if f.trouble is not None:
             return state, (Raise(f.trouble),)
         if _drawable(state, f, f.wanted):
-            again = replace(f, look=False)
-            return state, (*_follow(state, f), Show("wanted", again, f.wanted.content))
+            asked = replace(f, look=False)
+            return state, (*_follow(state, f), Show("wanted", asked, f.wanted.content))
     state = replace(state, behind=f.watched)
     if f.watched:
         return _watched(state, f)

@@ -57,6 +57,9 @@ _BEHIND_ANOTHER = (
 )
 
 
+_NO_VIEW = "nothing shows this actor, so there is no view to make its VDI of"
+
+
 class Driver(Deciding):
     """What happens behind a :class:`VDIMapper`; its observers call :meth:`begin` and :meth:`end`.
 
@@ -388,16 +391,14 @@ class Driver(Deciding):
         if not isinstance(source, SourceInput):
             if source is None or (source.last() is not None and source.prop is None):
                 return None if source is None else source.last()
-            self._look_for_view()
+            self.values_asked_for()
             return source.vdi()  # in the colours that its property has by now
         seen = self._look_for_view()
         if source.has_view:
             self.tell(VDIAsked(source.last() is not None, source.stamp()))
         elif seen is None:
-            raise InvalidArgumentError(
-                "nothing shows this actor, so there is no view to make its VDI of: add it to a "
-                "renderer, or call actor.regenerate(camera, window_size)"
-            )
+            remedy = "add it to a renderer, or call actor.regenerate(camera, window_size)"
+            raise InvalidArgumentError(f"{_NO_VIEW}: {remedy}")
         elif self.state.settings.automatic_view:
             return source.of_view(source.view_for(*seen))
         return source.last()
@@ -422,7 +423,10 @@ class Driver(Deciding):
         if self.input is None:
             return None
         self._look_for_view()
-        return self.input.deferred
+        values = self.input.deferred
+        if values is None and self.input.prop is not None:
+            raise InvalidArgumentError(f"{_NO_VIEW}: add it to a renderer")
+        return values
 
     def _look_for_view(self) -> tuple[Any, tuple[int, int], Any] | None:
         """Look at the scene between frames; return what the next picture sees the actor by."""

@@ -47,8 +47,8 @@ class Input:
     prop: Any = None
     #: What remedies a view that the VDI does not serve, where there is no source.
     remedy = (
-        "without its volume it cannot be made anew, and its own view is "
-        "plotter.camera = vdi.camera.to_pyvista()"
+        "without its volume it cannot be made anew, and plotter.camera = vdi.camera.to_pyvista() "
+        "goes to its own view"
     )
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
