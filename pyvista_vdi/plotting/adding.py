@@ -189,7 +189,7 @@ def added(
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
     render = not plotter._first_time if place.render is None else place.render
     opens = isinstance(thing, VDI | VDICollection) or isinstance(first, DeferredVDI)
-    opens = opens and not plotter.camera_set
+    opens = opens and place.reset_camera is not False and not plotter.camera_set
     with _all_or_nothing(plotter, actor):
         plotter.add_actor(
             actor,

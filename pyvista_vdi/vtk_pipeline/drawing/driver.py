@@ -57,9 +57,6 @@ _BEHIND_ANOTHER = (
 )
 
 
-_NO_VIEW = "nothing shows this actor, so there is no view to make its VDI of"
-
-
 class Driver(Deciding):
     """What happens behind a :class:`VDIMapper`; its observers call :meth:`begin` and :meth:`end`.
 
@@ -387,19 +384,14 @@ class Driver(Deciding):
         It is of the view that the first picture had, or that somebody chose; before the first
         picture, of the view that this would have now. ``None`` without an input, or a view.
         """
-        source = self.input
+        source, seen = self.input, self._look_for_view()
         if not isinstance(source, SourceInput):
             if source is None or (source.last() is not None and source.prop is None):
                 return None if source is None else source.last()
-            self.values_asked_for()
             return source.vdi()  # in the colours that its property has by now
-        seen = self._look_for_view()
         if source.has_view:
             self.tell(VDIAsked(source.last() is not None, source.stamp()))
-        elif seen is None:
-            remedy = "add it to a renderer, or call actor.regenerate(camera, window_size)"
-            raise InvalidArgumentError(f"{_NO_VIEW}: {remedy}")
-        elif self.state.settings.automatic_view:
+        elif seen is not None and self.state.settings.automatic_view:
             return source.of_view(source.view_for(*seen))
         return source.last()
 
@@ -419,14 +411,14 @@ class Driver(Deciding):
         return source.last() if same else source.source.MakeVDI(wanted)
 
     def values_asked_for(self) -> DeferredVDI | None:
-        """Return the values that are classified, made now if they are not; ``None`` of none."""
+        """Return the values that are classified, made now if they are not.
+
+        ``None`` where there are none, or no view to make them of.
+        """
         if self.input is None:
             return None
         self._look_for_view()
-        values = self.input.deferred
-        if values is None and self.input.prop is not None:
-            raise InvalidArgumentError(f"{_NO_VIEW}: add it to a renderer")
-        return values
+        return self.input.deferred
 
     def _look_for_view(self) -> tuple[Any, tuple[int, int], Any] | None:
         """Look at the scene between frames; return what the next picture sees the actor by."""
