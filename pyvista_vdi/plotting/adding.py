@@ -188,8 +188,9 @@ def added(
     remember(actor)
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
     render = not plotter._first_time if place.render is None else place.render
-    opens = isinstance(thing, VDI | VDICollection) or isinstance(first, DeferredVDI)
-    opens = opens and place.reset_camera is not False and not plotter.camera_set
+    touched = plotter.camera_set or plotter.camera.parallel_projection
+    is_made = isinstance(thing, VDI | VDICollection) or isinstance(first, DeferredVDI)
+    opens = is_made and place.reset_camera is not False and not touched
     with _all_or_nothing(plotter, actor):
         plotter.add_actor(
             actor,

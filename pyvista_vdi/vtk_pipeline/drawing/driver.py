@@ -127,11 +127,11 @@ class Driver(Deciding):
 
         What lit the last frame stays.
         """
-        if self.input is not None:
-            if isinstance(self.input, SourceInput):
-                self.input.keep_lights(self.renderers())
-            release_from_devices(self.input.on_devices())
+        held = [] if self.input is None else self.input.on_devices()
+        if isinstance(self.input, SourceInput):
+            self.input.keep_lights(self.renderers())
         super().release()
+        release_from_devices(held)
         self._texture.release()
         self._no_depth.release()
         self._selection.release()
