@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -143,6 +144,18 @@ def is_volume(options: argparse.Namespace) -> bool:
     is_vdi = f"{printable(options.file)} is a VDI: "
     refuse(options, (*_OF_A_VOLUME, *OF_A_STORE), "volumes", is_vdi)
     return False
+
+
+def require_vdi(file: str, verb: str) -> None:
+    """Refuse a volume where a VDI is wanted, and say how the command makes one."""
+    if is_vdi_file(file) or holds(file) in ("series", "set"):
+        return
+    if not (is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long a name, too
+        raise VDIFileError(f"{printable(file)} does not exist: check the file's name")
+    raise UnsupportedError(
+        f"{printable(file)} is no VDI, which is what {verb} takes; of a volume, "
+        f"'pyvista-vdi generate {printable(file)} -o FILE.vdi' makes one"
+    )
 
 
 def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:

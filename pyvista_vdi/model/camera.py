@@ -138,8 +138,9 @@ class Camera:
 
         Parameters
         ----------
-        camera : Camera or vtkCamera or pyvista.Camera
+        camera : Camera or vtkCamera or pyvista.Camera or three vectors
             VTK's cameras are read through their ``Get…`` methods; VTK itself is not imported.
+            Position, focal point and view up are what PyVista's ``camera_position`` has.
         model_transform : array_like, shape (4, 4), optional
             Replaces the model transform; by default a ``Camera`` keeps its own and others get the
             identity (``vtkCamera``'s own model transform is used where it has been set).
@@ -161,10 +162,14 @@ class Camera:
             given = model_transform is not None
             return camera.replace(model_transform=model_transform) if given else camera
         if not hasattr(camera, "GetDirectionOfProjection"):
-            raise InvalidCameraError(
-                f"expected a pyvista_vdi.Camera, a vtkCamera or a pyvista.Camera; "
-                f"got {type(camera).__name__}"
-            )
+            try:
+                position, focal_point, view_up = () if isinstance(camera, str) else camera
+            except (TypeError, ValueError):
+                raise InvalidCameraError(
+                    "expected a pyvista_vdi.Camera, a vtkCamera, a pyvista.Camera or (position, "
+                    f"focal_point, view_up); got {type(camera).__name__}"
+                ) from None
+            return cls(position, focal_point, view_up, model_transform=model_transform)
         reasons = []
         if tuple(camera.GetViewShear()) != (0.0, 0.0, 1.0):
             reasons.append("a view shear (SetViewShear)")
@@ -457,7 +462,7 @@ class Camera:
         if _length(_cross(_unit(forward), _unit(np.asarray(self.view_up)))) < 1e-12:
             raise InvalidCameraError(
                 f"view_up {self.view_up} is parallel to the direction of projection "
-                f"{tuple(_unit(forward))}: choose another up direction"
+                f"{tuple(_unit(forward).tolist())}: choose another up direction"
             )
         # By a power of two, which rounds nothing: squares may overflow
         forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])

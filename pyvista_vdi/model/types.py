@@ -56,7 +56,7 @@ Progress: TypeAlias = Callable[[float], object]
 
 #: A path is a file that ``read_volume`` reads.
 VolumeLike: TypeAlias = Union["Volume", VTKObject, str, "os.PathLike[str]"]
-CameraLike: TypeAlias = Union["Camera", VTKObject]
+CameraLike: TypeAlias = Union["Camera", VTKObject, Sequence[ArrayLike]]
 VDILike: TypeAlias = Union["VDI", VTKObject]
 LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]
 CroppingLike: TypeAlias = Union["Cropping", VTKObject, Sequence[float], Sequence[object]]

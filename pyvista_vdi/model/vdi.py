@@ -273,8 +273,10 @@ class VDI:
     def with_precision(self, precision: str) -> VDI:
         """Return the VDI with supersegments of fewer bytes, on devices and in ``.vdi`` files.
 
-        Its arrays, float32 as ever, hold what the packed form gives back, so that whatever reads
-        them sees what is drawn. docs/conventions.md ("Packed supersegments") has the bounds.
+        With 8 bytes each list that is not empty takes 16 more, so that lists of one supersegment
+        save nothing; in this process's memory the packed form lies beside the arrays. These hold
+        what it gives back, so that whatever reads them sees what is drawn. docs/conventions.md
+        ("Packed supersegments") has the bounds.
 
         Parameters
         ----------

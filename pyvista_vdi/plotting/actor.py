@@ -10,10 +10,10 @@ from pyvista.plotting.volume import Volume
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
-from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods, keep, let_go
+from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 from pyvista_vdi.vtk_pipeline.filters.view import framed
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, weakly
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkCamera, vtkImageData, weakly
 
 # PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
 require_this_build(Volume)
@@ -104,20 +104,6 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         if vdi is None:
             return f"PlotterVDIActor(a volume, of which actor.vdi makes a VDI{hidden})"
         return f"PlotterVDIActor({vdi!r}{hidden})"
-
-    def SetMapper(self, mapper: Any) -> None:  # noqa: N802
-        """Set the mapper, and hold it: PyVista's lose their lookup table with the last reference.
-
-        Parameters
-        ----------
-        mapper : PlotterVDIMapper or None
-            Of this actor alone.
-        """
-        before = self.GetMapper()
-        super().SetMapper(mapper)
-        let_go(thing=before, owner=self)  # a copy's may be another's, still
-        if mapper is not None:
-            keep(mapper, self)
 
     def SetProperty(self, prop: Any) -> None:  # noqa: N802
         """Set the volume property, of which the VDI is made anew.
@@ -242,9 +228,10 @@ def first_camera(renderer: Any, bounds: Any) -> Any:
     first = next(each for each in plotter.renderers if each.GetActiveCamera() is camera)
     if first is not renderer:
         renderer, bounds = first, first.ComputeVisiblePropBounds()
-    camera = camera.copy()
+    copied = vtkCamera()
+    copied.DeepCopy(camera)
     position, focal_point, up = renderer.get_default_cam_pos()
-    camera.SetPosition(position)
-    camera.SetFocalPoint(focal_point)
-    camera.SetViewUp(up)
-    return framed(camera, renderer, bounds)
+    copied.SetPosition(position)
+    copied.SetFocalPoint(focal_point)
+    copied.SetViewUp(up)
+    return framed(copied, renderer, bounds)

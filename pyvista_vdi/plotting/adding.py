@@ -31,10 +31,11 @@ from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.prepared import prepared, require_grid
+from pyvista_vdi.plotting.prepared import prepared
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import Refinement
-from pyvista_vdi.plotting.volumes import as_image, held
+from pyvista_vdi.plotting.uniform import UniformGrid
+from pyvista_vdi.plotting.volumes import as_image, held, require_grid
 from pyvista_vdi.quality.dial import refuse_settings
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
@@ -149,9 +150,7 @@ def added(
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
-    volume, stored = prepared(
-        *(plotter, volume, asked.array.scalars, asked.resample, asked.mask, asked.progress_bar)
-    )
+    volume, stored = prepared(plotter, volume, asked)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
@@ -189,8 +188,8 @@ def added(
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
     render = not plotter._first_time if place.render is None else place.render
     touched = plotter.camera_set or plotter.camera.parallel_projection
-    is_made = isinstance(thing, VDI | VDICollection) or isinstance(first, DeferredVDI)
-    opens = is_made and place.reset_camera is not False and not touched
+    own = _own(first, several)
+    opens = own is not None and place.reset_camera is not False and not touched
     with _all_or_nothing(plotter, actor):
         plotter.add_actor(
             actor,
@@ -201,7 +200,6 @@ def added(
             render=render and not opens,
         )
         if opens:  # from its own view: others may show little of it
-            own = first if several is None else several
             aim(plotter.camera, picture_view(own)[0], as_array(actor.GetMatrix()))
             if place.reset_camera:
                 plotter.reset_camera(render=False)
@@ -229,7 +227,7 @@ def added_blocks(
     """
     blocks = pv.wrap(blocks)
     for block in blocks.recursive_iterator(skip_none=True):
-        require_grid(block, asked.resample)
+        require_grid(block, uniform=asked.resample is None)
     actors: list[Any] = []
     maps = cycle(_MAPS)
     with _all_or_nothing(plotter, actors):
@@ -244,6 +242,15 @@ def added_blocks(
             add = added_blocks if isinstance(block, pv.MultiBlock) else added
             actors.append(add(plotter, block, own, remember))
     return actors
+
+
+def _own(first: Any, several: VDICollection | None) -> Any:
+    """Return what has a view to open from; ``None`` for volumes, and sets that tell of none."""
+    if several is not None and several.times is None:
+        return several if "camera" in getattr(several, "about", {}) else None
+    if several is not None:
+        return several
+    return first if isinstance(first, VDI | DeferredVDI) else None
 
 
 def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
@@ -335,15 +342,22 @@ def _values_shown(
 def _source(volume: Any, asked: Addition) -> VDISource:
     """Return a source of VDIs of a volume, made as it was asked for."""
     source, preference = VDISource(), asked.array.preference
-    image, array_name = as_image(volume, asked.array.scalars, asked.resolution)
+    uniform = volume if isinstance(volume, UniformGrid) else None
+    if uniform is None:
+        image, array_name = as_image(volume, asked.array.scalars, asked.resolution)
+        data = held(image)
+    else:
+        data, array_name = uniform.image, uniform.name
     asked.array.require_composite()
-    data = held(image)
     named = None if array_name is None else data.GetPointData().GetArray(array_name)
     if named is not None and preference == "point":
         # As add_volume: another may be made the active one of the mapper's dataset
         data.GetPointData().SetActiveScalars(array_name)
         array_name = None
-    source.SetInputDataObject(data)
+    if uniform is None:
+        source.SetInputDataObject(data)
+    else:
+        source.SetInputConnection(uniform.GetOutputPort())
     source.SetScalars(array_name, preference)
     source.SetOptions(asked.options)
     source.SetTarget(asked.target)
@@ -365,8 +379,12 @@ def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | N
     if read.rgba:
         look, bar = look.of_rgba(), False
     look = replace(look, clim=range_to_classify(scalars, look.clim))
-    table = look.lookup_table(read.array)
     unit_distance = (read if stored is None else stored).default_unit_distance
+    values = read.array
+    if isinstance(volume, UniformGrid) and asked.resample is not None:
+        # As add_volume, of the grid itself
+        values, unit_distance = volume.values, volume.unit_distance
+    table = look.lookup_table(values)
     prop = look.volume_property(table, unit_distance, rgba=read.rgba)
     look.light(prop)
     source.SetLights(plotter.renderer)

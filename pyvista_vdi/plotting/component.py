@@ -191,12 +191,13 @@ class AddVDI(Component):
         log_scale : bool
             Map values to colours by their logarithm.
         resample : "auto" or (int, int, int), optional
-            Take rectilinear, structured and unstructured grids, too, and blocks of them, each
-            resampled to a uniform grid of so many points along x, y and z; ``"auto"``: voxels as
-            large as the mean cell. What lies outside their cells is not drawn. The log says the
-            largest and the mean difference at the grid's own points.
-        mask : pyvista.ImageData, Volume, numpy.ndarray or path, optional
-            Labels at the points of the volume: where they are 0, nothing is drawn.
+            Resample any grid, and blocks of them, to a uniform one of so many points along x, y
+            and z; ``"auto"``: voxels as large as the mean cell, a uniform grid as it is. What lies
+            outside their cells is not drawn. With ``categories``, by the nearest value. The log
+            says the largest and the mean difference at the grid's own points.
+        mask : pyvista.DataSet, Volume, numpy.ndarray or path, optional
+            Labels of the volume's points, or of its cells: where they are 0, nothing is drawn. A
+            grid may have its axes mirrored or in another order.
         max_supersegments : int
             Longest list, 1 to 4096.
         criterion : {"least-error", "homogeneity"}
@@ -288,8 +289,8 @@ class AddVDI(Component):
             A ``pyvista.Volume``; ``actor.vdi`` is the VDI, made whenever it is asked for and there
             is none, before the first picture too, for the view that this would have,
             ``actor.regenerate()`` makes another from the current view, and ``actor.status`` says
-            how it is drawn. Changes to ``actor.prop`` or to the array's values are in the next
-            picture. A ``MultiBlock`` gives a list of actors.
+            how it is drawn. Changes to ``actor.prop``, to the array's values or to the mask are in
+            the next picture. A ``MultiBlock`` gives a list of actors.
 
         Raises
         ------

@@ -385,7 +385,7 @@ def _drawable(state: FrameState, f: FrameAsked, of: Any) -> bool:
 
 
 def _follow(state: FrameState, f: FrameAsked) -> tuple[Action, ...]:
-    """Have a VDI of what has changed be of this frame's view, if it is a whole picture."""
+    """Ask for this frame's view, if it is a whole picture, for a VDI of what has changed."""
     follows = f.one_view and f.look and state.settings.regenerate != "never"
     return (Do("follow view"),) if follows and _other_content(state, f) else ()
 

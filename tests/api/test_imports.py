@@ -48,7 +48,7 @@ LEVELS = (
     ("errors", "_version"),
     ("registry",),
     ("model",),
-    ("reference", "device", "io"),
+    ("device", "io"),
     ("volume",),
     ("generation", "raycasting"),
     ("quality",),

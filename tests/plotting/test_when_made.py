@@ -44,8 +44,11 @@ def picture(show, **options):
 def test_it_opens_from_its_own_view(kind):
     given = {"classification": "deferred"} if kind == "deferred" else {"cmap": "bone"}
     vdi = pvdi.generate(soft_ball(), OWN, WINDOW, **given)
-    several = {"series": "VDISeries", "set": "VDISet"}.get(kind)
-    thing = vdi if several is None else getattr(pvdi, several).of([vdi])
+    thing = vdi
+    if kind == "series":
+        thing = pvdi.VDISeries.of([vdi])
+    if kind == "set":
+        thing = pvdi.VDISet([vdi], [OWN], about={"camera": OWN.to_dict()})
     _, actor = picture(lambda plotter: plotter.add_vdi(thing))
     assert (actor.status.angle, actor.status.coverage) == (pytest.approx(0, abs=1e-6), 1)
 

@@ -24,7 +24,7 @@ class VDIActorMethods(PlayingMethods):
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
     def _become_vdi_actor(self: Any) -> None:
-        """Install the shader; to be called once, from ``__init__``."""
+        """Install a shader of its own."""
         super().SetShaderProperty(VDIShaderProperty())  # type: ignore[misc]
         show_image(self)
 
@@ -47,6 +47,13 @@ class VDIActorMethods(PlayingMethods):
         if isinstance(old, VDIMapperMethods) and old is not mapper:
             old.driver.leave_actor(self)
         super().SetMapper(mapper)  # type: ignore[misc]
+        # VTK keeps no more than its own part of a mapper, so this observer, which is never called,
+        # keeps the rest. The shader property is what VTK frees last of an actor: so the mapper goes
+        # after its actor, by Python, and not within VTK's collection, whose lock threads wait for.
+        shader = self.GetShaderProperty()
+        shader.RemoveObservers("UserEvent")
+        if mapper is not None:
+            shader.AddObserver("UserEvent", lambda *_: mapper)
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Show what another actor shows, by a copy of its mapper, which is of one actor.
@@ -64,8 +71,8 @@ class VDIActorMethods(PlayingMethods):
             copied = mapper.NewInstance() if isinstance(mapper, VDIMapperMethods) else mapper
             if copied is not mapper:
                 copied.ShallowCopy(mapper)
-        self.SetMapper(copied)
         super().ShallowCopy(other)  # type: ignore[misc]
+        self._become_vdi_actor()
         self.SetMapper(copied)
 
     def NewInstance(self) -> VDIActorMethods:

@@ -28,17 +28,10 @@ from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.box import Box
 from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding, number_of
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
-from pyvista_vdi.vtk_pipeline.drawing.frame import (
-    Drawn,
-    Frame,
-    Matrix,
-    consumers,
-    viewport,
-    volumes,
-)
+from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Matrix, consumers, viewport
 from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Images
-from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, touch
+from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, overlapped
 from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor, shown_box
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
@@ -48,7 +41,7 @@ from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window, now
-from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference, weakly
+from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference, weakly
 
 #: What is said where another volume has the mapper.
 _BEHIND_ANOTHER = (
@@ -195,11 +188,11 @@ class Driver(Deciding):
 
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image."""
-        frame, others = self._frame(mapper, renderer)
+        frame = self._showing(Frame.current(renderer, self._actor(), mapper))
         if frame is None:
             return self._last
-        if others and frame.volume is None:  # which has no lists to be merged by
-            part = self.window.shared(Overlaps).part(frame, _frames)
+        if frame.volume is None:  # which has no lists to be merged by
+            part = self.window.shared(Overlaps).part(frame)
             if part is not None:
                 return part
         window = self.window
@@ -219,24 +212,22 @@ class Driver(Deciding):
         frame = (frame if size == frame.full_size else few).coarser(size)
         return (self._images.get(frame) if frame.preview else None) or self._raycast(frame)
 
-    def _frame(self, mapper: Any, renderer: Any) -> tuple[Frame | None, bool]:
-        """Return the frame of what it shows, ``None`` if that is nothing, and if others do, too."""
-        frame = Frame.current(renderer, self._actor(), mapper)
-        window = Window.of(renderer.GetRenderWindow())
+    def _showing(self, frame: Frame) -> Frame | None:
+        """Return the frame of what is to be seen, ``None`` if that is nothing."""
+        window = Window.of(frame.renderer.GetRenderWindow())
         self._window, self._view = weakref.ref(window), frame.view
-        window.join(self, renderer)
-        shown = volumes(renderer)
-        others = len(shown) > 1
-        if others and any(p.GetMapper() is mapper and p is not frame.actor for p in shown):
+        if any(
+            v.mapper is frame.mapper and v.driver is None for v in window.shown_in(frame.renderer)
+        ):
             self._warnings.warn(_BEHIND_ANOTHER)
-        seen = self.decided(frame, joint=others and self._overlapped(frame, shown))
+        seen = self.decided(frame, joint=overlapped(frame))
         if seen is not None:
             self.box.place(seen.bounds)
             if seen.volume is None and seen.number != self._counted:
                 self._counted = seen.number
                 self._generation += 1
             seen = self._lit_and_blended(seen)
-        return seen, others
+        return seen
 
     def _lit_and_blended(self, frame: Frame) -> Frame:
         """Return the frame with the view whose light falls on it, and what it is blended of."""
@@ -477,34 +468,21 @@ class Driver(Deciding):
             selection.show(actor, renderer, None, self.device, self._first_hit)
         self._no_depth.show(renderer.GetRenderWindow(), mapper)
 
-    def _overlapped(self, frame: Frame, shown: list[Any]) -> bool:
-        """Whether one of the volumes that are shown is ours and lies where this one does."""
-        rectangles: list[Any] = []
-        for prop in shown:
-            driver = getattr(prop.GetMapper(), "driver", None)
-            source = driver.input if isinstance(driver, Driver) else None
-            bounds = None if source is None or not prop.GetVisibility() else source.bounds()
-            if bounds is not None:
-                rectangle = Frame.current(frame.renderer, prop, None).rectangle(bounds)
-                rectangles.insert(0 if driver is self else len(rectangles), rectangle)
-        return any(touch(rectangles[0], other) for other in rectangles[1:])
-
-    def beside(self, mapper: Any, renderer: Any) -> Frame | None:
+    def beside(self, mapper: Any, renderer: Any, matrix: Matrix) -> Frame | None:
         """Return the VDI as it is to be seen beside another one; ``None`` if it is not.
 
         Never raises. What is out of the picture is not brought up to date.
         """
-        return self._guarded(self._frame_in_picture, mapper, renderer)  # type: ignore[no-any-return]
 
-    def _frame_in_picture(self, mapper: Any, renderer: Any) -> Frame | None:
-        actor = self._actor()
-        bounds = None if self.input is None else self.input.bounds()
-        if actor is None or bounds is None:
-            return None
-        if Frame.current(renderer, actor, mapper).rectangle(bounds) is None:
-            return None
-        frame, _ = self._frame(mapper, renderer)
-        return None if frame is None or frame.volume is not None else frame
+        def in_picture(mapper: Any, renderer: Any) -> Frame | None:
+            bounds = None if self.input is None else self.input.bounds()
+            frame = Frame.current(renderer, self._actor(), mapper, matrix)
+            if bounds is None or frame.rectangle(bounds) is None:
+                return None
+            seen = self._showing(frame)
+            return None if seen is None or seen.volume is not None else seen
+
+        return self._guarded(in_picture, mapper, renderer)  # type: ignore[no-any-return]
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""
@@ -545,20 +523,3 @@ def _is_viewport(renderer: Any) -> bool:
     width, height, x, y = [0], [0], [0], [0]
     renderer.GetTiledSizeAndOrigin(width, height, x, y)
     return viewport(renderer) == ((x[0], y[0]), (width[0], height[0]))
-
-
-def _frames(own: Frame) -> list[Frame]:
-    """Return what the renderer shows of VDIs in this frame, in its order."""
-    frames = []
-    props = own.renderer.GetViewProps()
-    for i in range(props.GetNumberOfItems()):
-        prop = props.GetItemAsObject(i)
-        if prop is own.actor:
-            frames.append(own)
-            continue
-        mapper = prop.GetMapper() if isinstance(prop, vtkVolume) and prop.GetVisibility() else None
-        driver = getattr(mapper, "driver", None)
-        frame = driver.beside(mapper, own.renderer) if isinstance(driver, Driver) else None
-        if frame is not None:
-            frames.append(frame)
-    return frames

@@ -9,11 +9,12 @@ The others show nothing there. Which one it is cannot be seen.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.quality.records import replace
@@ -66,18 +67,14 @@ class Overlaps:
     def __init__(self) -> None:
         self._kept: Recent[_Picture] = Recent()
 
-    def part(self, own: Frame, others: Callable[[Frame], Sequence[Frame]]) -> Drawn | None:
-        """Return what an actor shows of the joint picture; ``None`` if it overlaps no other.
-
-        ``others`` gives all VDIs that the renderer shows, ``own`` among them, in its order. It is
-        called once for all of them, as long as each is drawn once.
-        """
+    def part(self, own: Frame) -> Drawn | None:
+        """Return what an actor shows of the joint picture; ``None`` if it overlaps no other."""
         # Where the frame's VDIs have been looked at already; once each, for a frame may have passes
         place = ("overlaps", own.renderer.GetAddressAsString(""))
         groups = own.window.of_frame.setdefault(place, {})
         key, group = groups.pop(id(own.driver), (None, None))
         if group is None or key != _key(own):
-            frames = others(own)
+            frames = _frames(own)
             if len(frames) == 1:
                 return None
             for members in _overlapping(frames):
@@ -138,19 +135,56 @@ def _raycast(frames: Sequence[Frame]) -> OwnedImage:
     return joint
 
 
+def _frames(own: Frame) -> list[Frame]:
+    """Return what the renderer shows of VDIs in this frame, in its order."""
+    frames = []
+    for each in own.window.shown_in(own.renderer):
+        if each.driver is own.driver:
+            frames.append(own)
+        elif each.driver is not None and each.visible:
+            frame = each.driver.beside(each.mapper, own.renderer, each.matrix)
+            frames += [] if frame is None else [frame]
+    return frames
+
+
+def overlapped(own: Frame) -> bool:
+    """Whether the data of another VDI may be seen where those of this one are."""
+    shown = [v for v in own.window.shown_in(own.renderer) if v.driver is not None and v.visible]
+    if len(shown) < 2:
+        return False
+    # Look at all once in this view: two eyes have two
+    place = (own.renderer.GetAddressAsString(""), own.origin, own.size, own.camera.window_center)
+    joint = own.window.of_frame.get(("overlapped", place, own.to_view.tobytes()))
+    if joint is None:
+        joint = own.window.of_frame["overlapped", place, own.to_view.tobytes()] = set()
+        rectangles: list[Matrix | None] = []
+        for each in shown:
+            mine = each.driver is own.driver  # whose matrix is that of the assembly by now
+            to_view = own.to_view @ (own.model_transform if mine else each.matrix)
+            frame = replace(own, camera=own.camera.replace(model_transform=to_view))
+            bounds = None if each.driver.input is None else each.driver.input.bounds()
+            rectangles.append(None if bounds is None else frame.rectangle(bounds))
+        touched = _touching(rectangles).sum(axis=0) > 1
+        joint.update(
+            id(v.driver) for v, is_touched in zip(shown, touched, strict=True) if is_touched
+        )
+    return id(own.driver) in joint
+
+
 def _overlapping(frames: Sequence[Frame]) -> list[list[Frame]]:
     """Divide VDIs into groups whose rectangles on the screen overlap, directly or by others."""
-    rectangles = [frame.rectangle(frame.bounds) for frame in frames]
+    touching = _touching([frame.rectangle(frame.bounds) for frame in frames])
     groups: list[set[int]] = []
-    for i, own in enumerate(rectangles):
-        touched = [g for g in groups if any(touch(own, rectangles[j]) for j in g)]
+    for i, touched_by in enumerate(touching):
+        touched = [g for g in groups if touched_by[list(g)].any()]
         groups = [g for g in groups if g not in touched]
         groups.append({i}.union(*touched))
     return [[frames[i] for i in sorted(group)] for group in groups]
 
 
-def touch(a: Matrix | None, b: Matrix | None) -> bool:
-    """Whether two rectangles of the picture, see :meth:`Frame.rectangle`, share pixels."""
-    if a is None or b is None:
-        return False
-    return bool((a[0] <= b[1] + _APART).all() and (b[0] <= a[1] + _APART).all())
+def _touching(rectangles: Sequence[Matrix | None]) -> NDArray[np.bool_]:
+    """Return which rectangles of the picture, see :meth:`Frame.rectangle`, share pixels: (n, n)."""
+    nowhere = np.full((2, 2), np.nan)
+    low, high = np.stack([nowhere if r is None else r for r in rectangles], axis=1)
+    before = (low[:, None] <= high + _APART).all(axis=-1)
+    return before & before.T
