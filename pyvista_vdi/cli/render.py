@@ -139,7 +139,7 @@ def _show(
         )
         if isinstance(shown, VDICollection) and shown.times is not None:
             _begin(actor, plotter, options, slider=screenshot is None)
-        aim(plotter.camera, camera, camera.model_transform)
+        aim(plotter.camera, camera)
         plotter.renderer.reset_camera_clipping_range()
         if screenshot is None:
             plotter.show()

@@ -460,7 +460,7 @@ def picture_view(vdi: Any) -> tuple[Camera, tuple[int, int]]:
 
     That on the screen, where the lists cover all of a volume.
     """
-    screen = getattr(vdi, "metadata", {}).get("screen")
+    screen: Any = getattr(vdi, "metadata", {}).get("screen")
     camera, size = vdi.camera, getattr(vdi, "picture_size", vdi.window_size)
     try:
         return camera.replace(**{name: screen[name] for name in _LENS}), size

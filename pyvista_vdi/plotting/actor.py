@@ -13,7 +13,7 @@ from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 from pyvista_vdi.vtk_pipeline.filters.view import framed
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, weakly
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkCamera, vtkImageData, weakly
 
 # PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
 require_this_build(Volume)
@@ -228,9 +228,10 @@ def first_camera(renderer: Any, bounds: Any) -> Any:
     first = next(each for each in plotter.renderers if each.GetActiveCamera() is camera)
     if first is not renderer:
         renderer, bounds = first, first.ComputeVisiblePropBounds()
-    camera = camera.copy()
+    copied = vtkCamera()
+    copied.DeepCopy(camera)
     position, focal_point, up = renderer.get_default_cam_pos()
-    camera.SetPosition(position)
-    camera.SetFocalPoint(focal_point)
-    camera.SetViewUp(up)
-    return framed(camera, renderer, bounds)
+    copied.SetPosition(position)
+    copied.SetFocalPoint(focal_point)
+    copied.SetViewUp(up)
+    return framed(copied, renderer, bounds)

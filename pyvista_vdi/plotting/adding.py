@@ -187,8 +187,9 @@ def added(
     remember(actor)
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
     render = not plotter._first_time if place.render is None else place.render
-    opens = isinstance(thing, VDI | VDICollection) or isinstance(first, DeferredVDI)
-    opens = opens and not plotter.camera_set
+    touched = plotter.camera_set or plotter.camera.parallel_projection
+    own = _own(first, several)
+    opens = own is not None and place.reset_camera is not False and not touched
     with _all_or_nothing(plotter, actor):
         plotter.add_actor(
             actor,
@@ -199,7 +200,6 @@ def added(
             render=render and not opens,
         )
         if opens:  # from its own view: others may show little of it
-            own = first if several is None else several
             aim(plotter.camera, picture_view(own)[0], as_array(actor.GetMatrix()))
             if place.reset_camera:
                 plotter.reset_camera(render=False)
@@ -242,6 +242,15 @@ def added_blocks(
             add = added_blocks if isinstance(block, pv.MultiBlock) else added
             actors.append(add(plotter, block, own, remember))
     return actors
+
+
+def _own(first: Any, several: VDICollection | None) -> Any:
+    """Return what has a view to open from; ``None`` for volumes, and sets that tell of none."""
+    if several is not None and several.times is None:
+        return several if "camera" in getattr(several, "about", {}) else None
+    if several is not None:
+        return several
+    return first if isinstance(first, VDI | DeferredVDI) else None
 
 
 def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:

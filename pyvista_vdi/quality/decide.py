@@ -201,8 +201,8 @@ def _frame(state: FrameState, f: FrameAsked) -> Decision:
         if f.trouble is not None:
             return state, (Raise(f.trouble),)
         if _drawable(state, f, f.wanted):
-            again = replace(f, look=False)
-            return state, (*_follow(state, f), Show("wanted", again, f.wanted.content))
+            asked = replace(f, look=False)
+            return state, (*_follow(state, f), Show("wanted", asked, f.wanted.content))
     state = replace(state, behind=f.watched)
     if f.watched:
         return _watched(state, f)
@@ -385,7 +385,7 @@ def _drawable(state: FrameState, f: FrameAsked, of: Any) -> bool:
 
 
 def _follow(state: FrameState, f: FrameAsked) -> tuple[Action, ...]:
-    """Have a VDI of what has changed be of this frame's view, if it is a whole picture."""
+    """Ask for this frame's view, if it is a whole picture, for a VDI of what has changed."""
     follows = f.one_view and f.look and state.settings.regenerate != "never"
     return (Do("follow view"),) if follows and _other_content(state, f) else ()
 

@@ -63,7 +63,7 @@ def classify_on_device(
 
 
 def release_values(deferred: DeferredVDI) -> None:
-    """Have devices hold a deferred VDI's values no longer; they are uploaded when used again."""
+    """Release a deferred VDI's values from devices; they are uploaded when used again."""
     with _lock:
         gone = _uploads.pop(deferred, None)
     del gone  # without the lock

@@ -228,7 +228,7 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> "PreparedVDI":
 
 
 def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) -> None:
-    """Have devices hold VDIs, values and volumes no longer; they are uploaded when used again."""
+    """Release VDIs, values and volumes from devices; they are uploaded when used again."""
     for thing in things:
         if isinstance(thing, Volume):
             release_voxels(thing)

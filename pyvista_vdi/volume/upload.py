@@ -140,7 +140,7 @@ def uploads_of(volume: Volume) -> _Uploads:
 
 
 def release_voxels(volume: Volume) -> None:
-    """Have devices hold a volume no longer; it is uploaded when it is used again."""
+    """Release a volume from devices; it is uploaded when it is used again."""
     with _uploads_lock:
         gone = _uploads.pop(volume, None)
     del gone  # without the lock

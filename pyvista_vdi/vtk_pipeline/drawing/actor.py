@@ -85,13 +85,12 @@ class VDIActorMethods(PlayingMethods):
 
         It is of the view that the first picture had; before that, of the view that it would have
         now; where a camera was given, of that. Making it is waited for. ``None`` where the mapper
-        has no input. Another one that is set is shown from the next frame on, and takes the place
-        of what made the one before: a volume, which is let go of.
+        has no input, or where nothing shows the actor and nobody has said a view. Another one that
+        is set is shown from the next frame on, and takes the place of what made the one before: a
+        volume, which is let go of.
 
         Raises
         ------
-        InvalidArgumentError
-            If nothing shows this actor, and nobody has said a view.
         VDIError
             What generating raises.
         """

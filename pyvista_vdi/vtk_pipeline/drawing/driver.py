@@ -120,11 +120,11 @@ class Driver(Deciding):
 
         What lit the last frame stays.
         """
-        if self.input is not None:
-            if isinstance(self.input, SourceInput):
-                self.input.keep_lights(self.renderers())
-            release_from_devices(self.input.on_devices())
+        held = [] if self.input is None else self.input.on_devices()
+        if isinstance(self.input, SourceInput):
+            self.input.keep_lights(self.renderers())
         super().release()
+        release_from_devices(held)
         self._texture.release()
         self._no_depth.release()
         self._selection.release()
@@ -377,21 +377,14 @@ class Driver(Deciding):
         It is of the view that the first picture had, or that somebody chose; before the first
         picture, of the view that this would have now. ``None`` without an input, or a view.
         """
-        source = self.input
+        source, seen = self.input, self._look_for_view()
         if not isinstance(source, SourceInput):
             if source is None or (source.last() is not None and source.prop is None):
                 return None if source is None else source.last()
-            self._look_for_view()
             return source.vdi()  # in the colours that its property has by now
-        seen = self._look_for_view()
         if source.has_view:
             self.tell(VDIAsked(source.last() is not None, source.stamp()))
-        elif seen is None:
-            raise InvalidArgumentError(
-                "nothing shows this actor, so there is no view to make its VDI of: add it to a "
-                "renderer, or call actor.regenerate(camera, window_size)"
-            )
-        elif self.state.settings.automatic_view:
+        elif seen is not None and self.state.settings.automatic_view:
             return source.of_view(source.view_for(*seen))
         return source.last()
 
@@ -411,7 +404,10 @@ class Driver(Deciding):
         return source.last() if same else source.source.MakeVDI(wanted)
 
     def values_asked_for(self) -> DeferredVDI | None:
-        """Return the values that are classified, made now if they are not; ``None`` of none."""
+        """Return the values that are classified, made now if they are not.
+
+        ``None`` where there are none, or no view to make them of.
+        """
         if self.input is None:
             return None
         self._look_for_view()

@@ -47,8 +47,8 @@ class Input:
     prop: Any = None
     #: What remedies a view that the VDI does not serve, where there is no source.
     remedy = (
-        "without its volume it cannot be made anew, and its own view is "
-        "plotter.camera = vdi.camera.to_pyvista()"
+        "without its volume it cannot be made anew, and plotter.camera = vdi.camera.to_pyvista() "
+        "goes to its own view"
     )
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
@@ -224,7 +224,7 @@ class SourceInput(Input):
         return max(stamps)
 
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
-        """Have it lit by a renderer that shows it, where it is placed; shown nowhere, as before."""
+        """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
         source, lit_by = self.source, self.source.GetLitBy()
         known = any(renderer is lit_by for renderer in renderers)
         if self.of_scene and not known and (self.alone or lit_by is None):
@@ -430,7 +430,7 @@ class DeferredInput(Input):
     def set_view_if_missing(
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
-        """Have the values made of the frame's view."""
+        """Take the view of a frame as that of the values, if there is none yet."""
         if isinstance(self._values, LateValues):
             self._values.take_view(camera, size, model_transform)
 

@@ -160,7 +160,7 @@ class SourceSettings(Classifying):
         self._watch_camera()
 
     def PlaceCamera(self, model_transform: ArrayLike) -> None:
-        """Say where the volume stands in the world of the camera that was set, (4, 4)."""
+        """Set where the volume stands in the world of the camera that was given, (4, 4)."""
         if self._given is not None:
             self._given.model_transform = model_transform
         if self._camera is not None:

@@ -24,7 +24,7 @@ def as_array(matrix: Any) -> NDArray[np.float64]:
     return np.array(elements).reshape(4, 4)
 
 
-def aim(theirs: Any, camera: Camera, matrix: ArrayLike | None = None) -> None:
+def aim(theirs: Any, camera: Camera, matrix: NDArray[np.float64] | None = None) -> None:
     """Set a ``vtkCamera`` to a view of the model frame, which a prop's matrix, (4, 4), places.
 
     The model transform is in the camera: where it is rigid beside that matrix, the eye moves.
