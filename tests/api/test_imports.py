@@ -72,7 +72,6 @@ LEVELS_WITHIN = {
     "io": (
         ("progress",),
         ("png", "time_steps", "vdi_file", "axes"),
-        ("coordinates",),
         ("stores",),
         ("volumes",),
         ("files",),
@@ -89,8 +88,8 @@ WITH_VTK = (
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = """
-aiohttp anywidget astropy cvista dask distributed h5py matplotlib mrcfile nibabel nrrd paraview
-pydicom pyopencl pyvista scipy skimage tifffile traitlets trame vtk vtkmodules xarray zarr
+SimpleITK aiohttp anywidget cvista dask distributed h5py matplotlib nrrd paraview pydicom pyopencl
+pyvista scipy skimage tifffile traitlets trame vtk vtkmodules zarr
 """
 
 
