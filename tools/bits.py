@@ -912,8 +912,6 @@ def saved(vdi: pvdi.VDI, suffix: str, **options: Any) -> Any:
                 parts = [
                     n.encode() + archive.read(n).replace(version, b"") for n in archive.namelist()
                 ]
-        elif suffix == ".exr":
-            parts = [path.read_bytes().replace(version, b"")]
         else:  # VTK's, with its version in it
             parts = []
         return [*parts, pvdi.read(path)]
@@ -941,13 +939,6 @@ def file_cases() -> Iterator[tuple[str, Case]]:
                 yield (
                     f"file/vdi/{name}/{precision}/{compression}",
                     lambda n=name, o=options: saved(plain(n), ".vdi", **o),
-                )
-        for exact in (True, False):
-            for compression in ("zips", "none"):
-                options = {"exact": exact, "compression": compression}
-                yield (
-                    f"file/exr/{name}/{'exact' if exact else 'plain'}/{compression}",
-                    lambda n=name, o=options: saved(plain(n), ".exr", **o),
                 )
         yield f"file/vti/{name}", lambda n=name: saved(plain(n), ".vti")
     for level in (1, 5, 9):

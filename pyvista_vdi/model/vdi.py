@@ -272,7 +272,8 @@ class VDI:
 
         With 8 bytes each list that is not empty takes 16 more, so that lists of one supersegment
         save nothing; in this process's memory the packed form lies beside the arrays. These hold
-        what it gives back, so that whatever reads them sees what is drawn. docs/conventions.md ("Packed supersegments") has the bounds.
+        what it gives back, so that whatever reads them sees what is drawn.
+        docs/conventions.md ("Packed supersegments") has the bounds.
 
         Parameters
         ----------
