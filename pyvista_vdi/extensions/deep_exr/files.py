@@ -132,7 +132,7 @@ def _vdi(path: Any, camera: Any, thickness: float | None) -> tuple[VDI, dict[str
             f"{path} was changed after pyvista-vdi wrote it: its bounds are those of its samples, "
             "and its metadata are left out"
         )
-    bounds = record.get("bounds")
+    bounds: Any = record.get("bounds")
     if camera is not None or not written:
         bounds = bounds_of_lists(view, counts, _ends(samples.front - shift, samples.back - shift))
     metadata = record["metadata"] if written else {"read_from": Path(path).name}
