@@ -443,9 +443,9 @@ def file_format(parser: argparse.ArgumentParser) -> None:
     option(
         group,
         "--compression",
-        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .exr: zips (default) or "
-        "none; of .vti: lz4 (default), zlib, lzma or none; of .html: deflate",
-        choices=("lz4", "zstd", "deflate", "zips", "zlib", "lzma", "none"),
+        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .vti: lz4 (default), zlib, "
+        "lzma or none; of .html: deflate",
+        choices=("lz4", "zstd", "deflate", "zlib", "lzma", "none"),
     )
     level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
     option(group, "--compression-level", level, "N", parse_whole)
@@ -457,9 +457,6 @@ def file_format(parser: argparse.ArgumentParser) -> None:
         "default",
         choices=PRECISIONS,
     )
-    standard = "leave out of an .exr what makes it exact: tau, and corrections"
-    switch(group, "--standard-channels", standard)
-    switch(group, "--linear", "write an .exr's colours as linear light, for compositing")
 
 
 def scheduler(options: Options) -> None:

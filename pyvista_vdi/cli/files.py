@@ -69,11 +69,7 @@ def convert(options: argparse.Namespace) -> int:
     require_vdi(options.file, "convert")
     target = checked_target(options.output)
     file_arguments = file_options(options)
-    foreign = {
-        "camera": given_camera(options),
-        "thickness": options.thickness,
-        "linear": options.from_linear or None,
-    }
+    foreign = {"camera": given_camera(options), "thickness": options.thickness}
     given = {name: value for name, value in foreign.items() if value is not None}
     with measuring("converting") as bar:
         vdi = read(options.file, progress=part(bar, 0.0, 0.5, "reading"), **given)

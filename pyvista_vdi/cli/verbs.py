@@ -49,7 +49,6 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--camera-json", view, "FILE")
     thickness = "world units, given to samples that have none (surfaces)"
     declare.option(group, "--thickness", thickness, "LENGTH", declare.parse_number)
-    declare.switch(group, "--from-linear", "the colours are linear light: show it by sRGB's curve")
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:

@@ -86,9 +86,8 @@ def write(
         ``compression`` and ``level`` for these; ``precision`` for ``.vdi`` and ``.html``, there
         ``title``, ``background`` and ``controls`` as well, and of a DeferredVDI what its
         transfer function begins with, as :meth:`DeferredVDI.classified` takes it: ``cmap``,
-        ``opacity``, ...; ``exact`` and ``linear`` for ``.exr``.
+        ``opacity``, ... . ``.exr`` has none.
         See :func:`pyvista_vdi.io.vdi_file.writer.write`,
-        :func:`pyvista_vdi.extensions.deep_exr.files.write`,
         :func:`pyvista_vdi.vtk_pipeline.filters.vti.write` and
         :func:`pyvista_vdi.extensions.web.page.page`.
 
@@ -106,7 +105,7 @@ def write(
     Cancelled
         If ``progress`` returned False.
     MissingDependencyError
-        If VTK is not installed and the name ends in ``.vti``.
+        If what such files need is not installed: VTK for ``.vti``, OpenEXR for ``.exr``.
 
     See Also
     --------
@@ -144,13 +143,13 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     progress : callable, optional
         As for :func:`write`.
     **options
-        ``camera``, ``thickness`` and ``linear`` for ``.exr``: see
-        :func:`pyvista_vdi.extensions.deep_exr.files.read`.
+        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.read`.
 
     Returns
     -------
     VDI or DeferredVDI or VDISeries or VDISet
-        The same to the last bit as was written by :func:`write`.
+        The same to the last bit as was written by :func:`write`; of ``.exr`` within float32's
+        rounding.
 
     Raises
     ------
@@ -162,7 +161,7 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     Cancelled
         If ``progress`` returned False.
     MissingDependencyError
-        If VTK is not installed and the name ends in ``.vti``.
+        If what such files need is not installed: VTK for ``.vti``, OpenEXR for ``.exr``.
     """
     found = format_of(path) or _own()
     if format_named(path) is None and str(path).lower().endswith(VOLUME_SUFFIXES):
@@ -212,7 +211,7 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     Raises
     ------
     MissingDependencyError
-        If VTK is not installed and the name ends in ``.vti``.
+        If what such files need is not installed: VTK for ``.vti``, OpenEXR for ``.exr``.
     """
     found = format_named(path)
     if found is not None and found.holds == "VDI":
@@ -237,12 +236,17 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     ------
     VDIFileError
         If the name ends in something else, or the target cannot be written.
+    MissingDependencyError
+        If what writes such files is not installed.
     """
     try:
         target = Path(path)
     except TypeError as error:
         raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
-    return check_writable(with_suffix(target, suffixes(), "a VDI"))
+    named = format_named(with_suffix(target, suffixes(), "a VDI"))
+    if named is not None:
+        named.load()  # what it needs is missed now
+    return check_writable(target)
 
 
 def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:

@@ -470,16 +470,16 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
            <String value="16-byte" /><String value="8-byte" />
          </StringListDomain>
          <Documentation>What a supersegment takes. usual: 8 bytes in a .vdis, a seventh of the exact
-         file at an SSIM of .9999; exact, 24 bytes, in a .vdi. An .exr is exact.</Documentation>
+         file at an SSIM of .9999; exact, 24 bytes, in a .vdi. An .exr has float32.</Documentation>
        </StringVectorProperty>
        <StringVectorProperty name="Compression" command="SetCompressionName" number_of_elements="1"
                              default_values="usual" panel_visibility="advanced">
          <StringListDomain name="list">
            <String value="usual" /><String value="lz4" /><String value="zstd" />
-           <String value="deflate" /><String value="zips" /><String value="none" />
+           <String value="deflate" /><String value="none" />
          </StringListDomain>
-         <Documentation>usual: zstd of .vdis, lz4 of .vdi (zstd is smaller), zips of .exr, which
-         has none beside it.</Documentation>
+         <Documentation>usual: zstd of .vdis, lz4 of .vdi (zstd is smaller); an .exr has no
+         other.</Documentation>
        </StringVectorProperty>
        <DoubleVectorProperty name="Tolerance" command="SetTolerance" number_of_elements="1"
                              default_values="0" panel_visibility="advanced">
