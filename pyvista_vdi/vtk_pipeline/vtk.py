@@ -73,7 +73,6 @@ _NAMES = {
     "vtkImagingHybrid": "vtkGaussianSplatter",
     "vtkImagingSources": "vtkImageGaussianSource vtkImageSinusoidSource",
     "vtkInteractionStyle": "vtkInteractorStyleTrackballCamera",
-    "vtkParallelCore": "vtkMultiProcessController",
     "vtkRenderingAnnotation": (
         "vtkAnnotatedCubeActor vtkAxesActor vtkCaptionActor2D vtkCornerAnnotation vtkScalarBarActor"
     ),

@@ -83,7 +83,7 @@ LEVELS_WITHIN = {
 WITH_VTK = (
     *("vtk_pipeline", "plotting", "extensions.paraview", "extensions.web.scenes"),
     *("extensions.series.pyvista_reader", "extensions.series.shown", "extensions.sets.shown"),
-    *("extensions.large.vtk_ranks", "extensions.paraview.parts"),
+    "extensions.paraview.parts",
 )
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.

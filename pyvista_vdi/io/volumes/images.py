@@ -140,7 +140,7 @@ def mrc(file: Path) -> list[VolumeInFile]:
     if not origin.any():  # CCP4's maps have whole voxels in place of an origin
         origin = step * [words[4 + axes.index(a)] for a in "xyz"]
     dtype, begin = np.dtype(f"{order}{_MODES[mode]}"), 1024 + int(words[23])
-    array = np.memmap(file, dtype, "r", begin, tuple(shape))
+    array = np.fromfile(file, dtype, int(np.prod(shape)), offset=begin).reshape(shape)
     return [VolumeInFile(array, axes[::-1], to_world(step, origin), unit="angstrom")]
 
 

@@ -122,7 +122,7 @@ def chosen(
     if asked in names:
         return names.index(asked)
     if isinstance(asked, bool | str) or not 0 <= asked < count:
-        raise InvalidArgumentError(f"{said}; got {asked!r}")
+        raise InvalidArgumentError(f"{file} has no {what} {asked!r}: it holds {listed or numbered}")
     return int(asked)
 
 

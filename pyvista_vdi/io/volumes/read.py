@@ -140,17 +140,14 @@ def needs_pyvista(file: Path) -> bool:
 
 
 def _format(path: str | os.PathLike[str]) -> VolumeFormat | None:
-    """Return a file's or a folder's format; ``None`` for a store; what cannot be opened is refused.
-
-    Pathlib's tests raise for names that are too long.
-    """
+    """Return a file's or a folder's format, ``None`` of a store; refuse what cannot be opened."""
     file = Path(path)
     try:
         if is_store(path):
             return None
-        if file.is_dir():
+        if os.path.isdir(file):  # noqa: PTH112 - pathlib's raises for a name that is too long
             return table.PICTURES if pictures.slices_in(file) else table.DICOM
-        if not file.exists():
+        if not os.path.exists(file):  # noqa: PTH110
             why = "does not exist: check the volume's path, or name a shipped volume by --example"
             raise InvalidVolumeError(f"{file} {why} (pyvista_vdi.examples)")
         if not file.is_file() or not file.stat().st_size:
