@@ -21,8 +21,8 @@ _FASTER_WITHIN = 10.0
 _NEAR, _WORTH_A_VDI = 0.09, 12
 #: Pictures by the volume, and estimates, that are remembered.
 _PICTURES, _ESTIMATES = 2 * _WORTH_A_VDI, 64
-#: Rays that an estimate casts, 16 tiles of 24 x 24 by the VDI and by the volume: to make a VDI of no
-#: more pixels takes no longer.
+#: Rays that an estimate casts, 16 tiles of 24 x 24 by the VDI and by the volume: to make a VDI of
+#: no more pixels takes no longer.
 _JUDGED = 2 * 16 * 24**2
 #: An estimate holds for pictures of views as near as this to its own (about radians).
 _ANOTHER_JUDGEMENT = 0.02

@@ -173,7 +173,7 @@ def _raycast(frames: Sequence[Frame], levels: Sequence[_Levels]) -> OwnedImage:
 
 
 def _leveled(vdis: Sequence[VDI], levels: Sequence[_Levels]) -> tuple[Sequence[VDI], _Levels]:
-    """Return VDIs of other colours, each by its levels, and what makes of their picture that of all.
+    """Return VDIs whose colours have gone through their levels, and the levels of their picture.
 
     Colours of VDIs are 0 to 1: what leaves that is brought there with all others, and back after.
     """
