@@ -80,7 +80,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     if is_vdi_image(data):
         raise InvalidVolumeError(
             f"{file} is a VDI in its VTK form, not a volume: "
-            "pyvista_vdi.render(pyvista.read(path), camera) shows it"
+            "plotter.add_vdi(pyvista.read(path)) shows it"
         )
     if data.n_points == 0 or not data.array_names:
         raise InvalidVolumeError(f"{file} holds no scalars that PyVista could read")
