@@ -75,6 +75,7 @@ registry.core = registry.Extension(
         "": "pyvista_vdi.plotting.imports:volumes_in",
     },
     methods={
+        "Camera.to_pyvista": "pyvista_vdi.plotting.imports:camera_to_pyvista",
         "DeferredVDI.classified": "pyvista_vdi.api.deferred:classified",
         "VDICollection.classified": "pyvista_vdi.api.deferred:classified_each",
         "TransferFunction.from_arguments": (

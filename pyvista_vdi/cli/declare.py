@@ -42,9 +42,8 @@ VDI_FILE = (
 )
 
 VOLUME_FILE = (
-    "a file of medicine, microscopy, simulation or astronomy (.nii.gz, .nrrd, .mha, .tif, .mrc, "
-    ".nc, .h5, .fits, .vti, .npy, ...), a raw file named like x_1024x1024x795_uint8.raw, a folder "
-    "of slices (DICOM, TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+    "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
+    "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 
 

@@ -30,7 +30,7 @@ from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
@@ -55,13 +55,14 @@ def render(options: argparse.Namespace) -> int:
         look = look_for(options, vdis[asks], options.files[asks])
         bar(0.5, "drawing")
         first = vdis[0]
-        view = camera(options, first.camera)
+        own, size = picture_view(first)
+        view = camera(options, own)
         several = len(vdis) > 1
         transforms = [vdi.camera.model_transform for vdi in vdis]
         image = render_vdi(
             vdis if several else first,
             view,
-            options.size or first.picture_size,
+            options.size or size,
             model_transforms=transforms if several else None,
             transmittance_cutoff=options.transmittance_cutoff,
             device=options.device,
@@ -88,7 +89,8 @@ def view(options: argparse.Namespace) -> int:
     else:
         shown = read(options.file)
         vdi = _at(shown, options.time)
-        size, first = options.size or vdi.picture_size, vdi.camera
+        first, own = picture_view(vdi)
+        size = options.size or own
         look = look_for(options, shown, options.file)
     # Last: what is wrong with the file is said with and without a display
     if screenshot is None and (trouble := why_no_window()) is not None:
@@ -138,7 +140,6 @@ def _show(
         if isinstance(shown, VDICollection) and shown.times is not None:
             _begin(actor, plotter, options, slider=screenshot is None)
         aim(plotter.camera, camera)
-        plotter.camera_set = True
         plotter.renderer.reset_camera_clipping_range()
         if screenshot is None:
             plotter.show()

@@ -225,7 +225,7 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         group,
         "--volume",
         "a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
-        "that it is the paper's; raw files are named like x_1024x1024x795_uint8.raw",
+        "that it is the paper's",
         "[NAME=]FILE",
         action="append",
     )

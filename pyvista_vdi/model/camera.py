@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
 from pyvista_vdi.model.checks import as_flag, as_float, as_floats
 
@@ -220,6 +221,33 @@ class Camera:
             state[name] = list(state[name])
         state["model_transform"] = self.model_transform.tolist()
         return state
+
+    def to_pyvista(self) -> Any:
+        """Return the view of the model frame as a PyVista camera: ``plotter.camera = ...``.
+
+        An actor whose matrix is the identity is seen as the model transform placed it: where this
+        is rigid by an eye that has moved instead, else by the camera's own model transform. Needs
+        PyVista.
+
+        Returns
+        -------
+        pyvista.Camera
+            The same picture.
+
+        Raises
+        ------
+        MissingDependencyError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import pyvista as pv
+        >>> import pyvista_vdi as pvdi
+        >>> plotter = pv.Plotter(off_screen=True)
+        >>> plotter.camera = pvdi.Camera((0, -4, 1), (0, 0, 0), (0, 0, 1)).to_pyvista()
+        >>> plotter.close()
+        """
+        return registry.method("Camera.to_pyvista")(self)
 
     def replace(self, **changes: Any) -> Camera:
         """Return a copy with some arguments of the constructor changed."""

@@ -110,9 +110,9 @@ class AddTransferFunctionEditor(Component):
                 "function to edit"
             )
         mapper = actor.GetMapper()
-        shown = mapper.driver.input if isinstance(mapper, VDIMapperMethods) else None
-        kept = None if shown is None else shown.deferred
-        if isinstance(mapper, VDIMapperMethods) and not mapper.GetSource() and kept is None:
+        ours = isinstance(mapper, VDIMapperMethods)
+        kept = mapper.driver.values_asked_for() if ours else None
+        if ours and not mapper.GetSource() and kept is None:
             raise UnsupportedError(
                 "this is a VDI without its volume, whose colours were fixed when it was generated: "
                 "add the volume (add_vdi(volume)), or a VDI of classification='deferred', to edit "

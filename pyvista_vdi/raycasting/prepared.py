@@ -5,7 +5,7 @@ import copy
 import functools
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,8 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.float32_limits import lists_are_far
 from pyvista_vdi.model.packing import Packed8, Packed16
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.classified_values import integrals, values_on_device
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.classified_values import integrals, release_values, values_on_device
 from pyvista_vdi.raycasting.kernels import (
     COUNT_PACKED,
     COUNT_SUPERSEGMENTS,
@@ -31,6 +32,7 @@ from pyvista_vdi.raycasting.kernels import (
     PREPARE_VALUES,
 )
 from pyvista_vdi.raycasting.packets import share_lit
+from pyvista_vdi.volume.upload import release_voxels
 
 #: Squares of stacks along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
 _SQUARES = 12
@@ -223,6 +225,20 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> "PreparedVDI":
             else:
                 place.prepared = PreparedVDI(runtime, vdi)
         return place.prepared
+
+
+def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) -> None:
+    """Release VDIs, values and volumes from devices; they are uploaded when used again."""
+    for thing in things:
+        if isinstance(thing, Volume):
+            release_voxels(thing)
+        elif thing is not None:
+            if isinstance(thing, DeferredVDI):
+                release_values(thing)
+            places: Any = _kept if isinstance(thing, DeferredVDI) else _prepared
+            with _lock:
+                gone = places.pop(thing, None)
+            del gone  # without the lock
 
 
 class PreparedVDI:

@@ -174,7 +174,7 @@ def warn():
         issued += 1
         over.wait(0.002)
 
-warning = threading.Thread(target=warn)
+warning = threading.Thread(target=warn, daemon=True)  # a job that fails ends the program
 warning.start()
 """
 

@@ -101,7 +101,6 @@ WRONG = {
     "--quality": NO_CHOICE,
     "--rate": (*NOT_ABOVE_0, "1e9"),
     "--regenerate": NO_CHOICE,
-    "--regenerate-below": (*BELOW_0, "1.5"),
     "--repeats": NO_COUNT,
     "--sample-distance": NOT_ABOVE_0,
     "--scalars": ("nothing", "''"),

@@ -159,7 +159,8 @@ def compiler():
 def test_declarations_are_as_compilers_see_kernels(compiler, declaration, defines):
     """Programs from a cache have no names on Intel's, so that every one is compiled here."""
     cl = devices.opencl()
-    program = cl._cl._Program(cl.Context([compiler]), programs.expand(declaration.path))
+    context = cl.Context([compiler])  # which a program does not keep alive
+    program = cl._cl._Program(context, programs.expand(declaration.path))
     options = (*define_options(defines), "-cl-kernel-arg-info")
     program._build(options=" ".join(("-cl-std=CL1.2", *options)).encode(), devices=[compiler])
     kernel = cl.Kernel(program, declaration.name)

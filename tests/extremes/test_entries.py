@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
@@ -20,13 +21,13 @@ from extreme_scenes import (
     view,
 )
 from oracle import assert_explained
+from reference.raycast import pixel_ray
 
-from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume, reference
+from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume
 from pyvista_vdi.model import float32_limits as numerics
 from pyvista_vdi.model.cropping import PRESETS
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
-from pyvista_vdi.reference.raycast import pixel_ray
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays
 

@@ -8,11 +8,12 @@ import zipfile
 
 import numpy as np
 import pytest
+import reference
 from rewriting import described
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import DeferredVDI, TransferFunction, io, reference
+from pyvista_vdi import DeferredVDI, TransferFunction, io
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import (
     InvalidArgumentError,

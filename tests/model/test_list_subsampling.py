@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference.raycast import render
 from strategies import random_vdi
 
 from pyvista_vdi import Camera
 from pyvista_vdi.model.list_subsampling import lists_crossed
-from pyvista_vdi.reference.raycast import render
 
 STRETCHED = np.diag([1.0, 2.0, 3.0, 1.0])
 LENSES = (

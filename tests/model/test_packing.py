@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import render_first_hits, render_vdi
 from extreme_scenes import slabs_vdi
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import assert_explained, total
 
-from pyvista_vdi import VDI, Camera, reference, render
+from pyvista_vdi import VDI, Camera, render
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, Packed16, gaps_and_thicknesses, packed_8
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 

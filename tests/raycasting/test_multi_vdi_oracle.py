@@ -12,6 +12,7 @@ import itertools
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import owned_image, render_vdi, render_vdis
 from extreme_scenes import slabs_vdi
@@ -19,7 +20,7 @@ from oracle import assert_explained
 from ray_scenes import random_ends, with_some
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import Camera, Cropping, InvalidArgumentError, reference
+from pyvista_vdi import Camera, Cropping, InvalidArgumentError
 from pyvista_vdi.model.ray_forms import cells_of_points
 from pyvista_vdi.raycasting import multi_vdi
 from pyvista_vdi.raycasting.multi_vdi import PlacedVDI

@@ -26,7 +26,7 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import checked_planes
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 
 try:
     import anywidget
@@ -259,7 +259,7 @@ class VDIWidget(anywidget.AnyWidget):
             _file=self._encoded(shown),
             _picture_size=_size_of(shown),
             _key=secrets.token_hex(8),
-            camera=shown.camera if camera is None else camera,
+            camera=picture_view(shown)[0] if camera is None else camera,
             time=shown.times[0] if isinstance(shown, VDISeries) else None,
             background=background,
             controls=controls,

@@ -37,18 +37,22 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         super().__init__(**ports)
         self._error: BaseException | None = None
         self._python_waits = False
+        self._before: Any = None
 
     def SetInputDataObject(self, *args: Any) -> None:
         """Set the input (optionally after a port number, 0)."""
         for each in args:
             vtk.require_this_build(type(each))
         super().SetInputDataObject(*args)
+        self._before = None
 
     def SetInputConnection(self, *args: Any) -> None:
         """Set what makes the input, a port of another algorithm (optionally after a number)."""
         for each in args:
             vtk.require_this_build(type(each))
         super().SetInputConnection(*args)
+        # Of an algorithm in Python VTK holds no more than what is written in C++
+        self._before = None if args[-1] is None else args[-1].GetProducer()
 
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""

@@ -268,21 +268,6 @@ def in_time(folder):
     return source
 
 
-def ranks(folder):
-    """Make VDIs of points, of cells and of time steps with all ranks of a server."""
-    source = brain_source(simple.OpenDataFile(str(folder / "brain.vti")))
-    simple.SaveData(str(folder / "points.vdi"), source)
-    picture = simple.VDIToImage(Input=source, Azimuth=AZIMUTH)
-    view = show_picture(picture, SIZE, "Surface")
-    simple.SaveScreenshot(str(folder / "picture.png"), view, ImageResolution=SIZE)
-    cells = brain_source(simple.PointDatatoCellData(Input=source.Input))
-    cells.Scalars = ["CELLS", "ImageScalars"]
-    simple.SaveData(str(folder / "cells.vdi"), cells)
-    wavelet = simple.Wavelet(WholeExtent=[-9, 10, -8, 12, -7, 6])
-    simple.SaveData(str(folder / "wavelet.vdi"), simple.VDISource(Input=wavelet, WindowSize=SIZE))
-    simple.SaveData(str(folder / "steps.vdis"), in_time(folder))
-
-
 def settings(folder):
     """Say what the properties became, and what a change of them did."""
     scalars, color, opacity = brain()
