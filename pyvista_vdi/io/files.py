@@ -13,7 +13,7 @@ from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.volumes.table import VOLUME_SUFFIXES
+from pyvista_vdi.io.volumes.formats import FORMATS
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
@@ -165,7 +165,8 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
         If VTK is not installed and the name ends in ``.vti``.
     """
     found = format_of(path) or _own()
-    if format_named(path) is None and str(path).lower().endswith(VOLUME_SUFFIXES):
+    of_volumes = tuple(suffix for each in FORMATS.values() for suffix in each.suffixes)
+    if format_named(path) is None and str(path).lower().endswith(of_volumes):
         raise VDIFileError(f"{path} is no VDI by its name: pyvista_vdi.read_volume reads volumes")
     _check_names("read", path, options, found.read_options)
     if found.reports_progress:
