@@ -13,7 +13,7 @@ from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.volumes.table import VOLUME_SUFFIXES
+from pyvista_vdi.io.volumes.formats import FORMATS
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
@@ -159,7 +159,8 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
         If what such files need is not installed: OpenEXR for ``.exr``.
     """
     found = format_of(path) or _own()
-    if format_named(path) is None and str(path).lower().endswith(VOLUME_SUFFIXES):
+    of_volumes = tuple(suffix for each in FORMATS.values() for suffix in each.suffixes)
+    if format_named(path) is None and str(path).lower().endswith(of_volumes):
         others = "pyvista_vdi.read_volume reads volumes"
         if str(path).lower().endswith(".vti"):
             others += f", and {_FROM_VTK} a VDI in its VTK form"
