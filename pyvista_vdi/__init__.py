@@ -61,15 +61,6 @@ registry.core = registry.Extension(
             compressions=("lz4", "zstd", "deflate", "none"),
             values=True,
         ),
-        registry.FileFormat(
-            ".vti",
-            "pyvista_vdi.vtk_pipeline.filters.vti",
-            compressions=("lz4", "zlib", "lzma", "none"),
-            shared=True,
-            reports_progress=False,
-            needs="VTK",
-            install='pip install "pyvista-vdi[plot]"',
-        ),
     ),
     readers={
         "": "pyvista_vdi.plotting.imports:volumes_in",

@@ -356,17 +356,16 @@ def estimate(
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> Any:
-    """Read a VDI from a file that :meth:`VDI.save` or VTK wrote, or any deep OpenEXR image.
+    """Read a VDI from a file that :meth:`VDI.save` wrote, or any deep OpenEXR image.
 
     Or a series or a set of them.
 
     Parameters
     ----------
     path : path-like
-        A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
-        in one of VTK's image files, ``.vti``, or a page with a VDI in it, ``.html``. Or the series
-        in a ``.vdis`` file, or the set in a ``.vdiset`` file, whose VDIs are read when they are
-        asked for.
+        A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a page with a VDI in
+        it, ``.html``. Or the series in a ``.vdis`` file, or the set in a ``.vdiset`` file, whose
+        VDIs are read when they are asked for.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none

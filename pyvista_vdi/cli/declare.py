@@ -36,10 +36,7 @@ _DECLARED = declared(
 #: What the step along a ray is where none is given.
 _HALF = " (default: half the smallest spacing)"
 
-VDI_FILE = (
-    "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, a VDI as .vti, or a page, "
-    ".html"
-)
+VDI_FILE = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
 
 VOLUME_FILE = (
     "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
@@ -212,7 +209,7 @@ def vdi_file(options: Options) -> None:
     option(options, "file", VDI_FILE, "FILE")
 
 
-def output(options: Options, text: str = ".vdi, .exr, .vti or .html to write") -> None:
+def output(options: Options, text: str = ".vdi, .exr or .html to write") -> None:
     """Add the file to write."""
     options.add_argument("-o", "--output", metavar="FILE", required=True, help=text)
 
@@ -443,9 +440,8 @@ def file_format(parser: argparse.ArgumentParser) -> None:
     option(
         group,
         "--compression",
-        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .vti: lz4 (default), zlib, "
-        "lzma or none; of .html: deflate",
-        choices=("lz4", "zstd", "deflate", "zlib", "lzma", "none"),
+        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .html: deflate",
+        choices=("lz4", "zstd", "deflate", "none"),
     )
     level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
     option(group, "--compression-level", level, "N", parse_whole)

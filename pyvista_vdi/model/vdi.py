@@ -318,7 +318,7 @@ class VDI:
         return registry.method("VDI.thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file that `pyvista_vdi.read` opens.
+        """Write a ``.vdi``, ``.exr`` or ``.html`` file that `pyvista_vdi.read` opens.
 
         The options are those of :func:`pyvista_vdi.io.write`.
         """

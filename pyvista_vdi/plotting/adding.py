@@ -187,7 +187,8 @@ def added(
     remember(actor)
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
     render = not plotter._first_time if place.render is None else place.render
-    touched = plotter.camera_set or plotter.camera.parallel_projection
+    camera = plotter.renderer.camera  # plotter.camera would set it
+    touched = camera.is_set or camera.parallel_projection
     own = _own(first, several)
     opens = own is not None and place.reset_camera is not False and not touched
     with _all_or_nothing(plotter, actor):
@@ -200,7 +201,7 @@ def added(
             render=render and not opens,
         )
         if opens:  # from its own view: others may show little of it
-            aim(plotter.camera, picture_view(own)[0], as_array(actor.GetMatrix()))
+            aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
             if place.reset_camera:
                 plotter.reset_camera(render=False)
             plotter.renderer.reset_camera_clipping_range()

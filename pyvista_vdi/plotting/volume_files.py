@@ -15,8 +15,7 @@ import pyvista as pv
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, with_article
 from pyvista_vdi.io.axes import to_world
-from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
-from pyvista_vdi.io.volumes.table import head_of
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.volumes import as_image
 from pyvista_vdi.vtk_pipeline import vtk
@@ -50,7 +49,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     if is_vdi_image(data):
         raise InvalidVolumeError(
             f"{file} is a VDI in its VTK form, not a volume: "
-            "pyvista_vdi.render(pyvista.read(path), camera) shows it"
+            "plotter.add_vdi(pyvista.read(path)) shows it"
         )
     place = to_world(data.direction_matrix * np.array(data.spacing), data.origin)
     active, found = data.active_scalars_info, []

@@ -97,6 +97,7 @@ _NAMES = {
         "vtkFixedPointVolumeRayCastMapper vtkGPUVolumeRayCastMapper vtkMultiVolume"
     ),
     "vtkRenderingVolumeOpenGL2": "vtkOpenGLGPUVolumeRayCastMapper",
+    "vtkViewsContext2D": "vtkContextInteractorStyle",
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

@@ -160,8 +160,8 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ("render a.vdi -o a.png --camera-json v.nrrd", "is no camera in JSON"),
         ("render a.vdi -o a.png --camera-json tf.json", "unknown entries"),
         ("render a.vdi -o a.png --view-angle 180", "between 0 and 180 degrees"),
-        ("generate v.nrrd -o b.png", "the name must end in .vdi or .vti.*, for instance 'b.vdi'"),
-        ("generate v.nrrd -o b.vti --precision 8-byte", "for .vdi.*, not b.vti: leave it out"),
+        ("generate v.nrrd -o b.png", "the name must end in .vdi.*, for instance 'b.vdi'"),
+        ("generate v.nrrd -o b.vti", "VTK writes its own files, .*; name a .vdi file here"),
         ("generate v.nrrd -o no/b.vdi", "the folder .*no does not exist; create it"),
         ("generate --example nothing -o b.vdi", "no example volume is called 'noth"),
         (

@@ -25,11 +25,6 @@ from pyvista_vdi.errors import VDIFileError
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals and limits")
 formats = pytest.mark.parametrize("suffix", io.suffixes())
 
-#: With processes: a `.vti` file goes the way of the others (`model.whole_file`), hence every night.
-formats_in_processes = pytest.mark.parametrize(
-    "suffix", [pytest.param(s, marks=[pytest.mark.slow] * (s == ".vti")) for s in io.suffixes()]
-)
-
 #: Where this process finds what tests share.
 SUPPORT = Path(__file__).parents[1] / "support"
 
@@ -78,7 +73,7 @@ def test_a_disk_that_fills_and_ctrl_c_at_each_write(suffix, fault, old, monkeypa
     vdi_number(2).save(tmp_path / f"counted{suffix}", **options(suffix))
     calls = len(left)
     (tmp_path / f"counted{suffix}").unlink()
-    # VTK and OpenEXR hand over all at once, and a page is one text
+    # OpenEXR hands over all at once, and a page is one text
     assert calls > (10 if suffix == ".vdi" else 1)
     error, message = (VDIFileError, "could not be written: No space left on device")
     if fault is interrupt:
@@ -172,7 +167,7 @@ def killed_at(moment, path):
 
 @pytest.mark.every(3)
 @posix
-@formats_in_processes
+@formats
 @pytest.mark.parametrize(
     "moments", [(0, 7, 9999), pytest.param((*range(0, 40, 3), 9999), marks=pytest.mark.slow)]
 )
@@ -199,7 +194,7 @@ def test_a_process_that_is_killed_while_it_saves(suffix, moments, tmp_path):
 
 
 @pytest.mark.every(3)
-@formats_in_processes
+@formats
 def test_two_processes_that_save_to_one_name(suffix, tmp_path):
     """Whoever reads meanwhile finds one of their files, whole."""
     path = vdi_number(1).save(tmp_path / f"a{suffix}", **options(suffix))

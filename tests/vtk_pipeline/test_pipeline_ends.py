@@ -219,7 +219,6 @@ def test_files_are_written_as_asked_for(vdi, tmp_path):
     with pytest.raises(errors.InvalidArgumentError, match="precision must be one of.*'4-byte'"):
         writer.SetPrecision("4-byte")
     for change, value, message in (
-        ("FileName", tmp_path / "a.vti", "a.vti.* precision"),
         ("Compression", "zip", "compression of .*'zip'"),
         ("Tolerance", 0.1, "a.vdi.* tolerance"),
     ):

@@ -2,8 +2,8 @@
 
 VTK draws the volumes of a renderer one after another and blends them in that order. So the first
 of several VDIs that overlap has the picture of all raycast, and every pixel of it is shown by one
-actor only: the first, in the renderer's order, that surely covers the pixel and contributes to it.
-The others show nothing there. Which one it is cannot be seen.
+actor only: the nearest that surely covers the pixel and contributes to it. The others show nothing
+there. Which one it is cannot be seen.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class _Picture:
 
 @dataclass
 class _Group:
-    """VDIs of a frame that overlap, in the renderer's order; drawn when the first is asked for."""
+    """VDIs of a frame that overlap, the nearest first; drawn when the first is asked for."""
 
     frames: list[Frame]
     picture: _Picture | None = None
@@ -173,7 +173,7 @@ def _raycast(frames: Sequence[Frame], levels: Sequence[_Levels]) -> OwnedImage:
 
 
 def _leveled(vdis: Sequence[VDI], levels: Sequence[_Levels]) -> tuple[Sequence[VDI], _Levels]:
-    """Return VDIs whose colours have gone through their levels, and the levels of their picture.
+    """Return VDIs in the colours of their levels, and what their picture is to be changed by.
 
     Colours of VDIs are 0 to 1: what leaves that is brought there with all others, and back after.
     """
@@ -233,7 +233,9 @@ def _overlapping(frames: Sequence[Frame]) -> list[list[Frame]]:
         touched = [g for g in groups if touched_by[list(g)].any()]
         groups = [g for g in groups if g not in touched]
         groups.append({i}.union(*touched))
-    return [[frames[i] for i in sorted(group)] for group in groups]
+    # The nearest first: in samples of a pixel where a mesh hides its box, none is to be seen
+    nearest = [frame.depths_of(frame.bounds)[0] for frame in frames]
+    return [[frames[i] for i in sorted(g, key=lambda i: (nearest[i], i))] for g in groups]
 
 
 def _touching(rectangles: Sequence[Matrix | None]) -> NDArray[np.bool_]:
