@@ -353,7 +353,7 @@ def test_permissions_are_the_users_and_kept_and_links_are_followed(tmp_path):
         ("a.vdi", {"compression": "gzip"}, r"must be one of lz4, zstd, deflate and none; got 'gz"),
         ("a.vdi", {"level": 0}, "level must be a whole number from 1 to 9; got 0"),
         ("a.vdi", {"level": "best"}, "level must be a whole number from 1 to 9; got 'best'"),
-        ("a.vdi", {"precision": "half"}, "precision must be one of exact and"),
+        ("a.vdi", {"precision": "half"}, "precision must be .exact. or .8-byte."),
         ("a.vdi", {"exact": True}, "options compression, level, precision; got exact"),
         ("a.exr", {"precision": "8-byte"}, "got precision"),
         ("a.exr", {"compression": "zips"}, "with the options none; got compression"),
