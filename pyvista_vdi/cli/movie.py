@@ -34,7 +34,7 @@ from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 
 Frame = NDArray[np.uint8]
 #: Names of moving pictures, and of single ones with a place for the number.
@@ -206,7 +206,8 @@ def _shown(
             )
         return render(vdi, view, size, device=options.device)
 
-    return draw, first.camera, steps, options.size or first.picture_size
+    own, size = picture_view(first)
+    return draw, own, steps, options.size or size
 
 
 def _angle(one: Camera, other: Camera) -> float:

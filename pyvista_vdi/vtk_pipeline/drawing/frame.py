@@ -79,6 +79,9 @@ class Frame:
     angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
     effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
     few_lists: VDI | None = None  # raycast in place of the VDI in a preview: every second list
+    parts: tuple[tuple[VDI, float], ...] = ()  # what the picture is blended of, with weights
+    blend: tuple[tuple[int, float], ...] = ()  # the same by numbers
+    lit_from: Camera | None = None  # whose light falls on a shaded volume, in place of the VDI's
     bounds: tuple[float, ...] = ()  # of what is seen, model frame
     options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
     depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
@@ -139,7 +142,8 @@ class Frame:
     @property
     def key(self) -> Any:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
-        return (self.camera, self.size, self.full_size, self.options, self.few_lists is None)
+        of = (self.camera, self.size, self.full_size, self.options)
+        return (*of, self.lit_from, self.blend, self.few_lists is None)
 
     @property
     def preview(self) -> bool:

@@ -227,8 +227,8 @@ class VDIMapperMethods(ArrayChoiceMethods):
             (``SetRegenerateBelow``): pictures depend on scene, view and the pictures before, never
             on time. ``"vdi"``: always the VDI. ``"volume"``: always the volume, by our volume
             raycaster; a VDI is made only when one is asked for. Volumes that overlap in the picture
-            are drawn by VDIs, ``"auto"`` off-screen by such as are of that view. In windows, a
-            volume that the device holds brick by brick is drawn by its VDI.
+            are drawn by VDIs, off-screen by such as are of that view. In windows, a volume that
+            the device holds brick by brick is drawn by its VDI.
 
         Raises
         ------
