@@ -55,13 +55,14 @@ def coverage(session: nox.Session) -> None:
 
 @nox.session
 def lint(session: nox.Session) -> None:
-    """Check style, formatting and spelling, as pre-commit does."""
+    """Check style, formatting and spelling, as pre-commit does, and ceilings of size."""
     session.install("ruff>=0.15", "codespell[toml]>=2.3", CLANG_FORMAT)
     session.run("ruff", "check", "--no-cache", ".")
     session.run("ruff", "format", "--no-cache", "--check", ".")
     session.run("codespell")
     kernels = map(str, sorted(Path("opencl").rglob("*.cl")))
     session.run("clang-format", "--dry-run", "--Werror", *kernels)
+    session.run("python", "tools/size.py")
 
 
 @nox.session

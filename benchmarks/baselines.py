@@ -10,10 +10,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))  # the reference, which baselines take
+
 from baselines.criteria import CRITERIA, RECORDED, cut
 from baselines.world_rays import WorldRays
 from scaling import fitted

@@ -50,10 +50,6 @@ class FileFormat:
         ``begins_with(path, magic)`` and ``data_in(path)``.
     values : bool
         Whether it holds deferred VDIs as well.
-    shared : bool
-        Whether other files have that suffix, too: its module has ``holds_vdi(path)``.
-    reports_progress : bool
-        Whether the module's functions take ``progress``.
     needs : str
         What its module cannot be loaded without, if that is optional.
     install : str
@@ -72,8 +68,6 @@ class FileFormat:
     magic: bytes = b""
     page: bool = False
     values: bool = False
-    shared: bool = False
-    reports_progress: bool = True
     needs: str = ""
     install: str = ""
     verbs: str = ""

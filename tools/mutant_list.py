@@ -654,7 +654,7 @@ PYTHON_MUTANTS = (
     _m(
         "decision: a VDI that is there is made again when it is asked for",
         DECIDE,
-        'if there and (state.settings.draw != "auto" or state.behind):',
+        'if there and (state.settings.draw == "vdi" or state.behind):',
         "if False:",
         ("quality",),
     ),

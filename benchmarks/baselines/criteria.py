@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from reference.generate import vdi_of_lists
 
 from pyvista_vdi.model.compositing import Segment, merge, opacity, split
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.reference.generate import vdi_of_lists
 
 Array = NDArray[np.float64]
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from reference.raycast import Lists, near_limit
 
 from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, Runtime
 from pyvista_vdi.device.constants import GROUP, block_items
@@ -14,7 +15,6 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.reference.raycast import Lists, near_limit
 
 KERNEL = KernelDeclaration(
     Path(__file__).with_name("world_rays.cl"),

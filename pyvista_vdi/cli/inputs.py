@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -145,6 +146,18 @@ def is_volume(options: argparse.Namespace) -> bool:
     return False
 
 
+def require_vdi(file: str, verb: str) -> None:
+    """Refuse a volume where a VDI is wanted, and say how the command makes one."""
+    if is_vdi_file(file) or holds(file) in ("series", "set"):
+        return
+    if not (is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long a name, too
+        raise VDIFileError(f"{printable(file)} does not exist: check the file's name")
+    raise UnsupportedError(
+        f"{printable(file)} is no VDI, which is what {verb} takes; of a volume, "
+        f"'pyvista-vdi generate {printable(file)} -o FILE.vdi' makes one"
+    )
+
+
 def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:
     """Refuse options that were given and would mean nothing: they are for something else."""
     for name in names:
@@ -229,10 +242,6 @@ def _refuse_with_values(options: argparse.Namespace) -> None:
         raise UnsupportedError(
             f"{target}: settings are chosen by a look, which --classification deferred does not "
             "have: give --max-supersegments"
-        )
-    if options.precision == "16-byte":
-        raise UnsupportedError(
-            "--precision 16-byte is none of VDIs that keep values: choose exact or 8-byte"
         )
 
 
@@ -350,16 +359,13 @@ _FILE_ARGUMENTS = {
     "compression": "compression",
     "compression_level": "level",
     "precision": "precision",
-    "standard_channels": "exact",
-    "linear": "linear",
 }
 
 
 def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of a file that were given."""
     given = {argument: getattr(options, name, None) for name, argument in _FILE_ARGUMENTS.items()}
-    given = {argument: v for argument, v in given.items() if v is not None and v is not False}
-    return given | {"exact": False} if "exact" in given else given
+    return {argument: value for argument, value in given.items() if value is not None}
 
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:

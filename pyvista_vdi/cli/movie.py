@@ -19,6 +19,7 @@ from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDI
 from pyvista_vdi.io import check_writable, to_bytes
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
+from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import with_suffix
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.view import aim
@@ -74,9 +75,8 @@ def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], li
         inputs.refuse(options, inputs.OF_NO_LOOK, "volumes", "this is a VDI: ")
         shown, draw = inputs.with_look(options, read(options.file), options.file), render
         steps = None if getattr(shown, "times", None) is None else len(shown)
-        one = shown if steps is None else shown[0]
-        first, size = one.camera, options.size or one.picture_size
-    size = [max(2, n - n % 2) for n in size]  # films halve their colours' pixels
+        first, size = picture_view(shown if steps is None else shown[0])
+    size = [max(2, n - n % 2) for n in options.size or size]  # films halve their colours' pixels
     path = views(inputs.camera(options, first), steps)
     with tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder:
         file = Path(folder) / target.name

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import re
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from pyvista_vdi import registry
 from pyvista_vdi._version import __version__
@@ -42,7 +43,14 @@ class UsageError(Exception):
 
 
 class _Parser(argparse.ArgumentParser):
-    """An argument parser that raises instead of leaving the process, and says one line."""
+    """An argument parser that raises instead of leaving the process, and says one line.
+
+    What begins with a minus and a digit is a value, -1.8e-15 and -1,0 as well as -1.5.
+    """
+
+    def _parse_optional(self, arg_string: str) -> Any:
+        # argparse's own rule knows no exponents
+        return None if re.match(r"-\.?\d", arg_string) else super()._parse_optional(arg_string)
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message}; see {self.prog} --help")

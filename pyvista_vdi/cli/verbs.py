@@ -49,7 +49,6 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--camera-json", view, "FILE")
     thickness = "world units, given to samples that have none (surfaces)"
     declare.option(group, "--thickness", thickness, "LENGTH", declare.parse_number)
-    declare.switch(group, "--from-linear", "the colours are linear light: show it by sRGB's curve")
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:
@@ -179,7 +178,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     declare.option(
         parser,
         "--precision",
-        "of the supersegments: exact (default, 24 bytes each), 16-byte or 8-byte",
+        "of the supersegments: exact (default, 24 bytes each) or 8-byte",
         choices=PRECISIONS,
         default="exact",
     )
@@ -225,7 +224,7 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         group,
         "--volume",
         "a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
-        "that it is the paper's; raw files are named like x_1024x1024x795_uint8.raw",
+        "that it is the paper's",
         "[NAME=]FILE",
         action="append",
     )
@@ -337,7 +336,7 @@ VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI, or each of a series or set, as .vdi, .exr, .vti; all as .html; a set as .cdb",
+        "write a VDI, or each of a series or set, as .vdi, .exr; all as .html; a set as .cdb",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),

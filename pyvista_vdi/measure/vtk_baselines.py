@@ -59,7 +59,7 @@ class OffScreenVolume:
         """Draw a frame and wait until it is finished; nothing is read back."""
         from pyvista_vdi.vtk_pipeline.filters.view import aim
 
-        aim(self._renderer.GetActiveCamera(), camera)
+        aim(self._renderer.GetActiveCamera(), camera, camera.model_transform)
         matrix = vtk.vtkMatrix4x4()
         matrix.DeepCopy(camera.model_transform.ravel().tolist())
         self._volume.SetUserMatrix(matrix)

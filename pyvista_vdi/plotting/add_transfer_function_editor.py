@@ -430,7 +430,7 @@ def _histogram(mapper: Any) -> tuple[NDArray[Any], NDArray[Any]] | None:
         values = pv.wrap(mapper.GetInput()).active_scalars
     elif mapper.GetSource() is not None:
         values = mapper.GetSource().GetVolume().array
-    elif mapper.driver.input is not None and (kept := mapper.driver.input.deferred) is not None:
+    elif (kept := mapper.driver.values_asked_for()) is not None:
         counts, edges = np.histogram(kept.mean, _BARS, (0, 1), weights=kept.steps)
         return counts, np.interp(edges, (0, 1), kept.value_range)
     else:

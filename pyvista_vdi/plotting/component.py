@@ -145,8 +145,10 @@ class AddVDI(Component):
             VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
             view is drawn. With VDIs nothing is generated, and arguments that
-            only a volume can honour are refused. A :class:`DeferredVDI`, or a series or a set of
-            such, takes a look (``cmap``, ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
+            only a volume can honour are refused; where nobody has set the camera, the plotter opens
+            from the VDI's own view, ``plotter.camera = vdi.camera.to_pyvista()``. A
+            :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``,
+            ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
         scalars : str or numpy.ndarray, optional
             Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
         clim : float or (float, float), optional
@@ -166,8 +168,9 @@ class AddVDI(Component):
             As in ``add_volume``.
         ambient, diffuse, specular, specular_power, shade
             As in ``add_volume``: without ``shade`` the others change nothing. A shaded VDI is lit
-            by the plotter's lights as they stand in its generating view: lights that follow the
-            camera move in the picture when the VDI is regenerated, and other lights regenerate it.
+            by the lights of the plotter that shows it, as they stand in its generating view: lights
+            that follow the camera move in the picture when the VDI is regenerated; other lights,
+            and another place among lights of the scene, regenerate it.
         categories : bool or int
             As many colours as there are different values, or this many.
         multi_colors : bool
@@ -206,7 +209,7 @@ class AddVDI(Component):
             Error that may be traded for shorter lists.
         view_cone : float
             Half angle of the cone of new views that must be served, degrees.
-        precision : {"exact", "16-byte", "8-byte"}
+        precision : {"exact", "8-byte"}
             What a supersegment takes, see :meth:`pyvista_vdi.VDI.with_precision`.
         quality : {"reference", "high", "balanced", "fast"}, optional
             Choose the settings by how good pictures are to be, from a short measurement: see
@@ -227,8 +230,8 @@ class AddVDI(Component):
         interpolation : {"nearest", "linear"}
             Between voxels; ``add_volume`` draws ``"nearest"``.
         camera : pyvista.Camera or vtkCamera or Camera, optional
-            The generating view; by default the plotter's camera at the first render, and that of
-            the frame where ``regenerate`` says so.
+            The generating view; by default that of the first picture, and that of the frame where
+            ``regenerate`` says so.
         coverage : {"bounds", "view"}
             ``"bounds"``: the VDI covers the whole volume, so that neither panning nor zooming out
             shows a cut edge. ``"view"``: it covers the window.
@@ -270,9 +273,9 @@ class AddVDI(Component):
             if it returns ``False``. Ctrl-C stops it as well.
         classification : {"baked", "deferred"}
             When scalars are classified: as the VDI is made, or by whoever shows it. Deferred, one
-            :class:`DeferredVDI` is made, for the plotter's view or ``camera``, and ``actor.prop``
-            and its lookup table classify it: what is changed there is seen in the next frame, and
-            nothing is generated again.
+            :class:`DeferredVDI` is made with the first picture, of its view or ``camera``, and
+            ``actor.prop`` and its lookup table classify it: what is changed there is seen in the
+            next frame, and nothing is generated again.
         value_range : (float, float), optional
             Least and largest scalar to keep, where deferred: as for :func:`pyvista_vdi.generate`.
         importance : array_like of float, optional
@@ -283,7 +286,8 @@ class AddVDI(Component):
         Returns
         -------
         PlotterVDIActor or list
-            A ``pyvista.Volume``; ``actor.vdi`` is the current VDI, made now where there is none,
+            A ``pyvista.Volume``; ``actor.vdi`` is the VDI, made whenever it is asked for and there
+            is none, before the first picture too, for the view that this would have,
             ``actor.regenerate()`` makes another from the current view, and ``actor.status`` says
             how it is drawn. Changes to ``actor.prop``, to the array's values or to the mask are in
             the next picture. A ``MultiBlock`` gives a list of actors.

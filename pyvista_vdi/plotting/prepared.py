@@ -18,6 +18,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.plotting.actor import first_camera
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import load
 from pyvista_vdi.plotting.uniform import UniformGrid
@@ -81,10 +82,4 @@ def _mask(mask: Any, grid: Any, stored: StoredVolume | None) -> Any:
 
 def framing_camera(plotter: Any, bounds: Sequence[float]) -> Camera:
     """Return the plotter's view, or about what it will be where nobody has set it."""
-    if plotter.renderer.camera.is_set:
-        return Camera.from_any(plotter.camera)
-    framed = pv.Camera()
-    box = pv.Box(bounds)
-    framed.position = np.add(box.center, np.multiply(box.length, (1.0, 1.0, 1.0)))
-    framed.focal_point = box.center
-    return Camera.from_any(framed)
+    return Camera.from_any(first_camera(plotter.renderer, bounds))

@@ -116,7 +116,8 @@ def decide(state: FrameState, event: Event) -> Decision:
                 (Complain(error), Show("before")) if shown else (Do("forget view"), Raise(error))
             )
         case VDIAsked(there, stamp):
-            if there and (state.settings.draw != "auto" or state.behind):
+            # Where frames keep it up to date, or will
+            if there and (state.settings.draw == "vdi" or state.behind):
                 return state, ()
             state, actions = _nothing_goes_on(state)
             again = stamp != state.failed_in_frame
@@ -196,14 +197,16 @@ def _frame(state: FrameState, f: FrameAsked) -> Decision:
         f = replace(f, look=f.whole and f.number != state.number)
         state = replace(state, number=f.number)
     if settings.draw == "volume" and not f.joint:
+        state = replace(state, behind=False)
         if f.trouble is not None:
             return state, (Raise(f.trouble),)
         if _drawable(state, f, f.wanted):
-            return state, (Show("wanted", replace(f, look=False), f.wanted.content),)
+            asked = replace(f, look=False)
+            return state, (*_follow(state, f), Show("wanted", asked, f.wanted.content))
     state = replace(state, behind=f.watched)
     if f.watched:
         return _watched(state, f)
-    if f.seen is None and (settings.draw != "auto" or callable(settings.regenerate)):
+    if f.seen is None and (settings.draw == "vdi" or callable(settings.regenerate)):
         return state, (*_update(state, f), Show("last"))
     before: tuple[Action, ...] = ()
     if f.one_view and f.look:
@@ -212,9 +215,8 @@ def _frame(state: FrameState, f: FrameAsked) -> Decision:
         if f.answer:
             again = AskAgain(replace(f, answer=False))
             return state, (Do("take view"), Do("update"), again)
-        if settings.regenerate != "never" and _other_content(state, f):
-            before = (Do("follow view"),)
-    if settings.draw == "auto":
+        before = _follow(state, f)
+    if settings.draw != "vdi":
         return _faithful(state, f, before)
     return state, (*before, *_update(state, f, before), Show("last"))
 
@@ -380,6 +382,12 @@ def _drawable(state: FrameState, f: FrameAsked, of: Any) -> bool:
     if of.content in f.refused:
         return False
     return state.refused is None or bool(state.refused != of.content)
+
+
+def _follow(state: FrameState, f: FrameAsked) -> tuple[Action, ...]:
+    """Ask for this frame's view, if it is a whole picture, for a VDI of what has changed."""
+    follows = f.one_view and f.look and state.settings.regenerate != "never"
+    return (Do("follow view"),) if follows and _other_content(state, f) else ()
 
 
 def _other_content(state: FrameState, f: FrameAsked) -> bool:

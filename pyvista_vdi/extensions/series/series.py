@@ -130,7 +130,7 @@ class VDISeries(VDICollection):
             part = VDISeries(Called(self._steps.__getitem__, chosen), self.times[index], volumes)
             part._maker = self._maker
             return part
-        return self._steps[range(len(self))[index]]
+        return self._steps[self._place(index, "steps")]
 
     def __iter__(self) -> Iterator[VDI]:
         return (self[i] for i in range(len(self)))

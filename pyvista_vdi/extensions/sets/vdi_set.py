@@ -183,7 +183,7 @@ class VDISet(VDICollection):
     def __getitem__(self, index: int | slice) -> VDI | list[VDI]:
         if isinstance(index, slice):
             return [self[i] for i in range(len(self))[index]]
-        i, n = range(len(self))[index], len(self._views)
+        i, n = self._place(index, "VDIs"), len(self._views)
         return self._views[i] if i < n else self._added[i - n]
 
     def __iter__(self) -> Iterator[VDI]:

@@ -257,7 +257,7 @@ def write_series(
     precision: str = "8-byte",
     tolerance: float = 0.0,
     key_every: int = KEY_EVERY,
-    compression: str = "zstd",
+    compression: str = DEFLATE,
     level: int | None = None,
     title: str | None = None,
     background: Sequence[float] = (0.0, 0.0, 0.0),
@@ -288,7 +288,7 @@ def write_set(
     *,
     precision: str = "8-byte",
     tolerance: float = 0.0,
-    compression: str = "zstd",
+    compression: str = DEFLATE,
     level: int = 1,
     title: str | None = None,
     background: Sequence[float] = (0.0, 0.0, 0.0),
@@ -400,7 +400,8 @@ def _view_of(vdi: VDI, background: Sequence[float]) -> View:
     behind = check_background(background)
     percents = " ".join(f"{100 * channel:g}%" for channel in behind)
     still = np.rint(over_background(_from_generating_view(vdi), background) * 255)
-    return View(None, f"rgb({percents})", still.astype(np.uint8), vdi.picture_size)
+    size = vdi.window_size if "screen" in vdi.metadata else vdi.picture_size  # of that view
+    return View(None, f"rgb({percents})", still.astype(np.uint8), size)
 
 
 def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:

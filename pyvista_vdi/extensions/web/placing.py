@@ -128,8 +128,8 @@ def encoded_many(shown: VDISeries | VDISet) -> tuple[bytes, int]:
     """
     stream = io.BytesIO()
     if isinstance(shown, VDISeries):
-        writer = StepsWriter("8-byte", 0.0, KEY_EVERY, "zstd", None)
+        writer = StepsWriter("8-byte", 0.0, KEY_EVERY, "deflate", None)
         cut = write_series(stream, writer, shown, shown.times, None)
     else:
-        cut = write_set(stream, StepsWriter("8-byte", 0.0, 1, "zstd", None), shown)
+        cut = write_set(stream, StepsWriter("8-byte", 0.0, 1, "deflate", None), shown)
     return stream.getvalue(), cut

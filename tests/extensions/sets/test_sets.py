@@ -311,7 +311,7 @@ def test_what_is_no_set_is_refused(made):
         pvdi.VDISet.of([])
     with pytest.raises(InvalidVDIError, match="in a list"):
         pvdi.VDISet.of(made[0])
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match=r"is out of range: there are \d+ VDIs"):
         made[len(made)]
     assert [vdi is made[i] for i, vdi in enumerate(made)] == [True] * len(made)
     assert made[1:3] == [made[1], made[2]]

@@ -66,7 +66,7 @@ export function headOf(bytes) {
     broken("its head is no JSON");
   }
   const { codec } = told ?? {};
-  if (!["none", "lz4", "zstd", "deflate"].includes(codec)) broken("its head names no codec");
+  if (codec !== "deflate") broken("its head names no codec");
   const set = beginsBy(bytes, MAGIC_BYTES) ? null : setOf(told);
   return { begin: 20 + size, codec, set };
 }

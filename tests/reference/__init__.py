@@ -9,16 +9,16 @@ ray, :func:`volume_image` the direct volume rendering, :func:`build_vdi` a plain
 
 from __future__ import annotations
 
-from pyvista_vdi.reference.generate import (
+from reference.generate import (
     RaySamples,
     ambient_transmittance,
     build_vdi,
     samples,
     volume_image,
 )
-from pyvista_vdi.reference.multi_vdi import render_joint, render_joint_range
-from pyvista_vdi.reference.ranges import render_range
-from pyvista_vdi.reference.raycast import render, render_pixels
+from reference.multi_vdi import render_joint, render_joint_range
+from reference.ranges import render_range
+from reference.raycast import render, render_pixels
 
 __all__ = [
     "RaySamples",

@@ -11,7 +11,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.reference.raycast import Line, Lists, Rays, composite_lines, near_limit
+from reference.raycast import Line, Lists, Rays, composite_lines, near_limit
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def render_range(
     Parameters
     ----------
     vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
-        As for :func:`pyvista_vdi.reference.render`.
+        As for :func:`reference.render`.
     pixels : sequence of (int, int)
         ``(x, y)`` of each, y = 0 at the bottom.
     k : float

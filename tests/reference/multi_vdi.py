@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite, optical_depth_over_length
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.reference.ranges import (
+from reference.ranges import (
     FACE_ROUNDINGS,
     RAY_ROUNDINGS,
     ROUNDOFF,
@@ -24,7 +24,7 @@ from pyvista_vdi.reference.ranges import (
     _Move,
     _window_nudges,
 )
-from pyvista_vdi.reference.raycast import Line, Lists, Rays, crossings
+from reference.raycast import Line, Lists, Rays, crossings
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def render_joint(
     """Return the exact image of several VDIs in one scene: float64 (H, W, 4), premultiplied RGBA.
 
     ``cameras`` are the new view, with each VDI's model transform; clipping planes, cropping and
-    opacity multipliers those of each VDI; the rest is as for :func:`pyvista_vdi.reference.render`.
+    opacity multipliers those of each VDI; the rest is as for :func:`reference.render`.
     """
     width, height = window_size
     views = _views(vdis, cameras, window_size, opaque_depth, clipping_planes, cropping)
@@ -116,7 +116,7 @@ def render_joint_range(
 ) -> tuple[Array, Array]:
     """Return the smallest and largest colour over rays moved by their arithmetic's roundings.
 
-    As :func:`pyvista_vdi.reference.render_range`, which derives how far and has the other
+    As :func:`reference.render_range`, which derives how far and has the other
     parameters; each VDI's ray is moved on its own, because each is computed in its own list space.
     In addition each VDI's segments are moved along the ray, by ``k`` roundings of the depths
     between which all of them lie.

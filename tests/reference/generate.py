@@ -17,8 +17,8 @@ from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.reference.raycast import HalfSpace, Ray, clip, inside_box, pixel_ray
-from pyvista_vdi.reference.shading import (
+from reference.raycast import HalfSpace, Ray, clip, inside_box, pixel_ray
+from reference.shading import (
     NodeOcclusion,
     cut_where_unlike,
     gradient_factors,
