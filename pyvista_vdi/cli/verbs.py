@@ -118,8 +118,7 @@ def _add_frames(parser: argparse.ArgumentParser, frames: str) -> None:
     declare.vdi_or_volume(parser)
     declare.output(
         parser,
-        ".gif to write; or .mp4, .webm (pip install 'pyvista-vdi[movie]'); or pictures, "
-        "frame_{:04d}.png",
+        ".gif, .mp4 or .webm to write (pip install 'pyvista-vdi[movie]')",
     )
     declare.size(parser, None)
     declare.option(
