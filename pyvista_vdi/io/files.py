@@ -156,9 +156,10 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
         If ``progress`` returned False.
     """
     found = format_of(path) or _own()
-    if format_named(path) is None and str(path).lower().endswith(VOLUME_SUFFIXES):
+    name = str(path).lower()
+    if format_named(path) is None and name.endswith((".vti", *VOLUME_SUFFIXES)):
         others = "pyvista_vdi.read_volume reads volumes"
-        if str(path).lower().endswith(".vti"):
+        if name.endswith(".vti"):
             others += f", and {_FROM_VTK} a VDI in its VTK form"
         raise VDIFileError(f"{path} is no VDI by its name: {others}")
     _check_names("read", path, options, found.read_options)
