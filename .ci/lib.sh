@@ -248,7 +248,7 @@ not_of_readme() {
     for file in /etc/OpenCL/vendors/*.icd $(type -aP mpirun mpiexec node npm Xvfb exrinfo oiiotool \
         pvpython clang chromium{,-browser,-headless-shell} google-chrome firefox{,-esr}); do
         [[ ! -f $file || ($file != *.icd && ! -x $file) ]] || readlink -f "$file"
-    done
+    done | sort -u
 }
 
 # as_readme COMMAND...: run it where those are hidden, and nothing is set that README does not set.

@@ -65,8 +65,7 @@ def public() -> Iterator[str]:
             yield from signatures(f"examples.{name}", thing)
     points = {(each.group, each.name) for each in distribution("pyvista-vdi").entry_points}
     yield from sorted(map(": ".join, points))
-    editors = ("add_transfer_function_editor", "remove_transfer_function_editor")
-    for name in ("add_vdi", "add_vdi_clip_plane", *editors, "vdi"):
+    for name in ("add_vdi", "add_vdi_clip_plane", "add_transfer_function_editor", "vdi"):
         found = getattr(pv.Plotter, name)
         yield f"Plotter.{name}{inspect.signature(vars(found).get('__call__', found))}"
     yield from signatures("ImageData.vdi", pv.ImageData.vdi)

@@ -369,14 +369,13 @@ def read(path: str | os.PathLike[str], **options: Any) -> Any:
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none
-        (surfaces); ``linear``, whether the colours are linear light. For all files ``progress``,
-        called with the finished fraction, 0 to 1.
+        (surfaces). For all files ``progress``, called with the finished fraction, 0 to 1.
 
     Returns
     -------
     VDI or DeferredVDI or VDISeries or VDISet
-        The same to the last bit if this package wrote the file; what is lost with other programs'
-        files is said in the documentation of files.
+        The same to the last bit if this package wrote the file, of ``.exr`` within float32's
+        rounding; what is lost with other programs' files is said in the documentation of files.
 
     Raises
     ------

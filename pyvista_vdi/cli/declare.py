@@ -39,9 +39,8 @@ _HALF = " (default: half the smallest spacing)"
 VDI_FILE = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
 
 VOLUME_FILE = (
-    "a file of medicine, microscopy, simulation or astronomy (.nii.gz, .nrrd, .mha, .tif, .mrc, "
-    ".nc, .h5, .fits, .vti, .npy, ...), a raw file named like x_1024x1024x795_uint8.raw, a folder "
-    "of slices (DICOM, TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+    "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
+    "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 
 
@@ -441,9 +440,8 @@ def file_format(parser: argparse.ArgumentParser) -> None:
     option(
         group,
         "--compression",
-        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .exr: zips (default) or "
-        "none; of .html: deflate",
-        choices=("lz4", "zstd", "deflate", "zips", "none"),
+        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .html: deflate",
+        choices=("lz4", "zstd", "deflate", "none"),
     )
     level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
     option(group, "--compression-level", level, "N", parse_whole)
@@ -455,9 +453,6 @@ def file_format(parser: argparse.ArgumentParser) -> None:
         "default",
         choices=PRECISIONS,
     )
-    standard = "leave out of an .exr what makes it exact: tau, and corrections"
-    switch(group, "--standard-channels", standard)
-    switch(group, "--linear", "write an .exr's colours as linear light, for compositing")
 
 
 def scheduler(options: Options) -> None:

@@ -69,11 +69,7 @@ def convert(options: argparse.Namespace) -> int:
     require_vdi(options.file, "convert")
     target = checked_target(options.output)
     file_arguments = file_options(options)
-    foreign = {
-        "camera": given_camera(options),
-        "thickness": options.thickness,
-        "linear": options.from_linear or None,
-    }
+    foreign = {"camera": given_camera(options), "thickness": options.thickness}
     given = {name: value for name, value in foreign.items() if value is not None}
     with measuring("converting") as bar:
         vdi = read(options.file, progress=part(bar, 0.0, 0.5, "reading"), **given)
@@ -97,12 +93,11 @@ def _own_verbs(file: str | None) -> Any:
 
 def _of_volume(volume: Volume) -> dict[str, Any]:
     # What all chunks hold is not read for this: there may be terabytes
-    known = volume.chunks is None or volume.chunks.ranges() is not None
     rows = {
         "dimensions": volume.dimensions,
         "scalars": volume.name,
         "type": f"{volume.array.dtype}{', RGBA' if volume.rgba else ''}",
-        "range": volume.finite_range() if known else None,
+        "range": None if volume.chunked else volume.finite_range(),
         "spacing": volume.spacing,
         "origin": volume.origin,
         "direction": volume.direction.tolist(),

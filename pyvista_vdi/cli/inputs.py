@@ -363,16 +363,13 @@ _FILE_ARGUMENTS = {
     "compression": "compression",
     "compression_level": "level",
     "precision": "precision",
-    "standard_channels": "exact",
-    "linear": "linear",
 }
 
 
 def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of a file that were given."""
     given = {argument: getattr(options, name, None) for name, argument in _FILE_ARGUMENTS.items()}
-    given = {argument: v for argument, v in given.items() if v is not None and v is not False}
-    return given | {"exact": False} if "exact" in given else given
+    return {argument: value for argument, value in given.items() if value is not None}
 
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:

@@ -49,7 +49,6 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--camera-json", view, "FILE")
     thickness = "world units, given to samples that have none (surfaces)"
     declare.option(group, "--thickness", thickness, "LENGTH", declare.parse_number)
-    declare.switch(group, "--from-linear", "the colours are linear light: show it by sRGB's curve")
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:
@@ -226,7 +225,7 @@ def _add_benchmark(parser: argparse.ArgumentParser) -> None:
         group,
         "--volume",
         "a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
-        "that it is the paper's; raw files are named like x_1024x1024x795_uint8.raw",
+        "that it is the paper's",
         "[NAME=]FILE",
         action="append",
     )

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
-from pyvista_vdi.io.progress import Progress
+from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
@@ -89,9 +89,8 @@ def write(
         ``compression`` and ``level`` for these; ``precision`` for ``.vdi`` and ``.html``, there
         ``title``, ``background`` and ``controls`` as well, and of a DeferredVDI what its
         transfer function begins with, as :meth:`DeferredVDI.classified` takes it: ``cmap``,
-        ``opacity``, ...; ``exact`` and ``linear`` for ``.exr``.
-        See :func:`pyvista_vdi.io.vdi_file.writer.write`,
-        :func:`pyvista_vdi.extensions.deep_exr.files.write` and
+        ``opacity``, ... . ``.exr`` has none.
+        See :func:`pyvista_vdi.io.vdi_file.writer.write` and
         :func:`pyvista_vdi.extensions.web.page.page`.
 
     Returns
@@ -107,6 +106,8 @@ def write(
         If an option is unknown or out of its range.
     Cancelled
         If ``progress`` returned False.
+    MissingDependencyError
+        If OpenEXR is not installed and the name ends in ``.exr``.
 
     See Also
     --------
@@ -122,7 +123,13 @@ def write(
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
     check_write_options(target, options)
-    return found.load().write(vdi, target, progress=progress, **options)  # type: ignore[no-any-return]
+    written: Path
+    if found.reports_progress:
+        written = found.load().write(vdi, target, progress=progress, **options)
+    else:
+        written = found.load().write(vdi, target, **options)
+        Pieces(progress, 1)()
+    return written
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> Any:
@@ -137,13 +144,13 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     progress : callable, optional
         As for :func:`write`.
     **options
-        ``camera``, ``thickness`` and ``linear`` for ``.exr``: see
-        :func:`pyvista_vdi.extensions.deep_exr.files.read`.
+        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.read`.
 
     Returns
     -------
     VDI or DeferredVDI or VDISeries or VDISet
-        The same to the last bit as was written by :func:`write`.
+        The same to the last bit as was written by :func:`write`; of ``.exr`` within float32's
+        rounding.
 
     Raises
     ------
@@ -154,6 +161,8 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
         If an option is unknown.
     Cancelled
         If ``progress`` returned False.
+    MissingDependencyError
+        If OpenEXR is not installed and the name ends in ``.exr``.
     """
     found = format_of(path) or _own()
     name = str(path).lower()
@@ -163,7 +172,11 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
             others += f", and {_FROM_VTK} a VDI in its VTK form"
         raise VDIFileError(f"{path} is no VDI by its name: {others}")
     _check_names("read", path, options, found.read_options)
-    return found.load().read(path, progress=progress, **options)
+    if found.reports_progress:
+        return found.load().read(path, progress=progress, **options)
+    read_whole = found.load().read(path, **options)
+    Pieces(progress, 1)()
+    return read_whole
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
@@ -223,6 +236,8 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     ------
     VDIFileError
         If the name ends in something else, or the target cannot be written.
+    MissingDependencyError
+        If what writes such files is not installed.
     """
     try:
         target = Path(path)
@@ -230,7 +245,10 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
         raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
     if target.suffix.lower() == ".vti":
         raise VDIFileError(f"{target}: VTK writes its own files, {_TO_VTK}; name a .vdi file here")
-    return check_writable(with_suffix(target, suffixes(), "a VDI"))
+    named = format_named(with_suffix(target, suffixes(), "a VDI"))
+    if named is not None:
+        named.load()  # what it needs is missed now
+    return check_writable(target)
 
 
 def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:

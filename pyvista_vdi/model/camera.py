@@ -163,7 +163,8 @@ class Camera:
             return camera.replace(model_transform=model_transform) if given else camera
         if not hasattr(camera, "GetDirectionOfProjection"):
             try:
-                position, focal_point, view_up = () if isinstance(camera, str) else camera
+                vectors: Any = () if isinstance(camera, str) else camera
+                position, focal_point, view_up = vectors
             except (TypeError, ValueError):
                 raise InvalidCameraError(
                     "expected a pyvista_vdi.Camera, a vtkCamera, a pyvista.Camera or (position, "

@@ -241,8 +241,8 @@ def _kept(mask: Any, grid: Any) -> tuple[NDArray[np.bool_], bool]:
     raise InvalidArgumentError(
         f"mask must have a label at each of the volume's points, or for each of its cells; its "
         f"{mask.n_points} points cover {_rounded(mask.bounds)}, and the volume's {grid.n_points} "
-        f"{_rounded(grid.bounds)}: resample it, by pyvista.ImageData.sample(mask, "
-        "categorical=True) of the volume's grid"
+        f"{_rounded(grid.bounds)}: resample it to the volume's points, by the nearest label "
+        "(PyVista's sample)"
     )
 
 

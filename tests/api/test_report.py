@@ -39,7 +39,7 @@ def test_a_report_says_what_is_missing(monkeypatch):
     monkeypatch.setattr(metadata, "version", version)
     described = pvdi.Report()
     assert described.packages["h5py"] is None
-    assert 'pip install "pyvista-vdi[hdf5]"' in repr(described)
+    assert 'pip install "pyvista-vdi[files]"' in repr(described)
     assert "no device" in repr(described)
 
 

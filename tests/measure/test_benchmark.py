@@ -291,15 +291,15 @@ def test_made_volumes_are_as_empty_and_as_turbulent_as_the_papers():
 
 def test_files_are_data_sets_too(tmp_path):
     array = np.arange(4 * 3 * 2, dtype="<u2").reshape(2, 3, 4)
-    raw = tmp_path / "nut_4x3x2_uint16.raw"
-    raw.write_bytes(array.tobytes())
+    raw = tmp_path / "nut.npy"
+    np.save(raw, array)
     dataset = find_dataset(f"beechnut={raw}")
     assert (dataset.name, dataset.paper, dataset.source) == ("beechnut", "beechnut", "file")
     assert np.array_equal(dataset.load().array, array)
     assert find_dataset(str(raw)).paper is None
     (tmp_path / "run=3").mkdir()
     apart = raw.rename(tmp_path / "run=3" / raw.name)
-    for name, label in ((str(apart), "nut_4x3x2_uint16"), (f"beechnut={apart}", "beechnut")):
+    for name, label in ((str(apart), "nut"), (f"beechnut={apart}", "beechnut")):
         assert find_dataset(name).name == label
         assert np.array_equal(find_dataset(name).load().array, array)
     nrrd = find_dataset(str(examples.path("brain")))

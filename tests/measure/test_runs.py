@@ -70,8 +70,8 @@ def test_a_volume_that_cannot_be_read_is_said(tmp_path, capsys, monkeypatch, def
 
 
 def test_the_engine_alone_can_run_it(verb, default_runtime, tmp_path):
-    file = tmp_path / "ball_11x10x12_uint16.raw"
-    file.write_bytes(np.load("ball.npy").tobytes())
+    file = tmp_path / "other.npy"
+    np.save(file, np.load("ball.npy"))
     places = {"ball.npy": file, ".": tmp_path, "a.json": tmp_path / "a.json"}
     result = run_bare([str(places.get(word, word)) for word in RUNS[verb]])
     assert result.returncode == 0, result.stderr

@@ -33,10 +33,10 @@ def shell():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with a volume as NumPy's file and as a raw one."""
+    """A folder with a volume in two files of NumPy's."""
     path = tmp_path_factory.mktemp("tradeoff")
     np.save(path / "ball.npy", shell())
-    (path / "ball_20x18x14_uint8.raw").write_bytes(shell().tobytes())
+    np.save(path / "shell.npy", shell())
     return path
 
 
@@ -150,9 +150,9 @@ def test_a_tiny_run_writes_what_the_schema_says(runtime, folder, tmp_path, capsy
 
 
 def test_python_and_the_command_measure_the_same(default_runtime, folder, tmp_path):
-    run = (folder / "ball_20x18x14_uint8.raw", *TINY_RUN, "--sweep", "lists=0.5", "--no-vtk")
+    run = (folder / "shell.npy", *TINY_RUN, "--sweep", "lists=0.5", "--no-vtk")
     assert tradeoff(*run, "--out", tmp_path, "--device", default_runtime.info.selector) == 0
-    commanded = Tradeoff.read(tmp_path / "tradeoff-ball_20x18x14_uint8.json")
+    commanded = Tradeoff.read(tmp_path / "tradeoff-shell.json")
     ours = measure_tradeoff(
         pvdi.Volume(shell()),
         sweep({"lists": (0.5,)}),

@@ -23,7 +23,7 @@ from pyvista_vdi.cli.inputs import (
     with_look,
 )
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
-from pyvista_vdi.extensions.series.cli import OF_READ_IMAGES, OF_WRITTEN_IMAGES, write_each
+from pyvista_vdi.extensions.series.cli import OF_READ_IMAGES, write_each
 from pyvista_vdi.extensions.sets import cinema, files
 from pyvista_vdi.extensions.sets.generate import generate_set
 from pyvista_vdi.io.files import format_named
@@ -110,7 +110,6 @@ def convert(options: argparse.Namespace) -> int:
     page = found is not None and found.page
     if suffix not in (files.SUFFIX, cinema.SUFFIX) and not page:
         return write_each(vdi_set, target, arguments)
-    refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {suffix}")
     if suffix == cinema.SUFFIX:
         refuse(options, ("compression", "compression_level", "precision"), "VDIs, not .cdb")
     with measuring("converting") as bar:

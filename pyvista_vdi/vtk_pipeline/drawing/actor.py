@@ -71,8 +71,9 @@ class VDIActorMethods(PlayingMethods):
             copied = mapper.NewInstance() if isinstance(mapper, VDIMapperMethods) else mapper
             if copied is not mapper:
                 copied.ShallowCopy(mapper)
+        self.SetMapper(copied)
         super().ShallowCopy(other)  # type: ignore[misc]
-        self._become_vdi_actor()
+        self._become_vdi_actor()  # VTK has it share the other one's shader
         self.SetMapper(copied)
 
     def NewInstance(self) -> VDIActorMethods:

@@ -24,7 +24,6 @@ from pyvista_vdi.quality.render_mode import seconds_per_pixel
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick
 from pyvista_vdi.raycasting.prepared import release_from_devices
-from pyvista_vdi.vtk_pipeline.drawing import passes
 from pyvista_vdi.vtk_pipeline.drawing.box import Box
 from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding, number_of
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
@@ -32,6 +31,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Matrix, consume
 from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Images
 from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, overlapped
+from pyvista_vdi.vtk_pipeline.drawing.refused import effects_without
 from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor, shown_box
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
@@ -148,6 +148,9 @@ class Driver(Deciding):
             if actor is not None:  # whose shader the copy has
                 place_image(actor, 0, (0, 0), (1, 1))
             return
+        origin, size = viewport(renderer)
+        if min(size) == 0:  # beside the tile of a picture that is drawn
+            return
         # VTK asks for four where the actor's property says that they are dependent
         components = 1 if actor.GetProperty().GetIndependentComponents() else 4
         if self.box.components != components:
@@ -158,10 +161,11 @@ class Driver(Deciding):
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
             return
-        occluded = peeled = False
-        if renderer.GetPass() is not None or renderer.GetUseDepthPeelingForVolumes():
-            occluded, peeled = passes.tell_effects(renderer, self._warnings.warn)
-        self._selection.leave(actor, occluded=occluded, peeled=peeled)
+        effects = effects_without(renderer)
+        for text in effects.values():
+            self._warnings.warn(text)
+        peeled = "vtkDualDepthPeelingPass" in effects
+        self._selection.leave(actor, occluded="vtkSSAOPass" in effects, peeled=peeled)
         with suppress(VDIError):  # which what is drawn says
             self.box.Update()
         drawn = self._last = self._guarded(self._paint, mapper, renderer) or self._last
@@ -169,7 +173,6 @@ class Driver(Deciding):
         if window.GetInteractor() is not None:
             of_window.listen(window.GetInteractor(), Grabbing)
         unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
-        origin, size = viewport(renderer)
         place_image(actor, unit, origin, size)
         if drawn.smooth:
             self._scissor.narrow(window, shown_box(drawn.image, origin, size))

@@ -2,8 +2,8 @@
 
 VTK draws the volumes of a renderer one after another and blends them in that order. So the first
 of several VDIs that overlap has the picture of all raycast, and every pixel of it is shown by one
-actor only: the first, in the renderer's order, that surely covers the pixel and contributes to it.
-The others show nothing there. Which one it is cannot be seen.
+actor only: the nearest that surely covers the pixel and contributes to it. The others show nothing
+there. Which one it is cannot be seen.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.records import replace
 from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
@@ -35,11 +36,44 @@ _APART = 1.0
 _numbers = itertools.count(-1, -1)
 
 
+@dataclass(frozen=True)
+class _Levels:
+    """What a mapper's final window and level make of straight colours: scale times them and bias.
+
+    Of premultiplied ones VTK's shader makes scale times them and bias times their opacity. Sums of
+    media keep that: so each VDI's colours can be changed before they are merged.
+    """
+
+    scale: float = 1.0
+    bias: float = 0.0
+
+    @classmethod
+    def of(cls, mapper: Any) -> _Levels:
+        window, level = mapper.GetFinalColorWindow(), mapper.GetFinalColorLevel()
+        return cls(1 / window, 0.5 - level / window) if window else cls()
+
+    def done(self, image: Image) -> Image:
+        """Return premultiplied RGBA as the shader shows it."""
+        return self._changed(image, self.scale, self.bias)
+
+    def undone(self, image: Image) -> Image:
+        """Return premultiplied RGBA that the shader shows as this one."""
+        return self._changed(image, 1 / self.scale, -self.bias / self.scale)
+
+    def _changed(self, image: Image, scale: float, bias: float) -> Image:
+        if (scale, bias) == (1.0, 0.0):
+            return image
+        changed = np.float32(scale) * image + np.float32(bias) * image[..., 3:]
+        changed[..., 3] = image[..., 3]
+        return changed
+
+
 @dataclass
 class _Picture:
     """A joint picture, and the image that each actor shows of it."""
 
     joint: OwnedImage
+    levels: list[_Levels]  # of each actor
     depth: Image | None
     parts: dict[int, Image] = field(default_factory=dict)
     numbers: dict[int, int] = field(default_factory=dict)
@@ -49,13 +83,14 @@ class _Picture:
         number = self.numbers.setdefault(index, next(_numbers))
         if index not in self.parts:
             mine = self.joint.owner == index
-            self.parts[index] = np.where(mine[..., np.newaxis], self.joint.image, np.float32(0))
+            part = np.where(mine[..., np.newaxis], self.joint.image, np.float32(0))
+            self.parts[index] = self.levels[index].undone(part)  # as the shader is about to
         return Drawn(self.parts[index], full_size, number=number, joint=True)
 
 
 @dataclass
 class _Group:
-    """VDIs of a frame that overlap, in the renderer's order; drawn when the first is asked for."""
+    """VDIs of a frame that overlap, the nearest first; drawn when the first is asked for."""
 
     frames: list[Frame]
     picture: _Picture | None = None
@@ -100,7 +135,8 @@ class Overlaps:
             frames = [first, *(replace(f, depth=None).coarser(size) for f in frames[1:])]
             picture = self._known(frames) if first.preview else None
         if picture is None:
-            picture = _Picture(_raycast(frames), frames[0].depth)
+            levels = [_Levels.of(frame.mapper) for frame in frames]
+            picture = _Picture(_raycast(frames, levels), levels, frames[0].depth)
             self._kept.keep(_key(*frames), picture)
         for other in self._kept.values():
             if other is not picture:
@@ -115,16 +151,17 @@ class Overlaps:
 
 def _key(*frames: Frame) -> Any:
     """Return what VDIs look like together, but for what hides them."""
-    return tuple((id(f.driver), f.number, f.key) for f in frames)
+    return tuple((id(f.driver), f.number, f.key, _Levels.of(f.mapper)) for f in frames)
 
 
-def _raycast(frames: Sequence[Frame]) -> OwnedImage:
+def _raycast(frames: Sequence[Frame], levels: Sequence[_Levels]) -> OwnedImage:
     before = now()
+    vdis, all_levels = _leveled([frame.vdi for frame in frames if frame.vdi], levels)
     # One device draws them all, and the same in whatever order they were added
     devices = {repr(frame.driver.device): frame.driver.device for frame in frames}
     device, first = devices[min(devices)], frames[0]
     joint = owned_image(
-        [PlacedVDI(frame.vdi, frame.camera, frame.options) for frame in frames if frame.vdi],
+        [PlacedVDI(v, f.camera, f.options) for v, f in zip(vdis, frames, strict=True)],
         FrameRequest(first.camera, first.size, opaque_depth=first.depth, device=device),
         margin=_MARGIN,
     )
@@ -132,7 +169,24 @@ def _raycast(frames: Sequence[Frame]) -> OwnedImage:
     for frame in frames:  # as if each had drawn its own
         took = (frame.size, frame.full_size, seconds / len(frames))
         frame.window.pace = frame.window.pace.drawn(*took, effort=frame.effort)
-    return joint
+    return OwnedImage(all_levels.done(joint.image), joint.owner)
+
+
+def _leveled(vdis: Sequence[VDI], levels: Sequence[_Levels]) -> tuple[Sequence[VDI], _Levels]:
+    """Return VDIs in the colours of their levels, and what their picture is to be changed by.
+
+    Colours of VDIs are 0 to 1: what leaves that is brought there with all others, and back after.
+    """
+    if set(levels) == {_Levels()}:
+        return vdis, _Levels()
+    ends = [end for each in levels for end in (each.bias, each.scale + each.bias)]
+    low, high = min(ends), max(ends)
+    leveled = []
+    for vdi, each in zip(vdis, levels, strict=True):
+        color = (np.float64(each.scale) * vdi.color + (each.bias - low)) / (high - low)
+        of = (vdi.camera, vdi.window_size, vdi.offsets, vdi.front, vdi.back, np.clip(color, 0, 1))
+        leveled.append(VDI(*of, vdi.optical_depth, vdi.bounds, depth_origin=vdi.depth_origin))
+    return leveled, _Levels(high - low, low)
 
 
 def _frames(own: Frame) -> list[Frame]:
@@ -179,7 +233,9 @@ def _overlapping(frames: Sequence[Frame]) -> list[list[Frame]]:
         touched = [g for g in groups if touched_by[list(g)].any()]
         groups = [g for g in groups if g not in touched]
         groups.append({i}.union(*touched))
-    return [[frames[i] for i in sorted(group)] for group in groups]
+    # The nearest first: in samples of a pixel where a mesh hides its box, none is to be seen
+    nearest = [frame.depths_of(frame.bounds)[0] for frame in frames]
+    return [[frames[i] for i in sorted(g, key=lambda i: (nearest[i], i))] for g in groups]
 
 
 def _touching(rectangles: Sequence[Matrix | None]) -> NDArray[np.bool_]:

@@ -159,7 +159,7 @@ class VDIWriter(Algorithm):
         """Set what a supersegment takes: ``"exact"``, ``"16-byte"`` or ``"8-byte"``.
 
         By default, ``None``, steps of a ``.vdis`` take 8 bytes, and all else is exact, as with
-        :meth:`VDI.save`. ``.exr`` files are exact.
+        :meth:`VDI.save`. ``.exr`` files have float32.
         """
         self._change("_precision", None if precision is None else check_precision(precision))
 

@@ -253,7 +253,7 @@ class VDISource(SourceSettings):
         if self.GetNumberOfInputConnections(0) == 0:
             return None
         data = self.UpdateInput()
-        if isinstance(data, vtkImageData) and self._holds_all(data):
+        if isinstance(data, vtkImageData):
             return tuple(data.GetBounds()) if data.GetNumberOfPoints() else None
         return self._known_bounds()
 
@@ -406,7 +406,7 @@ class VDISource(SourceSettings):
         data = self.GetInputDataObject(0, 0)
         if data is not None and not isinstance(data, vtkImageData):
             return None
-        if data is not None and data.GetNumberOfPoints() > 0 and self._holds_all(data):
+        if data is not None and data.GetNumberOfPoints() > 0:
             grid.CopyStructure(data)
             return grid
         if extent is None:
@@ -420,10 +420,6 @@ class VDISource(SourceSettings):
             if information.Has(key):
                 put(information.Get(key))
         return grid
-
-    def _holds_all(self, data: vtkImageData) -> bool:
-        """Whether the data at the input are all of it."""
-        return True
 
     def _advance(self, fraction: float) -> bool:
         self.UpdateProgress(fraction)

@@ -78,7 +78,7 @@ def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(
 
 @needs_mpi
 def test_whatever_is_wrong_with_the_input_of_one_rank_all_raise(tmp_path, default_runtime):
-    run(3, PROGRAM, "pipeline,closing", tmp_path)
+    run(3, PROGRAM, "closing", tmp_path)
 
 
 @pytest.mark.slow
