@@ -50,8 +50,6 @@ class FileFormat:
         ``begins_with(path, magic)`` and ``data_in(path)``.
     values : bool
         Whether it holds deferred VDIs as well.
-    reports_progress : bool
-        Whether the module's functions take ``progress``.
     needs : str
         What its module cannot be loaded without, if that is optional.
     install : str
@@ -70,7 +68,6 @@ class FileFormat:
     magic: bytes = b""
     page: bool = False
     values: bool = False
-    reports_progress: bool = True
     needs: str = ""
     install: str = ""
     verbs: str = ""

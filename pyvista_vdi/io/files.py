@@ -9,11 +9,11 @@ from typing import Any, BinaryIO
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
-from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.volumes.table import VOLUME_SUFFIXES
+from pyvista_vdi.io.volumes.formats import FORMATS
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
@@ -90,7 +90,7 @@ def write(
         ``title``, ``background`` and ``controls`` as well, and of a DeferredVDI what its
         transfer function begins with, as :meth:`DeferredVDI.classified` takes it: ``cmap``,
         ``opacity``, ... . ``.exr`` has none.
-        See :func:`pyvista_vdi.io.vdi_file.writer.write` and
+        See :func:`pyvista_vdi.io.vdi_file.writer.write`,
         :func:`pyvista_vdi.extensions.web.page.page`.
 
     Returns
@@ -107,7 +107,7 @@ def write(
     Cancelled
         If ``progress`` returned False.
     MissingDependencyError
-        If OpenEXR is not installed and the name ends in ``.exr``.
+        If what such files need is not installed: OpenEXR for ``.exr``.
 
     See Also
     --------
@@ -123,13 +123,7 @@ def write(
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
     check_write_options(target, options)
-    written: Path
-    if found.reports_progress:
-        written = found.load().write(vdi, target, progress=progress, **options)
-    else:
-        written = found.load().write(vdi, target, **options)
-        Pieces(progress, 1)()
-    return written
+    return found.load().write(vdi, target, progress=progress, **options)  # type: ignore[no-any-return]
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> Any:
@@ -162,21 +156,17 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     Cancelled
         If ``progress`` returned False.
     MissingDependencyError
-        If OpenEXR is not installed and the name ends in ``.exr``.
+        If what such files need is not installed: OpenEXR for ``.exr``.
     """
     found = format_of(path) or _own()
-    name = str(path).lower()
-    if format_named(path) is None and name.endswith((".vti", *VOLUME_SUFFIXES)):
+    of_volumes = tuple(suffix for each in FORMATS.values() for suffix in each.suffixes)
+    if format_named(path) is None and str(path).lower().endswith(of_volumes):
         others = "pyvista_vdi.read_volume reads volumes"
-        if name.endswith(".vti"):
+        if str(path).lower().endswith(".vti"):
             others += f", and {_FROM_VTK} a VDI in its VTK form"
         raise VDIFileError(f"{path} is no VDI by its name: {others}")
     _check_names("read", path, options, found.read_options)
-    if found.reports_progress:
-        return found.load().read(path, progress=progress, **options)
-    read_whole = found.load().read(path, **options)
-    Pieces(progress, 1)()
-    return read_whole
+    return found.load().read(path, progress=progress, **options)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:

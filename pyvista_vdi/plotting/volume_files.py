@@ -15,8 +15,7 @@ import pyvista as pv
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, with_article
 from pyvista_vdi.io.axes import to_world
-from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile
-from pyvista_vdi.io.volumes.table import head_of
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.volumes import as_image
 from pyvista_vdi.vtk_pipeline import vtk

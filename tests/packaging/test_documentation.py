@@ -20,7 +20,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.io.volumes.table import FORMATS
+from pyvista_vdi.io.volumes.formats import FORMATS
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
 DOCS = CHECKOUT / "docs"
@@ -263,7 +263,7 @@ def test_formats_on_the_page_of_files_are_written_and_read(tmp_path):
         assert pvdi.read(vdi.save(tmp_path / f"a{suffix}")).window_size == (2, 2)
     # The formats of volumes: what the table in the package says
     rows = ["| format | names end in | read by | extra |", "|---|---|---|---|"]
-    for each in FORMATS:
+    for each in FORMATS.values():
         names = ", ".join(f"`{suffix}`" for suffix in each.suffixes)
         rows.append(f"| {each.name} | {names} | {each.library} | {each.extra} |")
     assert "\n".join(rows) in text

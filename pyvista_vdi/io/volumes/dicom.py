@@ -17,11 +17,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, warn_external
 from pyvista_vdi.io.axes import to_world
-from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, stack
-from pyvista_vdi.io.volumes.table import head_of
-
-#: By how much of their mean the distances of slices may differ: more are missing slices.
-_EVEN = 0.01
+from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, head_of, stack
 
 
 class _Slice(NamedTuple):
@@ -46,6 +42,8 @@ def dicom(path: Path) -> list[VolumeInFile]:
                 series[one.header.get("SeriesInstanceUID", "")].append(one)
         except UnsupportedError as error:
             refused.append((len(files), error))
+        except ImportError:
+            raise
         except Exception as error:  # damage shows at whatever pydicom comes to first
             damaged.append(f"{file} cannot be read as a DICOM slice: {error}")
     if damaged and series:
@@ -128,8 +126,6 @@ def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
     first, what = slices[0], f"slices in {path}"
     read = partial(_pixels, lru_cache(maxsize=1)(_decoded))  # once for all frames of a file
     rows, columns = first.spacing if len(first.spacing) and first.spacing.min() > 0 else (1.0, 1.0)
-    if any(not np.array_equal(one.spacing, first.spacing) for one in slices):
-        raise InvalidVolumeError(f"{what} have pixels of several sizes: put those of one apart")
     if not len(first.spacing):
         warn_external(
             f"{what} do not say how large pixels are, and 1 mm is taken: give spacing=(x, y, z)"
@@ -142,20 +138,24 @@ def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
         )
         array = stack(slices, lambda one: read(one)[::-1])
         return VolumeInFile(array, "zyx", to_world((columns, rows, apart)), name, "mm")
-    if any(not np.allclose(one.turn, first.turn, atol=1e-3) for one in slices):
+    if any(
+        not np.array_equal(one.spacing, first.spacing)
+        or not np.allclose(one.turn, first.turn, atol=1e-3)
+        for one in slices
+    ):
         raise InvalidVolumeError(
-            f"{what} are turned against each other, as of a localiser: put those that are parallel "
-            "into a folder of their own"
+            f"{what} are turned against each other, as of a localiser, or have pixels of several "
+            "sizes: put those that belong together into a folder of their own"
         )
     along, down = first.turn.reshape(2, 3)
     slices.sort(key=lambda one: one.position @ np.cross(along, down))
     gaps = np.diff([one.position @ np.cross(along, down) for one in slices])
-    if not gaps.min() > _EVEN * gaps.mean():
+    if not gaps.min() > 0.01 * gaps.mean():
         raise InvalidVolumeError(
             f"several {what} lie in the same place, as those of several times or echoes do: put "
             "those of one into a folder of their own"
         )
-    if np.ptp(gaps) > _EVEN * gaps.mean():
+    if np.ptp(gaps) > 0.01 * gaps.mean():  # more are missing slices
         warn_external(
             f"{what} are {gaps.min():g} to {gaps.max():g} apart, and are taken as "
             f"{gaps.mean():g} apart: some are missing, or resample them"

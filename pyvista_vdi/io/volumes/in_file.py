@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +17,18 @@ from pyvista_vdi.model.volume import Volume
 
 #: What to do with what is not read.
 REMEDY = "read it by its own library, and give pyvista_vdi.Volume(array, spacing=, origin=)"
+
+
+def head_of(file: Path) -> bytes:
+    """Return a file's first bytes, unpacked where it is compressed by gzip."""
+    with file.open("rb") as stream:
+        head = stream.read(4096)
+    if not head.startswith(b"\x1f\x8b"):
+        return head
+    try:
+        return zlib.decompressobj(wbits=31).decompress(head, 4096)
+    except zlib.error:
+        return b""
 
 
 class Lazy:
@@ -112,6 +125,8 @@ def chosen(
 
     ``names``: of all, or their numbers; ``listed``: what a message says instead.
     """
+    if not names:
+        raise InvalidVolumeError(f"{file} holds no {what} of three axes")
     count = len(names)
     numbered = f"0 to {count - 1}" if isinstance(names, range) else ", ".join(names)
     said = f"{file} holds {count} {what}s, {listed or numbered}"

@@ -7,7 +7,6 @@ import os
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 
 from pyvista_vdi import registry
@@ -20,9 +19,8 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.io.stores import is_store, names_in, open_store
 from pyvista_vdi.io.time_steps import lists_steps
-from pyvista_vdi.io.volumes import pictures, table
+from pyvista_vdi.io.volumes.formats import FORMATS, VolumeFormat, format_of, slices_in
 from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, chosen, placed, volume_of
-from pyvista_vdi.io.volumes.table import VolumeFormat
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.model.whole_file import as_path
 
@@ -82,7 +80,7 @@ def read_volume(
     file, asked = Path(as_path(path)), series if array is None else array
     if file.suffix and (own := registry.reader(file.suffix.lower())) is not None:
         return placed(own(file), spacing, origin)
-    if (kind := _format(path)) in (None, table.HDF5):
+    if (volumes_in := (kind := _format(path)).volumes_in) is None:
         store = open_store(
             f"{os.fspath(path)}::{asked}" if isinstance(asked, str) else path,
             level="auto" if level is None else level,
@@ -93,7 +91,7 @@ def read_volume(
     if level not in (None, "auto", 0):
         raise UnsupportedError(f"{file} has no levels, as stores have: leave level={level!r} out")
     with _explained(file, kind):
-        found = _found(file, kind)
+        found = volumes_in(file)
         meant = [each for each in found if each.meant]
         if asked is None and len(meant) == 1:
             found = meant
@@ -117,9 +115,9 @@ def list_volumes(path: str | os.PathLike[str]) -> list[VolumeInFile]:
         of one is a line for people.
     """
     file = Path(as_path(path))
-    if (kind := _format(path)) not in (None, table.HDF5):
+    if (volumes_in := (kind := _format(path)).volumes_in) is not None:
         with _explained(file, kind):
-            return _found(file, kind)
+            return volumes_in(file)
     inside = [f"{file}::{name}" for name in names_in(path)] if file.is_file() else [path]
     return [
         VolumeInFile(
@@ -131,22 +129,14 @@ def list_volumes(path: str | os.PathLike[str]) -> list[VolumeInFile]:
     ]
 
 
-def needs_pyvista(file: Path) -> bool:
-    """Whether a file is read by PyVista."""
-    try:
-        return _format(file) is table.VTK
-    except VDIError:
-        return False
-
-
-def _format(path: str | os.PathLike[str]) -> VolumeFormat | None:
-    """Return a file's or a folder's format, ``None`` of a store; refuse what cannot be opened."""
+def _format(path: str | os.PathLike[str]) -> VolumeFormat:
+    """Return a file's or a folder's format, HDF5 of any store; refuse what cannot be opened."""
     file = Path(path)
     try:
         if is_store(path):
-            return None
+            return FORMATS["HDF5"]
         if os.path.isdir(file):  # noqa: PTH112 - pathlib's raises for a name that is too long
-            return table.PICTURES if pictures.slices_in(file) else table.DICOM
+            return FORMATS["PNG slices" if slices_in(file) else "DICOM"]
         if not os.path.exists(file):  # noqa: PTH110
             why = "does not exist: check the volume's path, or name a shipped volume by --example"
             raise InvalidVolumeError(f"{file} {why} (pyvista_vdi.examples)")
@@ -157,7 +147,7 @@ def _format(path: str | os.PathLike[str]) -> VolumeFormat | None:
                 f"{file} lists time steps, and one volume is asked for: name the file of one, or "
                 "make a series of all (pyvista-vdi series)"
             )
-        return table.format_of(file)
+        return format_of(file)
     except (OSError, ValueError) as error:
         if isinstance(error, VDIError):
             raise
@@ -165,28 +155,8 @@ def _format(path: str | os.PathLike[str]) -> VolumeFormat | None:
         raise InvalidVolumeError(f"{file} cannot be read ({why}): check its path") from error
 
 
-def _found(file: Path, kind: VolumeFormat) -> list[VolumeInFile]:
-    """Return the volumes in a file of a format: at least one; its library is imported."""
-    try:
-        import_module(kind.library)
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"{file} is {kind.name}, read by {kind.library}, which is not installed: install it "
-            f'by pip install "pyvista-vdi[{kind.extra}]"'
-        ) from error
-    if kind is table.VTK:
-        volumes_in = registry.reader("")
-    else:
-        module, _, function = kind.reader.partition(":")
-        volumes_in = getattr(import_module(f"{__package__}.{module}"), function)
-    found: list[VolumeInFile] = volumes_in(file)
-    if not found:
-        raise InvalidVolumeError(f"{file} ({kind.name}) holds nothing of three axes")
-    return found
-
-
 @contextmanager
-def _explained(file: Path, kind: VolumeFormat | None) -> Iterator[None]:
+def _explained(file: Path, kind: VolumeFormat) -> Iterator[None]:
     """Turn what a library raises and logs into errors and warnings of ours."""
     said: list[logging.LogRecord] = []
     mine = threading.get_ident()
@@ -201,12 +171,16 @@ def _explained(file: Path, kind: VolumeFormat | None) -> Iterator[None]:
     loggers = [logging.getLogger(name) for name in ("tifffile", "pydicom")]
     for each in loggers:
         each.addFilter(passes)
-    name = "" if kind is None else kind.name
     try:
         yield
         if any(record.levelno >= logging.ERROR for record in said):
             raise ValueError(said[0].getMessage())
-    except (MissingDependencyError, MemoryError, Warning):  # a warning, where those are errors
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{file} is {kind.name}, read by {kind.library}, which is not installed: install it "
+            f'by pip install "pyvista-vdi[{kind.extra}]"'
+        ) from error
+    except (MemoryError, Warning):  # a warning, where those are errors
         raise
     except Exception as error:  # each library has exceptions of its own
         if isinstance(error, VDIError) and str(file) in str(error):
@@ -214,10 +188,10 @@ def _explained(file: Path, kind: VolumeFormat | None) -> Iterator[None]:
         kind_of = type(error) if isinstance(error, VDIError) else InvalidVolumeError
         why = " ".join(str(error).split())[-500:] or type(error).__name__
         raise kind_of(
-            f"{file} cannot be read as {name} ({why}): is it whole? Write it anew, or {REMEDY}"
+            f"{file} cannot be read as {kind.name} ({why}): is it whole? Write it anew, or {REMEDY}"
         ) from error
     finally:
         for each in loggers:
             each.removeFilter(passes)
     for record in said:
-        warn_external(f"{name} of {file}: {record.getMessage()}")
+        warn_external(f"{kind.name} of {file}: {record.getMessage()}")
