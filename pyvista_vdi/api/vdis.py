@@ -106,7 +106,7 @@ def generate(
     view_cone : float
         Half angle of the cone of new views that must be served, degrees: the wider, the more of
         the budget goes to what V_O cannot see.
-    precision : {"exact", "16-byte", "8-byte"}
+    precision : {"exact", "8-byte"}
         What a supersegment takes on devices and in files, see :meth:`VDI.with_precision`.
     quality : {"reference", "high", "balanced", "fast"}, optional
         Choose the settings by how good pictures are to be: an SSIM of 0.98, 0.96 or 0.93 against

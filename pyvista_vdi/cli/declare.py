@@ -449,7 +449,7 @@ def file_format(parser: argparse.ArgumentParser) -> None:
         group,
         "--precision",
         "of .vdi: exact (24 bytes per supersegment before they are compressed; default of "
-        "generate), 16-byte or 8-byte; convert keeps what the file has; of .html: 8-byte by "
+        "generate) or 8-byte; convert keeps what the file has; of .html: 8-byte by "
         "default",
         choices=PRECISIONS,
     )

@@ -243,10 +243,6 @@ def _refuse_with_values(options: argparse.Namespace) -> None:
             f"{target}: settings are chosen by a look, which --classification deferred does not "
             "have: give --max-supersegments"
         )
-    if options.precision == "16-byte":
-        raise UnsupportedError(
-            "--precision 16-byte is none of VDIs that keep values: choose exact or 8-byte"
-        )
 
 
 def as_option(name: str) -> str:

@@ -179,7 +179,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     declare.option(
         parser,
         "--precision",
-        "of the supersegments: exact (default, 24 bytes each), 16-byte or 8-byte",
+        "of the supersegments: exact (default, 24 bytes each) or 8-byte",
         choices=PRECISIONS,
         default="exact",
     )

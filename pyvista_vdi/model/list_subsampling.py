@@ -10,7 +10,6 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.coverage import bounds_corners
-from pyvista_vdi.model.packing import Packed8, Packed16
 from pyvista_vdi.model.vdi import VDI
 
 #: Share of the way to the middle of the bounds at which their corners are looked at.
@@ -49,9 +48,7 @@ def subsampled_lists(vdi: VDI, along_x: int = 1, along_y: int = 1) -> VDI:
     offsets, rows = _rows_of(vdi, taken, vdi.counts.reshape(-1)[taken])
     result = _of_rows(vdi, view, window, offsets, rows, vdi.optical_depth[rows])
     packing = vdi.packing
-    if isinstance(packing, Packed16):
-        result.packing = replace(packing, color=packing.color[rows])
-    elif isinstance(packing, Packed8):
+    if packing is not None:
         result.packing = replace(
             packing,
             origins=packing.origins[taken],

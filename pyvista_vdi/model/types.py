@@ -79,7 +79,7 @@ RangeLike: TypeAlias = ArrayLike
 MatrixLike: TypeAlias = ArrayLike | VTKObject
 
 Criterion: TypeAlias = Literal["least-error", "homogeneity"]
-Precision: TypeAlias = Literal["exact", "16-byte", "8-byte"]
+Precision: TypeAlias = Literal["exact", "8-byte"]
 Quality: TypeAlias = Literal["reference", "high", "balanced", "fast"]
 Preference: TypeAlias = Literal["point", "cell"]
 Interpolation: TypeAlias = Literal["nearest", "linear"]

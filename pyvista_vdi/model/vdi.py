@@ -15,7 +15,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
-from pyvista_vdi.model.packing import Packed8, Packing, check_precision, packing_of
+from pyvista_vdi.model.packing import Packed8, check_precision, packing_of
 
 if TYPE_CHECKING:
     import os
@@ -85,7 +85,7 @@ class VDI:
     depth_origin: float
     metadata: dict[str, Any]
     #: The packed form of the arrays, not public; ``None`` where they are exact.
-    packing: Packing | None
+    packing: Packed8 | None
     #: What a classified deferred VDI is made of, not public: its arrays are made when asked for.
     values: ClassifiedValues | None = None
 
@@ -280,9 +280,8 @@ class VDI:
 
         Parameters
         ----------
-        precision : {"exact", "16-byte", "8-byte"}
+        precision : {"exact", "8-byte"}
             ``"exact"``: 24 bytes, whatever float32 holds; from a packed VDI, its values.
-            ``"16-byte"``: colours in steps of 1/2047, blue of 1/1023; all else exact.
             ``"8-byte"``: depths in 14 bits of the list's extent, optical depth with 8 significant
             bits, colours in steps of 1/255.
 
@@ -300,10 +299,10 @@ class VDI:
             return self
         if precision == "exact":
             return self._with_media(None, {})
-        packing = packing_of(self, precision)
+        packing = packing_of(self)
         return self._with_media(packing, packing.media(self.counts.reshape(-1)))
 
-    def _with_media(self, packing: Packing | None, media: Mapping[str, Any]) -> VDI:
+    def _with_media(self, packing: Packed8 | None, media: Mapping[str, Any]) -> VDI:
         arrays: dict[str, Any] = {name: media.get(name, getattr(self, name)) for name in _MEDIA}
         about = {"depth_origin": self.depth_origin, "metadata": self.metadata}
         arrays |= {"offsets": self.offsets, "bounds": self.bounds, **about}

@@ -209,7 +209,7 @@ class AddVDI(Component):
             Error that may be traded for shorter lists.
         view_cone : float
             Half angle of the cone of new views that must be served, degrees.
-        precision : {"exact", "16-byte", "8-byte"}
+        precision : {"exact", "8-byte"}
             What a supersegment takes, see :meth:`pyvista_vdi.VDI.with_precision`.
         quality : {"reference", "high", "balanced", "fast"}, optional
             Choose the settings by how good pictures are to be, from a short measurement: see

@@ -203,7 +203,7 @@ def _vdi_members(
 def vdi_members(data: bytes) -> None:
     """A ``.vdi`` file whose members were changed, with checksums that fit."""
     choices = Choices(data)
-    precision = choices.pick(("exact", "16-byte", "8-byte"))
+    precision = choices.pick(("exact", "8-byte"))
     members = _vdi_members(choices.integer(0, 7), choices.pick(COMPRESSIONS), precision)
     _read_changed(choices, dict(members))
 
@@ -324,7 +324,7 @@ def _page(index: int, precision: str) -> bytes:
 def html_patches(data: bytes) -> None:
     """A page of ours that is broken, in the text or in the ``.vdi`` that the text holds."""
     choices = Choices(data)
-    page = _page(choices.integer(0, 7), choices.pick(("8-byte", "16-byte", "exact")))
+    page = _page(choices.integer(0, 7), choices.pick(("8-byte", "exact")))
     for _ in range(choices.integer(1, 3)):
         parts = list(_DATA.finditer(page))
         kind = choices.integer(0, 3)

@@ -169,7 +169,7 @@ def test_ctrl_c_leaves_no_half_file(default_runtime, tmp_path):
         ("tradeoff ball.npy --sweep lists=a", "--sweep lists takes a number; got 'a'"),
         ("tradeoff ball.npy --sweep max-supersegments=1.5", "takes a whole number; got '1.5'"),
         ("tradeoff ball.npy --sweep skip-empty=no", "skip-empty takes on or off; got 'no'"),
-        ("tradeoff ball.npy --sweep precision=4-byte", "precision must be one of exact, 16-byte,"),
+        ("tradeoff ball.npy --sweep precision=4-byte", "precision must be one of exact, 8-byte"),
         ("tradeoff ball.npy --size 8x8", "a window of 8 x 8 has no SSIM: each edge must have 11"),
         ("tradeoff ball.npy --angles 5,5", "an angle is given twice"),
         ("tradeoff ball.npy --repeats 2000", "repeats must be a whole number from 1 to 1000; got"),

@@ -93,7 +93,7 @@ def test_what_is_chosen_after_generation_shares_a_vdi():
     ("make", "values", "message"),
     [
         (Setting, {"max_supersegments": 0}, "from 1 to 4096; got 0"),
-        (Setting, {"precision": "4-byte"}, "precision must be one of exact, 16-byte, 8-byte"),
+        (Setting, {"precision": "4-byte"}, "precision must be one of exact, 8-byte"),
         (Setting, {"criterion": "depth"}, "criterion must be one of least-error"),
         (Setting, {"lists": 0.0}, "lists must be from 0.05 to 8; got 0.0"),
         (Setting, {"preview": 1.5}, "preview must be from 0.02 to 1; got 1.5"),

@@ -243,7 +243,7 @@ def test_packed_values_are_within_their_bounds():
     assert (np.abs(packed.spread - made.spread) <= made.spread / 16 + 2**-19).all()
     assert np.abs(packed.share - made.share).max() <= 0.51 / 255
     assert packed.with_precision("exact").with_precision("8-byte").equals(packed)
-    with pytest.raises(UnsupportedError, match="16-byte"):
+    with pytest.raises(InvalidArgumentError, match="16-byte"):
         made.with_precision("16-byte")
 
 

@@ -289,8 +289,8 @@ REFUSED = {
     ],
     VALID.thinned: [(steps, "every k-th list") for steps in ((0, 1), (1, 7), (True, 1), (1.5, 1))],
     long_list(DEPTH_CODES + 1).with_precision: [
-        (("8-byte",), "a list of 16384 supersegments .* '16-byte'"),
-        (("4-byte",), "one of exact, 16-byte and 8-byte; got '4-byte'"),
+        (("8-byte",), "a list of 16384 supersegments .* 'exact'"),
+        (("4-byte",), "'exact' or '8-byte'; got '4-byte'"),
     ],
     Volume: [
         ({"array": np.zeros((3, 3))}, r"three-dimensional array; got shape \(3, 3\)$"),

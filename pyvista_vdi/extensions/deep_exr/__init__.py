@@ -10,7 +10,6 @@ EXTENSION = Extension(
             ".exr",
             "pyvista_vdi.extensions.deep_exr.files",
             read_options=("camera", "thickness"),
-            reports_progress=False,
             needs="the package OpenEXR",
             install='pip install "pyvista-vdi[exr]"',
         ),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import VDIError, VDIFileError, warn_external
 from pyvista_vdi.extensions.deep_exr.samples import media
 from pyvista_vdi.extensions.deep_exr.view import bounds_of_lists, camera_of, view_matrices
+from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import describe, from_json, number, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
@@ -28,7 +29,7 @@ from pyvista_vdi.model.whole_file import whole_file
 ATTRIBUTE, VERSION = "pyvistaVDI", 3
 
 
-def write(vdi: VDI, path: Any) -> Path:
+def write(vdi: VDI, path: Any, *, progress: Progress | None = None) -> Path:
     """Write a VDI as OpenEXR deep scan lines: see :func:`pyvista_vdi.io.write`."""
     # Depths may not be negative, which they are in some parallel views: move the eye back
     depths = [depth.astype(np.float64) + vdi.depth_origin for depth in (vdi.front, vdi.back)]
@@ -49,14 +50,23 @@ def write(vdi: VDI, path: Any) -> Path:
     image = OpenEXR.File(header, {name: _pixels(vdi, array) for name, array in channels.items()})
     content = BytesIO()  # the package does not say why a disk does not take a file
     image.write(content)
+    Pieces(progress, 1)()
     with whole_file(path) as stream:
         stream.write(content.getbuffer())
     return Path(path).resolve()
 
 
-def read(path: Any, *, camera: Any = None, thickness: float | None = None) -> VDI:
+def read(
+    path: Any,
+    *,
+    camera: Any = None,
+    thickness: float | None = None,
+    progress: Progress | None = None,
+) -> VDI:
     """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`."""
-    return _vdi(path, camera, thickness)[0]
+    vdi, _ = _vdi(path, camera, thickness)
+    Pieces(progress, 1)()
+    return vdi
 
 
 def read_info(path: Any) -> FileInfo:

@@ -13,7 +13,6 @@ import numpy as np
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidArgumentTypeError,
-    UnsupportedError,
     naming,
     warn_external,
     with_article,
@@ -262,10 +261,6 @@ def checked_deferral(deferral: Deferral, options: GenerationOptions) -> Deferral
     """Return what is to be kept, or raise now what generation would raise of it for any volume."""
     if not deferral.deferred:
         return deferral
-    if options.precision == "16-byte":
-        raise UnsupportedError(
-            "a DeferredVDI has no 16-byte supersegments: choose 'exact' or '8-byte'"
-        )
     ends = deferral.value_range
     if ends is None:  # that of the first step: any that the points of importance lie in
         points = importance_points(deferral.importance, (0.0, 1.0)) or ((0.0, 1.0),)

@@ -38,7 +38,7 @@ class SeriesWriter:
         The generating view V_O of volumes; not needed where VDIs are appended.
     window_size : (int, int), optional
         Width and height in pixels, likewise.
-    precision : {"8-byte", "16-byte", "exact"}
+    precision : {"8-byte", "exact"}
         Of the supersegments, see :meth:`VDI.with_precision`. Steps are written by their
         differences for ``"8-byte"`` alone.
     tolerance : float

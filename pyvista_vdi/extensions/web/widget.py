@@ -183,7 +183,7 @@ class VDIWidget(anywidget.AnyWidget):
         The first view; by default the VDI's own.
     background : str or (float, float, float), optional
         ``"white"``, ``"#204060"`` or RGB from 0 to 1; by default the page shows through.
-    precision : {"8-byte", "16-byte", "exact"}, optional
+    precision : {"8-byte", "exact"}, optional
         What a supersegment of a VDI takes on its way to the browser, see
         :meth:`pyvista_vdi.VDI.with_precision`; by default 8 bytes, or what it has where lists are
         too long for that. Series and sets take 8 bytes.

@@ -27,7 +27,7 @@ from pyvista_vdi.measure.results import (
 _ROW = ("data set", "window", "N_S", "angle")
 
 #: Precisions of packed VDIs whose frames are enqueued, too.
-PACKED = ("16-byte", "8-byte")
+PACKED = ("8-byte",)
 
 #: Columns of Table 1 beside the times.
 _FIGURES = (
@@ -164,7 +164,7 @@ def _queued(data: dict[str, Any]) -> Iterator[str]:
         "Frames that stay on the device",
         f"Frames a second of {data['plan']['queued']} that are enqueued one after the other, each "
         "of another view; in brackets, milliseconds that the driver's events say for the kernels. "
-        "16-byte, 8-byte: the VDI with packed supersegments, f_e. Over volume: the VDI's better "
+        "8-byte: the VDI with packed supersegments, f_e. Over volume: the VDI's better "
         "rate over `render_volume` without skipping, and the paper's "
         f"({paper_tables()['device']}).",
     )

@@ -18,7 +18,7 @@ _AXES: Mapping[str, tuple[str, tuple[float, float] | None, tuple[Any, ...]]] = {
     "max_supersegments": ("N_S {:g}", None, (5, 10, 15, 30, 40)),
     "tolerance": ("tolerance {:g}", (0.0, 1e6), (0.01, 0.1)),
     "lists": ("lists x{:g}", (0.05, 8.0), (0.5, 1.5, 2.0)),
-    "precision": ("{}", None, ("16-byte", "8-byte")),
+    "precision": ("{}", None, ("8-byte",)),
     "skip_empty": ("{}", None, (False,)),
     "preview": ("preview x{:g}", (0.02, 1.0), (0.7, 0.5, 0.35)),
     "criterion": ("{}", None, ("homogeneity",)),
@@ -54,7 +54,7 @@ class Setting:
         Longest list, the paper's N_S, and error per list that may be traded for shorter ones.
     lists : float
         Lists along each edge of the VDI over pixels along that edge of the frame.
-    precision : {"exact", "16-byte", "8-byte"}
+    precision : {"exact", "8-byte"}
         What a supersegment takes on the device and in a file.
     skip_empty : bool
         Whether frames pass by empty space.

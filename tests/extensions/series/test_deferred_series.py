@@ -147,7 +147,6 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
         ({"value_range": RANGE, "importance": [(0, 0), (300, 0)]}, "importance is 0 over all"),
         ({"importance": "much"}, "importance must be.*much"),
         ({"tolerance": 0.1}, "a tolerance is of colours"),
-        ({"precision": "16-byte"}, "no 16-byte supersegments"),
         ({"ambient_occlusion": pvdi.AmbientOcclusion()}, "ambient occlusion follows"),
     ],
 )
@@ -192,8 +191,6 @@ def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
                 vdis.save(tmp_path / name, cmap="bone", opacity="linear")
     with pytest.raises(InvalidArgumentError, match="tolerance"):
         series.save(tmp_path / "run.vdis", tolerance=0.01)
-    with pytest.raises(UnsupportedError, match="16-byte"):
-        series.save(tmp_path / "run.vdis", precision="16-byte")
     with pytest.raises(InvalidArgumentError, match="cmap"):
         pvdi.generate_series(volumes(), CAMERA, SIZE, cmap="bone", **KEPT)
     with pytest.raises(UnsupportedError, match="quality"):

@@ -58,7 +58,7 @@ def test_every_step_is_read_to_the_last_bit(steps, saved):
 
 @pytest.mark.every(4)
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "deflate", "none"])
-@pytest.mark.parametrize("precision", ["8-byte", "16-byte", "exact"])
+@pytest.mark.parametrize("precision", ["8-byte", "exact"])
 def test_precisions_and_compressions(precision, compression, tmp_path):
     steps = [stepped_vdi(step=k // 2) for k in range(4)]
     options = {"precision": precision, "compression": compression}

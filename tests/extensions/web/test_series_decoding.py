@@ -81,7 +81,6 @@ SERIES = {
     "without samples": (steps(6, metadata={}), {}),
     "other colours": (steps(4, metadata={}, palette=False), {"tolerance": 0.01}),
     "whole files": (steps(4, every=2), {"precision": "exact"}),
-    "16 bytes": (steps(3, every=2), {"precision": "16-byte"}),
     "what changes between steps": (mixed_series(), {}),
 }
 

@@ -465,7 +465,7 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
                              default_values="usual">
          <StringListDomain name="list">
            <String value="usual" /><String value="exact" />
-           <String value="16-byte" /><String value="8-byte" />
+           <String value="8-byte" />
          </StringListDomain>
          <Documentation>What a supersegment takes. usual: 8 bytes in a .vdis, a seventh of the exact
          file at an SSIM of .9999; exact, 24 bytes, in a .vdi. An .exr has float32.</Documentation>
