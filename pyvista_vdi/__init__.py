@@ -67,8 +67,7 @@ registry.core = registry.Extension(
             compressions=("lz4", "zlib", "lzma", "none"),
             shared=True,
             reports_progress=False,
-            needs="VTK",
-            install='pip install "pyvista-vdi[plot]"',
+            needs='VTK (pip install "pyvista-vdi[plot]")',
         ),
     ),
     readers={

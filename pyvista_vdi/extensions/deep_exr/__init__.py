@@ -10,9 +10,7 @@ EXTENSION = Extension(
             ".exr",
             "pyvista_vdi.extensions.deep_exr.files",
             read_options=("camera", "thickness"),
-            reports_progress=False,
-            needs="the package OpenEXR",
-            install='pip install "pyvista-vdi[exr]"',
+            needs='the package OpenEXR (pip install "pyvista-vdi[exr]")',
         ),
     )
 )

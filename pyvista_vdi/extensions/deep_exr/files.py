@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import VDIError, VDIFileError, warn_external
 from pyvista_vdi.extensions.deep_exr.samples import media
 from pyvista_vdi.extensions.deep_exr.view import bounds_of_lists, camera_of, view_matrices
+from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.description import describe, from_json, number, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
@@ -28,7 +29,7 @@ from pyvista_vdi.model.whole_file import whole_file
 ATTRIBUTE, VERSION = "pyvistaVDI", 3
 
 
-def write(vdi: VDI, path: Any) -> Path:
+def write(vdi: VDI, path: Any, *, progress: Progress | None = None) -> Path:
     """Write a VDI as OpenEXR deep scan lines: see :func:`pyvista_vdi.io.write`."""
     # Depths may not be negative, which they are in some parallel views: move the eye back
     depths = [depth.astype(np.float64) + vdi.depth_origin for depth in (vdi.front, vdi.back)]
@@ -49,19 +50,22 @@ def write(vdi: VDI, path: Any) -> Path:
     image = OpenEXR.File(header, {name: _pixels(vdi, array) for name, array in channels.items()})
     content = BytesIO()  # the package does not say why a disk does not take a file
     image.write(content)
+    Pieces(progress, 1)()
     with whole_file(path) as stream:
         stream.write(content.getbuffer())
     return Path(path).resolve()
 
 
-def read(path: Any, *, camera: Any = None, thickness: float | None = None) -> VDI:
+def read(path: Any, *, progress: Progress | None = None, **options: Any) -> VDI:
     """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`."""
-    return _vdi(path, camera, thickness)[0]
+    vdi, _ = _vdi(path, **options)
+    Pieces(progress, 1)()
+    return vdi
 
 
 def read_info(path: Any) -> FileInfo:
     """Return what a file says about itself; all samples are read for it."""
-    vdi, header = _vdi(path, None, None)
+    vdi, header = _vdi(path)
     return FileInfo(
         path=Path(path),
         format_version=VERSION,
@@ -103,7 +107,7 @@ def _deep_image(path: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     return deep[0]
 
 
-def _vdi(path: Any, camera: Any, thickness: float | None) -> tuple[VDI, dict[str, Any]]:
+def _vdi(path: Any, camera: Any = None, thickness: Any = None) -> tuple[VDI, dict[str, Any]]:
     """Return the VDI and the header of a file."""
     header, pixels = _deep_image(path)
     record, display = _record(header, path), np.array(header["displayWindow"])
@@ -181,9 +185,7 @@ def _pixels(vdi: VDI, array: NDArray[Any]) -> NDArray[Any]:
     return np.ascontiguousarray(pixels.reshape(height, width)[::-1])
 
 
-def _samples_in(
-    header: dict[str, Any], pixels: dict[str, NDArray[Any]], size: tuple[int, int], path: Any
-) -> tuple[NDArray[np.int64], dict[str, NDArray[Any]]]:
+def _samples_in(header: Any, pixels: Any, size: Any, path: Any) -> tuple[Any, dict[str, Any]]:
     """Return each sample's list, and the channels, of the pixels in the display window."""
     names = [name for name in ("Z", "ZBack", "A", "R", "G", "B", "tau") if name in pixels]
     if not {"Z", "A", "R", "G", "B"} <= {*names}:

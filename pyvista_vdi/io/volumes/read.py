@@ -80,8 +80,6 @@ def read_volume(
     list_volumes : what there is in a file.
     """
     file, asked = Path(as_path(path)), series if array is None else array
-    if file.suffix and (own := registry.reader(file.suffix.lower())) is not None:
-        return placed(own(file), spacing, origin)
     if (kind := _format(path)) in (None, table.HDF5):
         store = open_store(
             f"{os.fspath(path)}::{asked}" if isinstance(asked, str) else path,
