@@ -148,14 +148,14 @@ def is_volume(options: argparse.Namespace) -> bool:
 
 def require_vdi(file: str, verb: str) -> None:
     """Refuse a volume where a VDI is wanted, and say how the command makes one."""
-    if is_vdi_file(file) or holds(file) in ("series", "set"):
-        return
-    if not (is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long a name, too
-        raise VDIFileError(f"{printable(file)} does not exist: check the file's name")
-    raise UnsupportedError(
-        f"{printable(file)} is no VDI, which is what {verb} takes; of a volume, "
-        f"'pyvista-vdi generate {printable(file)} -o FILE.vdi' makes one"
-    )
+    named = printable(file)
+    if not (is_vdi_file(file) or is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long
+        raise VDIFileError(f"{named} does not exist: check the file's name")
+    if not is_vdi_file(file) and holds(file) not in ("series", "set"):
+        raise UnsupportedError(
+            f"{named} is no VDI, which is what {verb} takes; of a volume, 'pyvista-vdi generate "
+            f"{named} -o FILE.vdi' makes one"
+        )
 
 
 def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:

@@ -43,13 +43,10 @@ class UsageError(Exception):
 
 
 class _Parser(argparse.ArgumentParser):
-    """An argument parser that raises instead of leaving the process, and says one line.
-
-    What begins with a minus and a digit is a value, -1.8e-15 and -1,0 as well as -1.5.
-    """
+    """An argument parser that raises instead of leaving the process, and says one line."""
 
     def _parse_optional(self, arg_string: str) -> Any:
-        # argparse's own rule knows no exponents
+        # A value is -1.8e-15, too, and -1,0: argparse's own rule knows numbers like -1.5
         return None if re.match(r"-\.?\d", arg_string) else super()._parse_optional(arg_string)
 
     def error(self, message: str) -> NoReturn:

@@ -490,7 +490,7 @@ def input_of(data: Any) -> Input:
         image = ImageInput(data)
         image.vdi()  # refuse a damaged one now
         return image
-    show = registry.made_of("shown", data)
+    show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
     require_this_build(type(data))
