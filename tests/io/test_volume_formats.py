@@ -88,8 +88,9 @@ def test_times_channels_and_colours_of_simpleitk(tmp_path):
     sitk.WriteImage(image, str(tmp_path / "b.mha"))
     assert np.array_equal(pvdi.read_volume(tmp_path / "b.mha", channel=1).array, scan())
     colors = np.random.default_rng(2).integers(0, 255, (5, 6, 7, 4), np.uint8)
-    sitk.WriteImage(itk_image(colors, isVector=True)[1], str(tmp_path / "c.mha"))
-    assert np.array_equal(pvdi.read_volume(tmp_path / "c.mha").array, colors)
+    for name in ("c.mha", "c.nii"):
+        sitk.WriteImage(itk_image(colors, isVector=True)[1], str(tmp_path / name))
+        assert np.array_equal(pvdi.read_volume(tmp_path / name).array, colors)
 
 
 def nifti(path, *, sform=None, qfac=1.0, quaternion=None, slope=0.0, shift=0.0, unit=2):

@@ -72,10 +72,6 @@ def read_volume(
         If it does not hold what is asked for.
     MissingDependencyError
         If the format's library is not installed.
-
-    See Also
-    --------
-    list_volumes : what there is in a file.
     """
     file, asked = Path(as_path(path)), series if array is None else array
     if file.suffix and (own := registry.reader(file.suffix.lower())) is not None:
