@@ -362,6 +362,14 @@ def test_what_is_no_stack_of_slices_is_refused(tmp_path):
     write_slices(tmp_path, [np.zeros((6, 5), np.uint8), np.zeros((6, 7), np.uint8)])
     with pytest.raises(InvalidVolumeError, match=r"slice_1\.png has \(6, 7\) pixels"):
         pvdi.read_volume(tmp_path)
+    write_slices(tmp_path, [np.zeros((6, 5), np.uint8), np.zeros((6, 5), np.uint16)])
+    with pytest.raises(InvalidVolumeError, match=r"slice_1\.png has .* type uint16"):
+        pvdi.read_volume(tmp_path)
+    write_slices(tmp_path, scan(np.uint8)[:2], "tif")
+    with pytest.raises(InvalidVolumeError, match="holds TIFF and PNG files"):
+        pvdi.read_volume(tmp_path)
+    for path in tmp_path.glob("*.tif"):
+        path.unlink()
     (tmp_path / "slice_1.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     with pytest.raises(InvalidVolumeError, match=r"slice_1\.png cannot be read as a picture"):
         pvdi.read_volume(tmp_path)

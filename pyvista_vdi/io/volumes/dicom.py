@@ -134,7 +134,7 @@ def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
             f"{what} do not say where they lie or how they are turned: rows are taken to run along "
             f"y, slices along z, {apart:g} apart, in an order that may be the wrong one"
         )
-        array = stack(slices, lambda one: read(one)[::-1])
+        array = stack(slices, lambda one: read(one)[::-1], mixed=True)
         return VolumeInFile(array, "zyx", to_world((columns, rows, apart)), name, "mm")
     if any(
         not np.array_equal(one.spacing, first.spacing)
@@ -161,7 +161,7 @@ def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
     # The step is along the normal, unless a gantry was tilted
     step = (slices[-1].position - slices[0].position) / len(gaps)
     place = to_world(np.column_stack([along * columns, down * rows, step]), slices[0].position)
-    return VolumeInFile(stack(slices, read), "zyx", place, name, "mm")
+    return VolumeInFile(stack(slices, read, mixed=True), "zyx", place, name, "mm")
 
 
 def _decoded(file: Path) -> tuple[Any, NDArray[Any]]:

@@ -39,7 +39,7 @@ def nrrd(file: Path) -> list[VolumeInFile]:
     header: Any = {}
     if not re.search(r"(?im)^(data ?file: *(LIST|\S*%)|axis ?m)", head):
         header = nrrd.read_header(str(file))
-    if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space"}:
+    if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space", "???"}:
         array, axes, place = _by_itk(file)
         # ITK turns frames that grow to the right and the front: turn them back
         space = "".join(re.findall(r"(?im)^space: *(\S+)", head)).lower()
@@ -217,8 +217,10 @@ def _described(opened: Any, number: int, series: Any) -> tuple[list[float], str,
     page, names, size, unit = series.keyframe, [], [1.0, 1.0, 1.0], ""
     apart, pixels = True, page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
     pixels = [1 / n if n else 1.0 for n in pixels]
-    if opened.is_ome and opened.ome_metadata:
-        one = ET.fromstring(opened.ome_metadata).findall(".//{*}Pixels")[number]
+    described = opened.ome_metadata if opened.is_ome else ""
+    of_ome = ET.fromstring(described).findall(".//{*}Pixels")[number:] if described else []
+    if of_ome:
+        one = of_ome[0]
         said = {axis: one.get(f"PhysicalSize{axis}") for axis in "XYZ"}
         units = [one.get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
         names, apart = [c.get("Name", "") for c in one.findall("{*}Channel")], not said["X"]
@@ -245,9 +247,11 @@ def _described(opened: Any, number: int, series: Any) -> tuple[list[float], str,
 
 
 def slices_in(folder: Path) -> list[Path]:
-    """Return the pictures of slices in a folder, in natural order."""
+    """Return the pictures of slices in a folder, in natural order; none beside DICOM slices."""
     files = [path for path in folder.iterdir() if path.is_file() and path.name[0] != "."]
     found = [file for file in files if file.suffix.lower() in (*_TIFF, ".png")]
+    if found and any(head_of(file)[128:132] == b"DICM" for file in {*files} - {*found}):
+        return []  # previews of a scan
     return sorted(found, key=lambda file: natural_key(file.name.lower()))
 
 
@@ -257,6 +261,8 @@ def pictures(path: Path) -> list[VolumeInFile]:
     The top row is the last along y, as VTK has pictures.
     """
     files = slices_in(path) if path.is_dir() else [path]
+    if len({file.suffix.lower() == ".png" for file in files}) > 1:
+        raise InvalidVolumeError(f"{path} holds TIFF and PNG files: put those of one volume apart")
     if len(files) < 2:
         raise InvalidVolumeError(
             f"{path} holds one slice, and a volume needs two: give the folder that holds all"
@@ -283,6 +289,8 @@ def _picture(file: Path) -> NDArray[Any]:
 
             with Image.open(file) as picture:
                 found = np.asarray(picture.convert("RGBA") if picture.mode == "P" else picture)
+                if picture.mode == "I":  # of 16 bits, as older versions have them
+                    found = found.astype(np.uint16)
     except Exception as error:  # each format has readers, and exceptions, of its own
         raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
     return found[::-1]

@@ -41,17 +41,20 @@ class Lazy:
         return self._read()[index]
 
 
-def stack(slices: Sequence[Any], read: Callable[[Any], NDArray[Any]]) -> Lazy:
-    """Return slices of one size as an array along z, of a type that holds all of them."""
+def stack(
+    slices: Sequence[Any], read: Callable[[Any], NDArray[Any]], *, mixed: bool = False
+) -> Lazy:
+    """Return slices of one size as an array along z, of one type unless they are ``mixed``."""
     first = read(slices[0])
 
     def read_all() -> NDArray[Any]:
         array = np.empty((len(slices), *first.shape), first.dtype)
         for i, name in enumerate(slices):
-            if (one := read(name)).shape != first.shape:
+            one = read(name)
+            if one.shape != first.shape or (one.dtype != first.dtype and not mixed):
                 raise InvalidVolumeError(
-                    f"{name} has {one.shape} pixels, and {slices[0]} {first.shape}: the slices of "
-                    "a volume have one size"
+                    f"{name} has {one.shape} pixels of type {one.dtype}, and {slices[0]} "
+                    f"{first.shape} of {first.dtype}: the slices of a volume have one size and type"
                 )
             array = array.astype(np.promote_types(array.dtype, one.dtype), copy=False)
             array[i] = one
