@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
+from pyvista_vdi.errors import InvalidVolumeError, warn_external
 from pyvista_vdi.io.axes import in_one_unit, one_unit, to_world
 from pyvista_vdi.io.time_steps import natural_key
 from pyvista_vdi.io.volumes.dicom import dicom
-from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of, stack
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of, stack
 from pyvista_vdi.model.host_memory import aligned_empty
 
 #: Units of length in NIfTI, types in MRC, and what OME and ImageJ call a micrometre.
@@ -146,7 +146,7 @@ def mrc(file: Path) -> list[VolumeInFile]:
     if not origin.any():  # CCP4's maps have whole voxels in place of an origin
         origin = step * [words[4 + axes.index(a)] for a in "xyz"]
     dtype, begin = np.dtype(f"{order}{_MODES[mode]}"), 1024 + int(words[23])
-    array = np.fromfile(file, dtype, int(np.prod(shape)), offset=begin).reshape(shape)
+    array = np.fromfile(file, dtype, offset=begin)[: np.prod(shape)].reshape(shape)
     return [VolumeInFile(array, axes[::-1], to_world(step, origin), unit="angstrom")]
 
 
@@ -340,22 +340,3 @@ FORMATS = {
         ),
     )
 }
-
-
-def format_of(file: Path) -> VolumeFormat:
-    """Return the format of a file by its name, or else by its content.
-
-    Raises UnsupportedError with a remedy where there is none, and InvalidVolumeError for a VDI.
-    """
-    name, head = file.name.lower(), head_of(file)
-    if name.endswith((".vdi", ".exr", ".html")):
-        raise InvalidVolumeError(
-            f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
-        )
-    for each in FORMATS.values():
-        if name.endswith(each.suffixes) and not head.startswith(b"CDF"):  # as MINC 1 is
-            return each
-    for each in FORMATS.values():
-        if each.magic and (head.startswith(each.magic) or head[128:].startswith(each.magic)):
-            return each
-    raise UnsupportedError(f"{file} is of no format that is read here: {REMEDY}")
