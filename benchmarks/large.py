@@ -108,7 +108,6 @@ def on_cluster(options: Any) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         name = options.large or LARGE[options.whole]
         volume = stored(options.store or Path(folder) / "large.zarr", name)
-        volume.chunks.found_ranges()
         camera = filling_camera(volume.bounds, options.size)
         function = Classification.composited(LOOKS, "a benchmark").transfer_function_of(volume)
         given = {"n_workers": 2, "threads_per_worker": 1, "memory_limit": WORKER_BYTES}
