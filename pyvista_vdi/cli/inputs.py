@@ -281,17 +281,9 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
         raise
 
 
-def require_new(path: Path, options: argparse.Namespace) -> None:
-    """Refuse to replace results that ``--resume`` could go on with."""
-    if path.exists() and not options.resume:
-        raise InvalidArgumentError(
-            f"{path} is there already: --resume goes on with it, or choose another --out"
-        )
-
-
 @contextmanager
-def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
-    """Show a bar that is alive; after Ctrl-C say what ``--resume`` can go on with."""
+def measuring(label: str) -> Iterator[DelayedBar]:
+    """Show a bar that is alive."""
     bar, finished = DelayedBar(label=label), Event()
 
     def pulse() -> None:
@@ -302,12 +294,6 @@ def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
     try:
         pulsing.start()
         yield bar
-    except KeyboardInterrupt:
-        if results is not None and results.exists():
-            print(
-                f"\nWhat was measured is in {printable(results)}: --resume goes on", file=sys.stderr
-            )
-        raise
     finally:
         finished.set()
         bar.close()

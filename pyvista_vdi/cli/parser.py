@@ -38,6 +38,12 @@ pyvista-vdi devices says on what it runs.
 _LISTED = 16
 
 
+#: Verbs that went, and what does their work.
+_GONE = {
+    "benchmark": "the paper's tables are measured by a script of a checkout, benchmarks/paper.py"
+}
+
+
 class UsageError(Exception):
     """A mistake in the arguments; the message says which and what is right."""
 
@@ -62,6 +68,8 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
     if not arguments:
         print(_LESSON, end="")
         return None
+    if arguments[0] in _GONE:
+        raise UsageError(f"there is no verb {arguments[0]!r}: {_GONE[arguments[0]]}")
     if not arguments[0].startswith("-") and arguments[0] not in verbs:
         raise UsageError(
             f"there is no verb {arguments[0]!r}: {_suggestion(arguments[0], list(verbs))}"

@@ -28,7 +28,6 @@ RIGHT = {
     "serve": "v.npy --port 0 --shade",
     "info": "v.npy",
     "compare": "v.npy --out new --size 12x8 --angles 5 --repeats 1 --no-vtk --shade",
-    "benchmark": "--out new.json --datasets v.npy --no-vtk",
     "tradeoff": "v.npy --out new --quick --no-vtk --shade",
     "convert": "a.vdi -o old.vdi",
     "series": "v.npy -o old.vdis --size 12x8 --shade",
@@ -154,7 +153,6 @@ OF_A_VERB = {
     ("set", "--output"): tuple(name.format(".vdiset") for name in NO_TARGET),
     ("compare", "--out"): ("v.npy", "v.npy/a"),
     ("tradeoff", "--out"): ("v.npy", "v.npy/a"),
-    ("benchmark", "--out"): tuple(name.format(".json") for name in NO_TARGET),
 }
 #: Files in place of the verb's first.
 FILES = {

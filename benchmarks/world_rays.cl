@@ -1,7 +1,9 @@
-// A renderer that docs/baselines.md measures: rays of a new view in V_O's homogeneous coordinates. The product has none of this.
+// Lochmann et al. 2016: a ray of the new view is projected into V_O's image, a DDA gives the lists
+// that the projection runs through, and each supersegment, a truncated pyramid in the world, is
+// intersected there. Everything is affine in t: U d and V d, where list (i, j) is i <= U < i + 1,
+// j <= V < j + 1; Z less the depth origin; and d, which is Z, or 1 in parallel projection.
 //
-// Everything is affine in t: U d and V d, where list (i, j) is i <= U < i + 1 and j <= V < j + 1; Z less the depth origin;
-// and d, which is Z, or 1 in parallel projection. No list space: what is met is met in the world.
+// -D BINARY_SEARCH  a list's first supersegment by halving, not by looking from its beginning
 #define DEPTH RECIPROCAL // of no coordinate here
 #include "lib/list_space.cl"
 #include "lib/compositing.cl"
@@ -18,11 +20,9 @@ typedef struct {
 inline ViewRay view_ray(int2 pixel, int width, int height, __global const float *forms, int planes)
 {
     const Ray of = ray_of_pixel(pixel, width, height);
-    ViewRay ray;
-    ray.place = of.place;
-    ray.t0 = -INFINITY;
-    ray.t1 = INFINITY;
-    ray.present = of.present && clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, planes, of.a, of.b, &ray.t0, &ray.t1);
+    ViewRay ray = {.place = of.place, .t0 = -INFINITY, .t1 = INFINITY};
+    __global const float *clipped = forms + PLANE_FORMS * FORM_SIZE;
+    ray.present = of.present && clip_to_planes(clipped, planes, of.a, of.b, &ray.t0, &ray.t1);
     ray.speed = model_speed(forms, of.a, of.b);
     float value[4], slope[4];
     for (int k = 0; k < 4; ++k) {
@@ -32,11 +32,6 @@ inline ViewRay view_ray(int2 pixel, int width, int height, __global const float 
     ray.value = vload4(0, value);
     ray.slope = vload4(0, slope);
     return ray;
-}
-
-inline float4 point_at(const ViewRay *ray, float t)
-{
-    return fma((float4)(t), ray->slope, ray->value);
 }
 
 // Keep of [*t0, *t1] where value + t slope >= 0.
@@ -60,11 +55,6 @@ inline void keep_between(const ViewRay *ray, float2 faces, float *t0, float *t1)
     keep(faces.y - ray->value.z, -ray->slope.z, t0, t1);
 }
 
-// Lochmann et al. 2016: a ray of the new view is projected into V_O's image, a DDA gives the lists that the projection runs
-// through, and each supersegment, a truncated pyramid in the world, is intersected there.
-//
-// -D BINARY_SEARCH  a list's first supersegment by halving; otherwise the list is looked through from its beginning
-
 // Lists along one axis of V_O's image, between the projections of the ray's two ends.
 typedef struct {
     int at, last, step;
@@ -79,7 +69,7 @@ inline Dda dda_between(float from, float to, int lists)
     return dda;
 }
 
-// t at which the ray leaves the present lists: it meets the plane through V_O's eye and their border.
+// t at which the ray leaves the present lists: at the plane through V_O's eye and their border.
 inline float leaves_at(const Dda *dda, float value, float slope, float d_value, float d_slope)
 {
     if (dda->at == dda->last)
@@ -88,7 +78,7 @@ inline float leaves_at(const Dda *dda, float value, float slope, float d_value, 
     return -(value - border * d_value) / (slope - border * d_slope);
 }
 
-// The first supersegment, in the ray's sense, that reaches behind depth z; list_end if there is none.
+// The first supersegment, in the ray's sense, that reaches behind depth z; the end if none does.
 inline int first_behind(__global const float2 *faces, int begin, int end, float z, bool away)
 {
     int n = away ? begin : end - 1;
@@ -124,7 +114,8 @@ __kernel void world_rays(
     const ViewRay ray = view_ray(pixel, width, height, forms, planes);
     Seen seen = nothing_seen();
     if (ray.present) {
-        const float4 p0 = point_at(&ray, ray.t0), p1 = point_at(&ray, ray.t1);
+        const float4 p0 = fma((float4)(ray.t0), ray.slope, ray.value);
+        const float4 p1 = fma((float4)(ray.t1), ray.slope, ray.value);
         Dda u = dda_between(p0.x / p0.w, p1.x / p1.w, lists_wide);
         Dda v = dda_between(p0.y / p0.w, p1.y / p1.w, lists_high);
         const bool away = ray.slope.z >= 0.0f;
