@@ -43,11 +43,12 @@ class FileFormat:
     compressions : tuple of str
         Values of ``compression``, the first by default. Without any, ``compression`` and ``level``
         are no options.
-    magic : bytes
-        What it begins with, by which it is found in a page.
+    head : str
+        Of what is a folder or a ZIP of VDIs: its file that is written last in a folder, and first
+        in a ZIP, by which it is found in a page.
     page : bool
         Whether it is a page, which may hold a file of another format: its module has
-        ``begins_with(path, magic)`` and ``data_in(path)``.
+        ``begins_with(path, head)`` and ``data_in(path)``.
     values : bool
         Whether it holds deferred VDIs as well.
     shared : bool
@@ -69,7 +70,7 @@ class FileFormat:
     read_options: tuple[str, ...] = ()
     write_options: tuple[str, ...] = ()
     compressions: tuple[str, ...] = ()
-    magic: bytes = b""
+    head: str = ""
     page: bool = False
     values: bool = False
     shared: bool = False

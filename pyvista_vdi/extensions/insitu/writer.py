@@ -22,10 +22,14 @@ from pyvista_vdi.extensions.large.on_mpi import (
     require_same,
     together,
 )
-from pyvista_vdi.extensions.series.continuing import check_goes_on, checked_way, refused
 from pyvista_vdi.extensions.series.generate import checked_deferral
 from pyvista_vdi.extensions.series.series import checked_time
-from pyvista_vdi.extensions.series.writer import SeriesWriter
+from pyvista_vdi.extensions.series.writer import (
+    SeriesWriter,
+    check_goes_on,
+    checked_way,
+    refused,
+)
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -305,7 +309,7 @@ class InSitu:
         return time
 
     def close(self) -> None:
-        """Finish the series' file; what was appended is readable before. No step comes after."""
+        """Let others write the series; what was appended is readable before. No step comes after."""
         self._closed = True
         if self._writer is not None:
             self._writer.close()

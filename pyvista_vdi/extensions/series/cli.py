@@ -7,7 +7,7 @@ import json
 import math
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -33,10 +33,9 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
-from pyvista_vdi.errors import InvalidArgumentError, naming
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming
 from pyvista_vdi.extensions.series import files as of_series
-from pyvista_vdi.extensions.series.layout import SUFFIX
-from pyvista_vdi.extensions.series.series import VDISeries
+from pyvista_vdi.extensions.series.archive import SERIES, Kind, StoredInfo
 from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.io import check_write_options, checked_target, read_info
 from pyvista_vdi.io import read as read_vdi
@@ -46,7 +45,6 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, declared
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
 #: Options of ``convert`` that are for deep images of other programs, and for those that it writes.
@@ -74,8 +72,11 @@ def series(options: argparse.Namespace) -> int:
     looks = classification(options)
     Classification.composited(looks, "series")  # refused before a volume is read
     looks |= kept_values(options)
-    target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
-    # A writer's file grows step by step: it gets its name when it is whole, and all have been read
+    target = with_suffix(Path(options.output), (SERIES.suffix,), "a series").resolve()
+    if target.exists():
+        raise VDIFileError(f"{target} is there already: choose another name, or remove it first")
+    check_writable(target)
+    # A folder grows step by step: it gets its name when it is whole
     with (
         tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder,
         _connected(options.scheduler) as client,
@@ -85,11 +86,11 @@ def series(options: argparse.Namespace) -> int:
         if kinds[0] == "volume":
             _write_volumes(part, steps, options, {"client": client, **looks}, bar)
         else:
-            with SeriesWriter(part, **_of_the_series(options)) as out:
+            with SeriesWriter(part, **of_the_file(options)) as out:
                 for i, step in enumerate(steps):
                     out.append(step.read(), step.time)
                     bar((i + 1) / len(steps))
-        part.replace(target)
+        part.rename(target)
     about = of_series.read_info(options.output)
     print(f"{printable(options.output)}: {len(about.times)} steps, {mebibytes(about.file_bytes)}")
     return 0
@@ -110,7 +111,7 @@ def _write_volumes(
         sample_distance=options.sample_distance,
         memory_limit=options.memory_limit,
         device=options.device,
-        **_of_the_series(options),
+        **of_the_file(options),
         **more,
     ) as out:
         for i, step in enumerate(steps):
@@ -123,10 +124,6 @@ def _write_volumes(
 def _connected(address: str | None) -> Any:
     """Connect to a Dask scheduler, if one is given."""
     return nullcontext() if address is None else registry.generator("clients")(address)
-
-
-def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
-    return {**of_the_file(options), "tolerance": options.tolerance, "key_every": options.key_every}
 
 
 def _steps_of_vdis(files: Sequence[str]) -> list[Step]:
@@ -172,25 +169,33 @@ def _kind(file: str) -> str:
 
 
 def info(options: argparse.Namespace) -> int:
-    """Print what a file of a series says about itself."""
+    """Print what a series says about itself."""
     about = of_series.read_info(options.file)
+    times = about.times
+    steps = {"steps": f"{len(times)}, times {times[0]:g} to {times[-1]:g}"}
+    print_info(options, about, steps, {})
+    return 0
+
+
+def print_info(
+    options: argparse.Namespace, about: StoredInfo, own: dict[str, str], listed: dict[str, Any]
+) -> None:
+    """Print what a series or a set says about itself, with what is its own."""
     if options.json:
         state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
-        print(json.dumps(state, indent=1))
-        return 0
+        print(json.dumps({**state, **listed}, indent=1))
+        return
     width, height = about.window_size
-    state_of = "" if about.closed else ", not closed: still being written, or cut off"
+    kept = about.deferred
     print(
         table(
             {
-                "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}{state_of}",
+                "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}",
                 "written by": f"{about.written_by}, format version {about.format_version}",
-                "steps": f"{len(about.times)}, times {about.times[0]:g} to {about.times[-1]:g}",
-                **({} if about.value_range is None else of_values(about.value_range)),
-                "keys": f"{len(about.keys)} steps need no other",
-                "bytes a step": f"{min(about.step_bytes)} to {max(about.step_bytes)}",
-                "precision": about.precision
-                + (f", within a tolerance of {about.tolerance:g}" if about.tolerance else ""),
+                **own,
+                **({} if kept is None else of_values(kept["value_range"])),
+                "bytes a VDI": f"{min(about.vdi_bytes)} to {max(about.vdi_bytes)}",
+                "precision": about.precision,
                 "lists": f"{width} x {height}",
                 "eye": vector(about.camera.position),
                 "bounds": vector(about.bounds),
@@ -198,31 +203,28 @@ def info(options: argparse.Namespace) -> int:
             }
         )
     )
-    return 0
 
 
 def convert(options: argparse.Namespace) -> int:
     """Write a series anew, as a page, or each of its steps to a file of its own."""
-    refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a series")
+    return convert_several(options, of_series.read, SERIES)
+
+
+def convert_several(options: argparse.Namespace, read: Callable[[str], Any], kind: Kind) -> int:
+    """Write a series or a set as one file, as a page, or each VDI to a file of its own."""
+    refuse(options, OF_READ_IMAGES, f"deep images, .exr, and this is a {kind.name}")
     target, arguments = Path(options.output), of_the_file(options)
     found = format_named(target)
-    steps: VDISeries = with_look(
-        options,
-        of_series.read(options.file),
-        options.file,
-        colors=found is not None and found.suffix not in (SUFFIX, ".vdi"),
-    )
-    if found is not None and (found.suffix == SUFFIX or found.page):
+    together = found is not None and (found.page or found.suffix == kind.suffix)
+    colors = found is not None and found.suffix not in (kind.suffix, ".vdi")
+    vdis = with_look(options, read(options.file), options.file, colors=colors)
+    if together:
         refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {target.suffix}")
         with measuring("converting") as bar:
-            steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
+            vdis.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
         say_written([target])
         return 0
-    return write_each(steps, target, arguments)
-
-
-def write_each(vdis: Sequence[VDI], target: Path, arguments: dict[str, Any]) -> int:
-    """Write each of several VDIs to a file of its own, named by a number."""
+    # Name each by a number
     digits = max(4, len(str(len(vdis) - 1)))
     files = [
         target.with_name(f"{target.stem}_{i:0{digits}}{target.suffix}") for i in range(len(vdis))
@@ -249,14 +251,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     times = "of the steps, ascending (default: those in the files, else 0,1,2,...)"
     declare.option(parser, "--times", times, "A,B,...", declare.parse_numbers)
     group = parser.add_argument_group("file")
-    text = (
-        "what colours times opacity, and opacities, of a supersegment may differ by, 0 to 1, where "
-        "that saves bytes (default: 0, every bit is kept)"
-    )
-    declare.option(group, "--tolerance", text, "T", declare.parse_number, default=0.0)
-    text = "most steps from one that needs no other to the next (default: 16)"
-    declare.option(group, "--key-every", text, "N", declare.parse_count, default=16)
-    text = "of the supersegments (default: 8-byte, the only one that is written by differences)"
+    text = "of the supersegments (default: 8-byte)"
     declare.option(group, "--precision", text, choices=PRECISIONS)
     text = "zstd (default), lz4, deflate or none"
     declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))

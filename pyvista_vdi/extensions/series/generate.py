@@ -98,7 +98,7 @@ def generate_series(
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **options
         All else that :func:`pyvista_vdi.generate` takes, classification included. ``precision`` is
-        ``"8-byte"`` by default, which is what files of series are made for.
+        ``"8-byte"`` by default.
 
     Returns
     -------

@@ -65,7 +65,9 @@ class Deferral(TypedDict, total=False):
 class SetOptions(Look, total=False):
     """What :func:`pyvista_vdi.generate_set` passes on."""
 
+    max_supersegments: int
     criterion: str
+    precision: str
     sample_distance: float | None
     tolerance: float
     view_cone: float
@@ -77,11 +79,10 @@ class SetOptions(Look, total=False):
 class InSituOptions(SetOptions, Deferral, total=False):
     """What :class:`pyvista_vdi.extensions.insitu.InSitu` passes on."""
 
-    max_supersegments: int
-    precision: str
 
+class SeriesOptions(InSituOptions, total=False):
+    """What :func:`pyvista_vdi.generate_series` passes on."""
 
-class _Dial(TypedDict, total=False):
     quality: str | None
     target_ssim: float | None
     target_fps: float | None
@@ -89,20 +90,9 @@ class _Dial(TypedDict, total=False):
     target_angle: float
 
 
-class SeriesOptions(InSituOptions, _Dial, total=False):
-    """What :func:`pyvista_vdi.generate_series` passes on."""
+class WriterOptions(SeriesOptions, total=False):
+    """What :class:`pyvista_vdi.SeriesWriter`, which names ``precision`` itself, passes on."""
 
-
-class WriterOptions(Look, Deferral, _Dial, total=False):
-    """What :class:`pyvista_vdi.SeriesWriter`, which has its own ``tolerance``, passes on."""
-
-    max_supersegments: int
-    criterion: str
-    sample_distance: float | None
-    view_cone: float
-    lights: LightsLike | None
-    ambient_occlusion: OcclusionLike | None
-    memory_limit: MemoryLike | None
     client: ClientLike | None
     spacing: Sequence[float] | None
     origin: Sequence[float] | None

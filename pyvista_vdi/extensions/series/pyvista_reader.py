@@ -1,4 +1,4 @@
-"""``pyvista.read`` of ``.vdis`` files: the steps of a series, each in its canonical VTK form."""
+"""``pyvista.read`` of ``.vdis``: the steps of a series, each in its canonical VTK form."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pyvista_vdi.vtk_pipeline.filters.files import VDIReader
 
 
 class SeriesReader(pv.BaseReader, pv.TimeReader):  # type: ignore[type-arg]
-    """Read the steps of a ``.vdis`` file as PyVista reads any file with times.
+    """Read the steps of a ``.vdis`` folder or file as PyVista reads any file with times.
 
     ``pyvista.get_reader("x.vdis")`` returns one from PyVista 0.49 on, and ``pyvista.read`` the
     first step. PyVista 0.48 knows readers of its own only: there call this class.
@@ -19,40 +19,22 @@ class SeriesReader(pv.BaseReader, pv.TimeReader):  # type: ignore[type-arg]
     Parameters
     ----------
     path : str or path-like
-        The file.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is none.
+        The folder or file; FileNotFoundError is raised if there is none.
     """
 
     _class_reader = VDIReader
 
+    def _set_directory(self, directory: Any) -> None:
+        self._set_filename(directory)
+
     def read(self, **options: Any) -> pv.ImageData:
-        """Return the active step, the first one before another is set.
-
-        Parameters
-        ----------
-        **options
-            As of any reader of PyVista.
-
-        Returns
-        -------
-        pyvista.ImageData
-            As from :func:`pyvista_vdi.plotting.reader.read_vdi`.
-
-        Raises
-        ------
-        VDIFileError
-            If it is not a readable file of that kind.
-        """
+        """Return the active step, the first one before another is set; raise what is wrong."""
         self.reader.Update()  # raises, where PyVista's update would tell VTK's window
         return super().read(**options)
 
     @property
     def time_values(self) -> list[float]:
-        """The steps' times; of a file that is being written, those of the finished steps."""
+        """The steps' times; of a folder that is being written, those of the finished steps."""
         return list(self.reader.GetSeries().times)
 
     @property
@@ -83,7 +65,7 @@ class SeriesReader(pv.BaseReader, pv.TimeReader):  # type: ignore[type-arg]
         return self.reader.GetOutputInformation(0)
 
 
-#: What PyVista is told to read ``.vdis`` files by: 0.48 calls it and takes what it returns for data
+#: What PyVista is told to read ``.vdis`` by: 0.48 calls it and takes what it returns for data
 read_series: Any = (
     SeriesReader if pv.version_info >= (0, 49) else lambda path: SeriesReader(path).read()
 )

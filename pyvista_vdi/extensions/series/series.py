@@ -6,7 +6,7 @@ import math
 import os
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, overload
@@ -15,6 +15,7 @@ import numpy as np
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
+from pyvista_vdi.extensions.series.archive import Archive
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import IN_PLACE, Look
 from pyvista_vdi.model.collection import VDICollection
@@ -29,9 +30,9 @@ _KEPT = 4
 class VDISeries(VDICollection):
     """The VDIs of one scene at several times: a sequence of :class:`VDI` or :class:`DeferredVDI`.
 
-    Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` from a ``.vdis`` file,
-    whose steps are decoded when they are asked for, or by :meth:`of` from VDIs at hand. It can be
-    read from several threads at once, and pickled: one that was read, as the name of its file.
+    Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` from a ``.vdis`` folder
+    or file, whose steps are read when they are asked for, or by :meth:`of` from VDIs at hand. It can
+    be read from several threads at once, and pickled: one that was read, as its path.
 
     Parameters
     ----------
@@ -73,8 +74,6 @@ class VDISeries(VDICollection):
         self.volumes = volumes
         self._steps = steps
         self._maker: Callable[..., VDI] | None = None  # of a step's volume, for another view
-        #: What knows the view without decoding a step
-        self._first: Any = steps if hasattr(type(steps), "window_size") else None
 
     @classmethod
     def of(cls, vdis: Iterable[VDI], times: Iterable[float] | None = None) -> VDISeries:
@@ -101,20 +100,25 @@ class VDISeries(VDICollection):
             check_range(step, range_of(steps[0]), f"step {i}")
         return cls(steps, range(len(steps)) if times is None else checked_times(times))
 
+    @cached_property
+    def _first(self) -> Any:
+        """What knows the first step's view, without its arrays where it is of a file."""
+        return self._steps.info() if isinstance(self._steps, Archive) else self[0]
+
     @property
     def camera(self) -> Camera:
         """The generating view V_O of the first step."""
-        return (self._first or self[0]).camera  # type: ignore[no-any-return]
+        return self._first.camera  # type: ignore[no-any-return]
 
     @property
     def window_size(self) -> tuple[int, int]:
         """W and H of the first step: lists along each edge of the viewport."""
-        return (self._first or self[0]).window_size  # type: ignore[no-any-return]
+        return self._first.window_size  # type: ignore[no-any-return]
 
     @property
     def bounds(self) -> tuple[float, float, float, float, float, float]:
         """The first step's bounds in the model frame."""
-        return (self._first or self[0]).bounds  # type: ignore[no-any-return]
+        return self._first.bounds  # type: ignore[no-any-return]
 
     def __len__(self) -> int:
         return len(self.times)
@@ -188,19 +192,20 @@ class VDISeries(VDICollection):
         return self._maker(self.volumes[step], camera=camera, window_size=window_size)
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdis`` file, or a page that plays it; it appears whole or not at all.
+        """Write one ``.vdis`` file, for sending, or a page that plays it.
 
-        :func:`pyvista_vdi.read` opens both.
+        It appears whole or not at all; :func:`pyvista_vdi.read` opens both. A folder, which grows
+        step by step, is written by :class:`pyvista_vdi.SeriesWriter`.
 
         Parameters
         ----------
         path : path-like
             The target; its name ends in ``.vdis``, or in ``.html``.
         **options
-            ``precision``, by default the first step's, and ``"8-byte"`` in a page; ``tolerance``,
-            ``key_every``, ``compression`` and ``level`` as for :class:`pyvista_vdi.SeriesWriter`;
-            and ``progress``, called with the finished fraction. For pages ``title``,
-            ``background``, ``controls`` and ``autoplay`` as well.
+            ``precision``, by default the first step's, and ``"8-byte"`` in a page;
+            ``compression`` (``"zstd"``, and ``"deflate"`` in a page) and ``level`` as for
+            :class:`pyvista_vdi.SeriesWriter`; and ``progress``, called with the finished fraction.
+            For pages ``title``, ``background``, ``controls`` and ``autoplay`` as well.
 
         Returns
         -------

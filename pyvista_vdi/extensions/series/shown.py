@@ -64,7 +64,7 @@ class SeriesInput(Input):
         """Pause, and leave no thread."""
         self.player.close()
 
-    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
+    def look(self, camera: Camera, device: Any) -> None:
         """Decode for a device."""
         self.player.device = device
 

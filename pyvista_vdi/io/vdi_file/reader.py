@@ -60,7 +60,7 @@ _NAME_AT = 30
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
 
 #: What zipfile raises, beside its own error, for archives that are not well formed.
-_ARCHIVE_ERRORS = (
+ARCHIVE_ERRORS = (
     zipfile.BadZipFile,
     EOFError,
     NotImplementedError,
@@ -221,7 +221,7 @@ class _OpenFile:
             )
         try:
             archive = zipfile.ZipFile(self._stream)
-        except _ARCHIVE_ERRORS as error:
+        except ARCHIVE_ERRORS as error:
             raise VDIFileError(
                 f"{self._path} is truncated: the directory at its end is missing or damaged "
                 f"({error}); {_REMEDY}"
@@ -482,7 +482,7 @@ class _OpenFile:
         member = self._member(name, limit)
         try:
             data = self._archive.read(member)
-        except _ARCHIVE_ERRORS as error:
+        except ARCHIVE_ERRORS as error:
             self._refuse(f"its member {name!r}: {error}")
         if len(data) != member.file_size:
             self._refuse(f"its member {name!r} ends after {len(data)} bytes")

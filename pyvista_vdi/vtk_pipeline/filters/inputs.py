@@ -94,12 +94,8 @@ class Input:
     def rest(self) -> None:
         """End what goes on behind the frames, which may begin anew."""
 
-    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
-        """Choose what a view shows, before a frame.
-
-        ``growth`` says whether VDIs that are lacking are made: ``"now"``, ``"behind"`` the frames,
-        or not yet, ``"later"``, because the view turns; ``None``: never.
-        """
+    def look(self, camera: Camera, device: Any) -> None:
+        """Choose what a view shows, before a frame."""
 
     @property
     def busy(self) -> bool:
