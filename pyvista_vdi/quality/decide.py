@@ -37,7 +37,6 @@ from pyvista_vdi.quality.frame_state import (
     PlaceholderTook,
     Raise,
     RenderMode,
-    Settings,
     Show,
     Sight,
     StoredAsked,

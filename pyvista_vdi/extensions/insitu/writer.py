@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Formatter
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from pyvista_vdi.extensions.large.on_mpi import (
     require_same,
     together,
 )
-from pyvista_vdi.extensions.series.generate import checked_deferral
 from pyvista_vdi.extensions.series.series import checked_time
 from pyvista_vdi.extensions.series.writer import (
     SeriesWriter,
@@ -46,11 +45,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Grid, Volume
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from pyvista_vdi.extensions.series.keywords import InSituOptions
 
 _DEFERRAL = tuple(declared(Deferral))
 
@@ -133,7 +127,7 @@ class InSitu:
         append: bool = False,
         overwrite: bool = False,
         device: DeviceLike | None = None,
-        **options: Unpack[InSituOptions],
+        **options: Any,
     ) -> None:
         self._comm = comm = mpi().COMM_WORLD if comm is None else checked_ranks(comm)
         self._device, self._closed, self._step = device, False, 0
@@ -185,7 +179,6 @@ class InSitu:
             self._function = unclassified(self._looks.interpolation)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
-        self._deferral = checked_deferral(self._deferral, self._options)
         points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
         of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
         self._grid = Grid(points, of.spacing, of.origin, of.direction)
@@ -309,7 +302,7 @@ class InSitu:
         return time
 
     def close(self) -> None:
-        """Let others write the series; what was appended is readable before. No step comes after."""
+        """Let others write the series; no step comes after."""
         self._closed = True
         if self._writer is not None:
             self._writer.close()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import os
+import weakref
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any, NoReturn
@@ -21,12 +22,13 @@ from pyvista_vdi.io.vdi_file.description import from_json, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 
 #: Version of the JSON.
 VERSION = 1
+#: VDIs that are kept of those that were read: the last ones.
+_KEPT = 6
 #: What the files of an earlier format begin with: steps by differences, and sets of them.
 _EARLIER = (b"\x89VDIS\r\n\x1a", b"\x89VDIV\r\n\x1a")
 
@@ -37,52 +39,33 @@ class Kind:
 
     name: str
     suffix: str
-    head: str  # name of the JSON
-    listed: str  # its entry that has one item for each VDI
-    kept: int  # VDIs that are kept of those that were read: the last ones
+    listed: str  # the JSON's entry that has one item for each VDI
 
     @property
-    def format(self) -> str:
-        """What the JSON calls the format."""
-        return f"pyvista-vdi-{self.name}"
+    def head(self) -> str:
+        """Name of the JSON."""
+        return f"{self.name}.json"
 
 
-SERIES = Kind("series", ".vdis", "series.json", "times", 4)
-SET = Kind("set", ".vdiset", "set.json", "views", 8)
+SERIES = Kind("series", ".vdis", "times")
+SET = Kind("set", ".vdiset", "views")
 
 
-@dataclass(frozen=True)
-class StoredInfo(FileInfo):
-    """What a series or a set says about itself; the first VDI's, but for path and bytes.
-
-    ``times``: of the steps; empty for a set. ``vdi_bytes``: size of each VDI's file.
-    """
-
-    times: tuple[float, ...] = ()
-    vdi_bytes: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Encoding:
-    """How the .vdi files are written: see :meth:`VDI.save`."""
-
-    precision: str | None = "8-byte"  # None: as they are
-    compression: str = "zstd"
-    level: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.precision is not None:
-            check_precision(self.precision)
-        one_of(self.compression, "compression", (*CODECS, "none"))
-        check_level(self.level)
-
-    def __call__(self, vdi: VDI | DeferredVDI) -> bytes:
-        """Return a VDI's file."""
-        vdi = vdi if self.precision is None else vdi.with_precision(self.precision)
-        lists, about = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
-        stream = io.BytesIO()
-        writer.write_to(stream, lists, self.compression, self.level, coarse=False, deferred=about)
-        return stream.getvalue()
+def encoded(
+    vdi: VDI | DeferredVDI,
+    *,
+    precision: str = "8-byte",
+    compression: str = "zstd",
+    level: int | None = None,
+) -> bytes:
+    """Return a VDI's file; its options are those of :meth:`VDI.save`."""
+    one_of(compression, "compression", (*CODECS, "none"))
+    check_level(level)
+    vdi = vdi.with_precision(precision)
+    lists, about = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
+    stream = io.BytesIO()
+    writer.write_to(stream, lists, compression, level, coarse=False, deferred=about)
+    return stream.getvalue()
 
 
 class Archive(Sequence[Any]):
@@ -92,21 +75,21 @@ class Archive(Sequence[Any]):
     """
 
     def __init__(self, path: str | os.PathLike[str], kind: Kind) -> None:
-        self.path, self._kind = as_path(path), kind
-        self._zip = None if self.path.is_dir() else self._opened()
+        self.path, self._kind = as_path(path).absolute(), kind
+        self._root: Any = self.path if self.path.is_dir() else zipfile.Path(self._opened())
+        self._read = lru_cache(_KEPT)(self._read_now)
         try:
             self.about: dict[str, Any] = from_json(self._content(kind.head))
             form, version = self.about["format"], self.about["version"]
             self._length = len(self.about[kind.listed])
-        except (KeyError, TypeError, ValueError, RecursionError) as error:
-            self.refuse(f"its {kind.head} is no JSON, or incomplete ({error!r})")
-        if (form, version) != (kind.format, VERSION):
+        except (KeyError, TypeError, RecursionError, UnicodeDecodeError) as error:
+            self.refuse(f"its {kind.head} is incomplete ({error!r})")
+        if (form, version) != (f"pyvista-vdi-{kind.name}", VERSION):
             raise VDIFileError(
                 f"{path} is of the format {form!r}, version {version!r}; this is pyvista-vdi "
-                f"{__version__}, which reads {kind.format!r}, version {VERSION}: upgrade by "
-                "pip install -U pyvista-vdi"
+                f"{__version__}, which reads 'pyvista-vdi-{kind.name}', version {VERSION}: upgrade "
+                "by pip install -U pyvista-vdi"
             )
-        self._read = lru_cache(kind.kept)(self._read_now)
 
     def __reduce__(self) -> Any:
         return type(self), (self.path, self._kind)
@@ -117,15 +100,12 @@ class Archive(Sequence[Any]):
     def __getitem__(self, index: Any) -> Any:
         return self._read(range(len(self))[index])
 
-    def info(self) -> StoredInfo:
-        """Return what is known without the arrays."""
-        if not len(self):
-            raise VDIFileError(f"{self.path} has no finished VDI: none has been written yet")
+    def info(self) -> FileInfo:
+        """Return what is known of the first VDI without its arrays, and the bytes of all."""
         first = reader.read_info(self.path / name_of(0), stream=self._stream(0))
-        sizes = tuple(self._size(name_of(i)) for i in range(len(self)))
-        total = sum(sizes) if self._zip is None else self.path.stat().st_size
-        about = {**vars(first), "path": self.path, "file_bytes": total, "vdi_bytes": sizes}
-        return StoredInfo(**about, times=tuple(self.about.get("times", ())))
+        files = self.path.iterdir() if self.path.is_dir() else [self.path]
+        n_bytes = sum(file.stat().st_size for file in files)
+        return replace(first, path=self.path, file_bytes=n_bytes)
 
     def refuse(self, why: str) -> NoReturn:
         """Raise the error of what is damaged."""
@@ -137,54 +117,38 @@ class Archive(Sequence[Any]):
         """Return the file as an archive, or say what it is instead of one."""
         try:
             stream = opened(self.path)
-        except (OSError, ValueError) as error:
-            raise VDIFileError(
-                f"{self.path} cannot be read: {getattr(error, 'strerror', None) or error}"
-            ) from error
-        try:
+            weakref.finalize(self, stream.close)
             begin = stream.read(8)
-            if begin in _EARLIER:
-                raise VDIFileError(_earlier(self.path))
-            if not begin.startswith(b"PK"):
-                raise VDIFileError(
-                    f"{self.path} is no {self._kind.name} of VDIs: it begins with {begin!r}"
-                )
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
+        if begin in _EARLIER:
+            raise VDIFileError(_earlier(self.path))
+        if not begin.startswith(b"PK"):
+            name = self._kind.name
+            raise VDIFileError(f"{self.path} is not a {name} of VDIs: it begins with {begin!r}")
+        try:
             archive = zipfile.ZipFile(stream)
-            # The directory at the end of a file that was cut off is that of a .vdi file within
-            if not archive.infolist() or archive.infolist()[0].header_offset:
-                raise zipfile.BadZipFile("its directory is missing")
-        except VDIFileError:
-            stream.close()
-            raise
         except reader.ARCHIVE_ERRORS as error:
-            stream.close()
             self.refuse(f"it is truncated, or no whole ZIP ({error})")
+        # The directory at the end of a file that was cut off is that of a .vdi file within
+        if not archive.infolist() or archive.infolist()[0].header_offset:
+            self.refuse("it is truncated")
+        if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
+            self.refuse("its files are compressed once more: zip them by zip -0")
         return archive
 
     def _content(self, name: str) -> bytes:
         """Return the bytes of one of the files."""
         try:
-            if self._zip is None:
-                return (self.path / name).read_bytes()
-            member = self._zip.getinfo(name)
-            if member.compress_type != zipfile.ZIP_STORED:
-                self.refuse(f"its {name} is compressed once more: zip it by zip -0")
-            return self._zip.read(member)
+            return (self._root / name).read_bytes()  # type: ignore[no-any-return]
         except (KeyError, FileNotFoundError):
             self.refuse(f"it has no {name}")
         except reader.ARCHIVE_ERRORS as error:
             self.refuse(f"its {name} cannot be read ({error})")
 
-    def _size(self, name: str) -> int:
-        try:
-            if self._zip is None:
-                return (self.path / name).stat().st_size
-            return self._zip.getinfo(name).file_size
-        except (KeyError, OSError):
-            self.refuse(f"it has no {name}")
-
     def _stream(self, i: int) -> Any:
-        return None if self._zip is None else io.BytesIO(self._content(name_of(i)))
+        return io.BytesIO(self._content(name_of(i)))
 
     def _read_now(self, i: int) -> Any:
         return reader.read(self.path / name_of(i), stream=self._stream(i))
@@ -206,8 +170,8 @@ def name_of(i: int) -> str:
 
 def head_bytes(kind: Kind, about: Mapping[str, Any]) -> bytes:
     """Return the JSON."""
-    head = {"format": kind.format, "version": VERSION, "written_by": f"pyvista-vdi {__version__}"}
-    return to_json({**head, **about}).encode()
+    head = {"format": f"pyvista-vdi-{kind.name}", "version": VERSION}
+    return to_json({**head, "written_by": f"pyvista-vdi {__version__}", **about}).encode()
 
 
 def write(
@@ -215,8 +179,9 @@ def write(
     kind: Kind,
     about: Mapping[str, Any],
     vdis: Sequence[Any],
-    encoding: Encoding,
+    *,
     progress: Progress | None = None,
+    **options: Any,
 ) -> Path:
     """Write one file, which appears whole or not at all; it replaces what was there."""
     target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.name}"))
@@ -225,7 +190,7 @@ def write(
             if stream.read(8) in _EARLIER:
                 raise VDIFileError(f"{_earlier(target)}; choose another name for this one")
     with whole_file(target) as out:
-        write_to(out, kind, about, vdis, encoding, progress)
+        write_to(out, kind, about, vdis, progress=progress, **options)
     return target
 
 
@@ -234,15 +199,19 @@ def write_to(
     kind: Kind,
     about: Mapping[str, Any],
     vdis: Sequence[Any],
-    encoding: Encoding,
+    *,
     progress: Progress | None = None,
+    **options: Any,
 ) -> int:
-    """Write one file to a stream; return how many bytes hold the JSON and the first VDI."""
+    """Write one file to a stream; return how many bytes hold the JSON and the first VDI.
+
+    ``options``: those of :func:`encoded`.
+    """
     done, first = Pieces(progress, len(vdis)), 0
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(writer.stored(kind.head), head_bytes(kind, about))
         for i in range(len(vdis)):
-            archive.writestr(writer.stored(name_of(i)), encoding(vdis[i]))
+            archive.writestr(writer.stored(name_of(i)), encoded(vdis[i], **options))
             first = first or stream.tell()
             done()
     return first

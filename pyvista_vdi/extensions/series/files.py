@@ -8,35 +8,28 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.extensions.series.archive import SERIES, Archive, Encoding, StoredInfo, write
+from pyvista_vdi.extensions.series.archive import SERIES, Archive, write
 from pyvista_vdi.extensions.series.series import VDISeries, checked_times, refuse_look
 from pyvista_vdi.io.files import format_named
 from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 
 
-def save(
-    series: VDISeries,
-    path: str | os.PathLike[str],
-    *,
-    progress: Progress | None = None,
-    **options: Any,
-) -> Path:
+def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Path:
     """Write one file with a series, or a page that plays it: see :meth:`VDISeries.save`."""
-    refuse_look(series, options)
+    refuse_look(options)
     found = format_named(path)
     if found is not None and found.page:
         as_vdi(series[0])  # refuses what has no colours
-        page = found.load()
-        return page.write_series(series, path, progress=progress, **options)  # type: ignore[no-any-return]
-    encoding = Encoding(**{"precision": series[0].precision, **options})
-    return write(path, SERIES, {"times": series.times}, series, encoding, progress)
+        return found.load().write_series(series, path, **options)  # type: ignore[no-any-return]
+    if options.get("precision") is None:
+        options["precision"] = series[0].precision
+    return write(path, SERIES, {"times": series.times}, series, **options)
 
 
-def write_steps(
-    vdis: Sequence[VDI], times: Sequence[float], path: str | os.PathLike[str], **options: Any
-) -> Path:
+def write_steps(vdis: Sequence[VDI], times: Sequence[float], path: str, **options: Any) -> Path:
     """Write the VDIs of several times as a series."""
     return save(VDISeries(vdis, times), path, **options)
 
@@ -58,6 +51,6 @@ def times_of(steps: Archive) -> tuple[float, ...]:
         steps.refuse(f"its times cannot be ({error})")
 
 
-def read_info(path: str | os.PathLike[str]) -> StoredInfo:
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
     """Read what a series says about itself, without its arrays: errors as for :func:`read`."""
     return Archive(path, SERIES).info()

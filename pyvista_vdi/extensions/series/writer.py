@@ -9,37 +9,31 @@ import re
 import reprlib
 import sys
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming, warn_external
-from pyvista_vdi.extensions.series.archive import SERIES, Archive, Encoding, head_bytes, name_of
+from pyvista_vdi.extensions.series.archive import SERIES, Archive, head_bytes, name_of
 from pyvista_vdi.extensions.series.files import times_of
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import check_range, checked_time, range_of
+from pyvista_vdi.io import check_write_options
 from pyvista_vdi.io.vdi_file.description import to_json
 from pyvista_vdi.model.checks import as_flag
-from pyvista_vdi.model.deferred import DeferredVDI, importance_points
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, whole_file, with_suffix
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from pyvista_vdi.extensions.series.keywords import WriterOptions
-
-#: What a VDI's metadata say that must be the same in all steps.
-_SAME = ("transfer_function", "lights", "ambient_occlusion")
 _NUMBERED = re.compile(r"\d{6,}\.vdi")
 
 
 class SeriesWriter:
     """Writes a series while what it shows is still being computed.
 
-    It is a folder ``run.vdis`` of numbered ``.vdi`` files, and ``series.json``, which has their
-    times. Each step is whole and on the disk when :meth:`append` returns: other processes read it
-    then, and it stays if this one is killed. A series that is there already is not replaced unless
-    that is asked for, and while one writer is at work another one is refused.
+    It is a folder of numbered ``.vdi`` files, and ``series.json``, which has their times. Each step
+    is whole and on the disk when :meth:`append` returns: other processes read it then, and it stays
+    if this one is killed. A series that is there already is not replaced unless that is asked for,
+    and while one writer is at work another one is refused.
 
     Parameters
     ----------
@@ -95,7 +89,7 @@ class SeriesWriter:
         device: DeviceLike | None = None,
         append: bool = False,
         overwrite: bool = False,
-        **options: Unpack[WriterOptions],
+        **options: Any,
     ) -> None:
         self._make: StepMaker | None = None
         if (camera is None) != (window_size is None) or (options and camera is None):
@@ -104,10 +98,10 @@ class SeriesWriter:
                 "nor options of generation"
             )
         if camera is not None and window_size is not None:
-            self._make = StepMaker(
-                "SeriesWriter", camera, window_size, precision, device=device, **options
-            )
-        self._encoding = Encoding(precision, compression, level)
+            given = {"precision": precision, "device": device, **options}
+            self._make = StepMaker("SeriesWriter", camera, window_size, **given)
+        self._how = {"precision": precision, "compression": compression, "level": level}
+        check_write_options(name_of(0), self._how)
         append, overwrite = checked_way(append, overwrite)
         self.path = Path(os.path.realpath(with_suffix(as_path(path), (SERIES.suffix,), "a series")))
         if self.path.is_file():
@@ -132,30 +126,15 @@ class SeriesWriter:
         if overwrite:
             for file in (head, *numbered):
                 file.unlink(missing_ok=True)
-        elif head.exists():
-            try:
-                steps = Archive(self.path, SERIES)
-                self._times = list(times_of(steps))
-            except VDIFileError:
-                if append:
-                    raise
-                raise refused(self.path, "") from None
-            if self._times and not append:
-                raise refused(
-                    self.path, f" with {len(steps)} steps, the last at time {self._times[-1]:g}"
-                )
+        elif append and (numbered or head.exists()):
+            steps = Archive(self.path, SERIES)
+            self._times = list(times_of(steps))
             if self._times:
                 self._before = steps[-1]
                 self._range = range_of(self._before)
-                if self._make is not None:
-                    _check_kept(self.path, self._before, self._make.deferral)
-                return
         elif numbered:
-            raise VDIFileError(
-                f"{self.path} holds {numbered[0].name} and no {SERIES.head}, which has the times "
-                "of the steps: pass overwrite=True to remove these, or choose another name"
-            )
-        self._write_times([])
+            raise refused(self.path, f" with {len(numbered)} .vdi files")
+        self._write_times(self._times)
 
     def append(self, step: Any, time: float | None = None) -> VDI:
         """Write the next step.
@@ -194,10 +173,8 @@ class SeriesWriter:
         if not self._times:
             self._range = range_of(step)
         check_range(step, self._range, f"number {len(self)}")
-        content = self._encoding(step)
         # The step first: one whose time is not known is none, and is replaced by the next
-        with whole_file(self.path / name_of(len(self))) as stream:
-            stream.write(content)
+        step.save(self.path / name_of(len(self)), **self._how)
         self._write_times([*self._times, time])
         self._before = None
         return step  # type: ignore[no-any-return]
@@ -241,7 +218,7 @@ def _locked(folder: Path) -> IO[bytes]:
     """Return a file that is locked as long as it is open, and no longer than this process lives."""
     try:
         folder.mkdir(exist_ok=True)
-        stream = (folder / "writer.lock").open("a+b")
+        stream = (folder / "writer.lock").open("ab")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise VDIFileError(
@@ -251,7 +228,6 @@ def _locked(folder: Path) -> IO[bytes]:
         if sys.platform == "win32":
             import msvcrt
 
-            stream.seek(1 << 16)  # others may read what is before
             msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
         else:
             import fcntl
@@ -264,16 +240,11 @@ def _locked(folder: Path) -> IO[bytes]:
                 "second writer from it, whose steps would replace these"
             )
             return stream
-        stream.seek(0)
-        by = stream.read(100).decode(errors="replace") or "another process"
         stream.close()
         raise VDIFileError(
-            f"{folder} is being written by {by}: close that writer, or end the process, and try "
-            "again; or choose another name"
+            f"{folder} is being written by another SeriesWriter: close that, or end its process, "
+            "and try again; or choose another name"
         ) from None
-    stream.truncate(0)
-    stream.write(f"process {os.getpid()}".encode())
-    stream.flush()
     return stream
 
 
@@ -297,34 +268,17 @@ def refused(path: Path, with_what: str) -> VDIFileError:
 
 def check_goes_on(path: Any, before: Any, step: Any) -> None:
     """Raise InvalidArgumentError if a VDI has another view or classification than one before."""
-    check_range(step, range_of(before), "this step")
-    _check_importance(path, before, getattr(step, "importance", None))
-    pairs = {"camera": (before.camera, step.camera)}
-    pairs["window_size"] = (tuple(before.window_size), tuple(step.window_size))
-    for name in _SAME:
-        pairs[name] = tuple(json.loads(to_json(vdi.metadata.get(name))) for vdi in (before, step))
+    pairs: dict[str, tuple[Any, Any]] = {
+        name: (getattr(before, name, None), getattr(step, name, None))
+        for name in ("camera", "window_size", "value_range", "importance")
+    }
+    for name in ("transfer_function", "lights", "ambient_occlusion"):
+        said = (json.loads(to_json(vdi.metadata.get(name))) for vdi in (before, step))
+        pairs[name] = tuple(said)
     for name, (had, has) in pairs.items():
         if had != has:
-            had, has = (reprlib.repr(value) for value in (had, has))
             raise InvalidArgumentError(
-                f"{path} cannot be continued: its {name} is {had}, and that of this step {has}; "
-                "give the same view and classification (clim, too), or begin another series"
+                f"{path} cannot be continued: its {name} is {reprlib.repr(had)}, and that of this "
+                f"step {reprlib.repr(has)}; give the same view and classification (clim, too), or "
+                "begin another series"
             )
-
-
-def _check_kept(path: Any, before: Any, deferral: Any) -> None:
-    """Raise InvalidVDIError or InvalidArgumentError if other values would be kept."""
-    if deferral.deferred and deferral.value_range is not None:
-        check_range(deferral, range_of(before), "this run")
-        points = importance_points(deferral.importance, deferral.value_range)
-        _check_importance(path, before, points)
-
-
-def _check_importance(path: Any, before: Any, points: Any) -> None:
-    """Raise InvalidArgumentError if values are kept by another importance than before."""
-    had = getattr(before, "importance", None)
-    if points != had:
-        raise InvalidArgumentError(
-            f"{path} was written with importance={had}, as points (value, weight), and goes on "
-            f"with the same only; got {points}"
-        )

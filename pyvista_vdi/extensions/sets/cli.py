@@ -54,16 +54,9 @@ def generate(options: argparse.Namespace) -> int:
 def info(options: argparse.Namespace) -> int:
     """Print what a file of a set says about itself."""
     about, vdi_set = files.read_info(options.file), files.read(options.file)
-    print_info(
-        options,
-        about,
-        {
-            "views": f"{len(vdi_set)}",
-            "pictures": f"{vdi_set.window_size[0]} x {vdi_set.window_size[1]}",
-        },
-        {"views": [camera.to_dict() for camera in vdi_set.cameras]},
-    )
-    return 0
+    own = {"views": f"{len(vdi_set)}", "pictures": "{} x {}".format(*vdi_set.window_size)}
+    views = [camera.to_dict() for camera in vdi_set.cameras]
+    return print_info(options, about, own, {"views": views})
 
 
 def convert(options: argparse.Namespace) -> int:
@@ -86,7 +79,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     declare.longest(group, None)
     declare.step(group)
     declare.memory_limit(group)
-    declare.camera(parser, "the view that the volume fills; it tells distance, lens, up and a cone's axis")
+    declare.camera(
+        parser, "the view that the volume fills; it tells distance, lens, up and a cone's axis"
+    )
     declare.classification(parser)
     declare.occlusion(parser)
     declare.device(parser)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,6 @@ from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import CameraLike, DeviceLike, Progress, VolumeLike, WindowSize
 from pyvista_vdi.quality.view_error import world_centre
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from pyvista_vdi.extensions.series.keywords import SetOptions
-
 #: Half angle of the cone that a V_O of a set has to serve, degrees: others serve what is beyond.
 VIEW_CONE = 30.0
 #: Above this share of the length along the axis of a view's up direction another one is up.
@@ -43,7 +38,7 @@ def generate_set(
     lists: float = 1.0,
     device: DeviceLike | None = None,
     progress: Progress | None = None,
-    **options: Unpack[SetOptions],
+    **options: Any,
 ) -> VDISet:
     """Generate VDIs of a volume from several views: on a sphere, in a cone, or those given.
 

@@ -115,7 +115,7 @@ class SetInput(Input):
 
     def _fitting(self) -> list[int]:
         """Return the nearest VDIs that there is memory for, and at least those that are drawn."""
-        largest = max((v.nbytes * (1 + ON_DEVICE) for v in self._ready.values()), default=1.0)
+        largest = max((1.0, *(v.nbytes * (1 + ON_DEVICE) for v in self._ready.values())))
         return self._order[: max(MOST_BLENDED, min(_AHEAD, int(self.memory / largest)))]
 
     def _wanted(self) -> int | None:

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
-from pyvista_vdi.extensions.series.series import Made, as_step, check_range, range_of
+from pyvista_vdi.extensions.series.series import as_steps, mapped
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import each_of
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
 
@@ -26,8 +21,6 @@ from pyvista_vdi.quality.view_error import eye_from_centre
 BLEND = 6.0
 #: Tangent of half the angle of VTK's lens.
 _LENS = math.tan(math.radians(15))
-#: VDIs with other colours that are kept, as those that were decoded last are.
-_KEPT = 8
 #: Most V_Os that a picture is blended of.
 MOST_BLENDED = 3
 
@@ -83,7 +76,7 @@ class VDISet(VDICollection):
                 f"views must be a sequence of VDIs, got {type(views).__name__}: pass a list"
             )
         if cameras is None:
-            cameras = [as_step(vdi).camera for vdi in views]
+            cameras = [vdi.camera for vdi in views]
         elif not np.iterable(cameras):
             raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
         cameras = [Camera.from_any(camera) for camera in cameras]
@@ -122,11 +115,8 @@ class VDISet(VDICollection):
         InvalidVDIError
             If one is no VDI, or they are of other bounds than the first.
         """
-        if isinstance(vdis, VDI | DeferredVDI):
-            raise InvalidVDIError("a set is made of several VDIs: pass them in a list")
-        views = tuple(as_step(vdi) for vdi in each_of(vdis))
+        views = as_steps(vdis, "a set")
         for i, vdi in enumerate(views):
-            check_range(vdi, range_of(views[0]), f"view {i}")
             if vdi.bounds != views[0].bounds:
                 raise InvalidVDIError(
                     f"the VDIs of a set are of one scene: number {i} has the bounds "
@@ -161,9 +151,6 @@ class VDISet(VDICollection):
             return [self[i] for i in range(len(self))[index]]
         return self._views[range(len(self))[index]]
 
-    def __iter__(self) -> Iterator[VDI]:
-        return (self[i] for i in range(len(self)))
-
     @property
     def blend(self) -> float:
         """Degrees by which a V_O may be farther than the nearest and still be blended in.
@@ -181,9 +168,8 @@ class VDISet(VDICollection):
         self._blend = value
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISet:
-        """Return a set of what a function makes of each VDI, when that is asked for."""
         found = VDISet(
-            Made(function, self, _KEPT),
+            mapped(function, self),
             self.cameras,
             window_size=self.window_size,
             bounds=self.bounds,
@@ -245,41 +231,6 @@ class VDISet(VDICollection):
             The view.
         """
         return [(self[i], weight) for i, weight in self.weights(camera)]
-
-    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write one ``.vdiset`` file, or a page that shows it; it appears whole or not at all.
-
-        :func:`pyvista_vdi.read` opens both.
-
-        Parameters
-        ----------
-        path : path-like
-            The target; its name ends in ``.vdiset``, or in ``.html``.
-        **options
-            ``precision`` (``"8-byte"``), ``compression`` (``"zstd"``, and ``"deflate"`` in a page)
-            and ``level`` as for :class:`pyvista_vdi.SeriesWriter`; ``progress``, called with the
-            finished fraction. For pages ``title``, ``background`` and ``controls`` as well.
-
-        Returns
-        -------
-        pathlib.Path
-            The file.
-
-        Raises
-        ------
-        VDIFileError
-            If the target cannot be written.
-        InvalidArgumentError
-            If an option is out of its range, or one is a look, which :meth:`classified` takes.
-        """
-        return registry.method("VDISet.save")(self, path, **options)  # type: ignore[no-any-return]
-
-    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
-        """Return what a notebook shows: a viewer, or a picture."""
-        text = {"text/plain": repr(self)}
-        if self.value_range is not None:  # pages show colours
-            return text
-        return registry.method("VDISet._repr_mimebundle_", lambda *_: text)(self, include, exclude)
 
     def __repr__(self) -> str:
         width, height = self.window_size

@@ -20,16 +20,15 @@ from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.extensions.series.archive import SERIES, SET, Encoding, write_to
+from pyvista_vdi.extensions.series.archive import SERIES, SET, write_to
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.files import about
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.io.progress import Progress
-from pyvista_vdi.io.vdi_file import reader
+from pyvista_vdi.io.vdi_file import reader, writer
 from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.vdi_file import writer
 from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.metrics import check_background, over_background
@@ -271,8 +270,8 @@ def write_series(
     """
     view = _view_of(series[0], background)
     view.attributes = {"autoplay": ""} if autoplay else {}
-    encoding = Encoding(precision, compression, level)
-    return _write_several(view, path, series, encoding, title, controls, progress)
+    how = {"precision": precision, "compression": compression, "level": level}
+    return _write_several(view, path, series, title, controls, progress=progress, **how)
 
 
 def write_set(
@@ -290,38 +289,35 @@ def write_set(
     """Write a page that shows a set: see :meth:`pyvista_vdi.VDISet.save`, and :func:`page`."""
     view = _view_of(vdi_set[vdi_set.nearest(vdi_set.camera)], background)
     view.still_size = vdi_set.window_size
-    encoding = Encoding(precision, compression, level)
-    return _write_several(view, path, vdi_set, encoding, title, controls, progress)
+    how = {"precision": precision, "compression": compression, "level": level}
+    return _write_several(view, path, vdi_set, title, controls, progress=progress, **how)
 
 
 def _write_several(
     view: View,
     path: str | os.PathLike[str],
     vdis: VDISeries | VDISet,
-    encoding: Encoding,
     title: str | None,
     controls: str,
-    progress: Progress | None,
+    **how: Any,
 ) -> Path:
     """Write a page of a series or a set that a viewer shows."""
     target = Path(os.path.realpath(check_writable(Path(path))))
     check_controls(controls)
-    view.series = in_parts(*several(vdis, encoding, progress))
+    view.series = in_parts(*several(vdis, **how))
     content = assembled([view], title=target.stem if title is None else title, controls=controls)
     with whole_file(target) as out:
         out.write(content)
     return target
 
 
-def several(
-    vdis: VDISeries | VDISet, encoding: Encoding, progress: Progress | None = None
-) -> tuple[bytes, int]:
+def several(vdis: VDISeries | VDISet, **how: Any) -> tuple[bytes, int]:
     """Return the file of a series or a set, and how many bytes of it show its first VDI."""
     stream = io.BytesIO()
     if isinstance(vdis, VDISeries):
-        cut = write_to(stream, SERIES, {"times": vdis.times}, vdis, encoding, progress)
+        cut = write_to(stream, SERIES, {"times": vdis.times}, vdis, **how)
     else:
-        cut = write_to(stream, SET, about(vdis), vdis, encoding, progress)
+        cut = write_to(stream, SET, about(vdis), vdis, **how)
     return stream.getvalue(), cut
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, MissingDependencyError
-from pyvista_vdi.extensions.series.archive import Encoding
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
@@ -357,7 +356,7 @@ class VDIWidget(anywidget.AnyWidget):
         if vdi is None:
             return b""
         if not isinstance(vdi, VDI | DeferredVDI):
-            return several(vdi._mapped(bare), Encoding(None, "deflate", EFFORT))[0]
+            return several(vdi._mapped(bare), compression="deflate", level=EFFORT)[0]
         fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
         sent: Any = vdi.with_precision(self._precision or "8-byte") if fits else vdi
         about = None

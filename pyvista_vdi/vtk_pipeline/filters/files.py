@@ -93,7 +93,7 @@ class VDIReader(Algorithm):
                 self._series = read(self._path) if holds(self._path) == "series" else None
         self.picture_size = picture_size(about.window_size, about.metadata) if about else None
         announce(outputs, about.window_size if about else (1, 1))
-        announce_times(outputs, about.times if self._series is not None else ())
+        announce_times(outputs, () if self._series is None else self._series.times or ())
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:

@@ -117,10 +117,6 @@ class Input:
         """Return the VDIs that a picture is blended of, with weights; none for one."""
         return []
 
-    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI | None:
-        """Generate what is shown for a view, and show that; ``None`` where this cannot be."""
-        return None
-
 
 class SourceInput(Input):
     """What a :class:`VDISource` makes."""
