@@ -78,11 +78,12 @@ class Archive(Sequence[Any]):
         self.path, self._kind = as_path(path).absolute(), kind
         self._root: Any = self.path if self.path.is_dir() else zipfile.Path(self._opened())
         self._read = lru_cache(_KEPT)(self._read_now)
+        content = self._content(kind.head)
         try:
-            self.about: dict[str, Any] = from_json(self._content(kind.head))
+            self.about: dict[str, Any] = from_json(content)
             form, version = self.about["format"], self.about["version"]
             self._length = len(self.about[kind.listed])
-        except (KeyError, TypeError, RecursionError, UnicodeDecodeError) as error:
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
             self.refuse(f"its {kind.head} is incomplete ({error!r})")
         if (form, version) != (f"pyvista-vdi-{kind.name}", VERSION):
             raise VDIFileError(
