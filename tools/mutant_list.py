@@ -11,7 +11,6 @@ ROOMS = {
     "volume": ("volume", "generation"),
     "raycasting": ("raycasting", "model"),
     "multi_vdi": ("raycasting",),
-    "series": ("extensions/series",),
     "large": ("extensions/large",),
     "cpu16": ("generation", "volume", "raycasting"),
 }
@@ -42,7 +41,6 @@ MARCH, MARCH_LISTS = "opencl/volume/march.cl", "opencl/cpu16/generation_march.cl
 RUNS, SHORTEN = "opencl/generation/runs.cl", "opencl/cpu16/generation_shorten.cl"
 HOMOGENEITY = "opencl/generation/homogeneity.cl"
 LISTS = "opencl/raycasting/first_supersegment.cl"
-DECODE = "opencl/series/decode.cl"
 LARGE, OPTICAL_DEPTHS, LARGE_RUNS = (
     ("extensions/large",),
     "opencl/cpu16/generation_optical_depths.cl",
@@ -323,16 +321,6 @@ KERNEL_MUTANTS = (
         "length(direction) * (float)stride * step",
         "length(direction) * step",
     ),
-    _m("series: lists have not moved", DECODE, "rounded(shift * moved_by, 1.0, &tame)", "0"),
-    _m(
-        "series: kept ones that are left over do not matter",
-        DECODE,
-        "tame = tame && !bit_at(kept_there, place[THERE_BIT] + old);",
-        ";",
-    ),
-    _m("series: last faces are as the others", DECODE, "if (k == count - 1) {", "if (false) {"),
-    _m("series: numbers are rounded down", DECODE, "rint(value / unit)", "floor(value / unit)"),
-    _m("series: colours are the table's", DECODE, "if (same >= 0 && left == 0) {", "if (false) {"),
     _m(
         "large: a step that is sampled stands for itself alone",
         OPTICAL_DEPTHS,
@@ -624,13 +612,6 @@ PYTHON_MUTANTS = (
         ("quality",),
     ),
     _m(
-        "decision: a set grows while its view turns off-screen",
-        DECIDE,
-        '    if moving:\n        return "later"',
-        '    if moving and watched:\n        return "later"',
-        ("quality",),
-    ),
-    _m(
         "decision: nobody looks whether a view has come to rest",
         DECIDE,
         "return state.making is not None or state.estimating or settles",
@@ -752,15 +733,22 @@ PYTHON_MUTANTS = (
     _m(
         "series: steps that were left out are not counted",
         PLAYER,
-        "self.dropped += place - self._place - 1",
+        "self.dropped += max(0, place - self._place - 1)",
         "self.dropped += 0",
         ("extensions/series",),
     ),
     _m(
         "series: what was played to its end does not begin anew",
         PLAYER,
-        "if not loop and self._place == n - 1:",
-        "if False:",
+        "self._begin(0 if not loop and self.step == last else self.step)",
+        "self._begin(self.step)",
+        ("extensions/series",),
+    ),
+    _m(
+        "series: a second writer is not refused",
+        "pyvista_vdi/extensions/series/writer.py",
+        "fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)",
+        "pass",
         ("extensions/series",),
     ),
     _m(
@@ -768,13 +756,6 @@ PYTHON_MUTANTS = (
         SERIES,
         "return min(candidates, key=lambda i: abs(self.times[i] - time))",
         "return candidates[-1]",
-        ("extensions/series",),
-    ),
-    _m(
-        "series: optical depths that are told apart are rounded down",
-        "pyvista_vdi/extensions/series/codes.py",
-        "(bits + 0x8000 >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
-        "(bits >> 16) - TAU_BASE + 1, 0, TAU_CODES)",
         ("extensions/series",),
     ),
     _m(
@@ -836,8 +817,8 @@ PYTHON_MUTANTS = (
     _m(
         "viewer: the step farthest in time is shown",
         VIEWER + "series.js",
-        "if (Math.abs(frame.time - time) < Math",
-        "if (Math.abs(frame.time - time) > Math",
+        "far.indexOf(Math.min(...far))",
+        "far.indexOf(Math.max(...far))",
         ("extensions/web",),
     ),
     _m(

@@ -50,8 +50,6 @@ RUNS = {
     "generation": "--volumes brain --repeats 1",
     "large": "--volumes brain --large kingsnake_like@8 --repeats 1",
     "scaling": "--volume brain --repeats 1",
-    "series": "--series plume",
-    "sets": "--volumes brain --directions 2 --target-ssim .8 --repeats 1",
     "trees": "--other .. --volumes brain --repeats 1",
     "web": "--volumes brain --seconds 6 --repeats 1",
 }
