@@ -302,7 +302,7 @@ class InSitu:
         return time
 
     def close(self) -> None:
-        """Let others write the series; no step comes after."""
+        """End the run: no step comes after, and others may write."""
         self._closed = True
         if self._writer is not None:
             self._writer.close()

@@ -199,7 +199,7 @@ class SeriesWriter:
         self._times = times
 
     def close(self) -> None:
-        """Let others write; once is enough."""
+        """End: no step comes after, and others may write."""
         lock, self._lock = self._lock, None
         if lock is not None:
             lock.close()

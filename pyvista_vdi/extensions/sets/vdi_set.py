@@ -76,7 +76,7 @@ class VDISet(VDICollection):
                 f"views must be a sequence of VDIs, got {type(views).__name__}: pass a list"
             )
         if cameras is None:
-            cameras = [vdi.camera for vdi in views]
+            cameras = [vdi.camera for vdi in as_steps(views, "a set")]
         elif not np.iterable(cameras):
             raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
         cameras = [Camera.from_any(camera) for camera in cameras]
