@@ -120,7 +120,6 @@ def share_lit(
     counts = offsets[lists + 1] - offsets[lists]
     begins = np.cumsum(counts) - counts
     places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
-    own = np.repeat(lists, counts)
     optical_depth = vdi.optical_depth[places] if optical_depths is None else optical_depths(places)
     optical_depth = optical_depth.astype(np.float64)
     before = np.cumsum(optical_depth) - optical_depth
