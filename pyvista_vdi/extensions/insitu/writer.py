@@ -32,8 +32,9 @@ from pyvista_vdi.extensions.series.writer import (
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_whole, not_taken, three_wholes
+from pyvista_vdi.model.checks import as_range, as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.deferred import importance_points
 from pyvista_vdi.model.options import (
     GENERATION_NAMES,
     Deferral,
@@ -176,6 +177,8 @@ class InSitu:
         self._looks = Classification.composited(looks, "InSitu", others)
         if self._deferral.deferred:
             self._looks.require_no_look()
+            ends = as_range(self._deferral.value_range)
+            importance_points(self._deferral.importance, ends)  # refused before the run
             self._function = unclassified(self._looks.interpolation)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})

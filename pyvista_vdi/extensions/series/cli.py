@@ -15,7 +15,7 @@ from typing import Any
 
 from pyvista_vdi import registry
 from pyvista_vdi.cli import declare
-from pyvista_vdi.cli.files import of_values
+from pyvista_vdi.cli.files import state_of, text_of
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     OF_ANY_VOLUME,
@@ -30,7 +30,7 @@ from pyvista_vdi.cli.inputs import (
     with_look,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
-from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
+from pyvista_vdi.cli.text import mebibytes, printable, table
 from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.extensions.series import files as of_series
 from pyvista_vdi.extensions.series.archive import SERIES, Kind
@@ -151,21 +151,9 @@ def print_info(
 ) -> int:
     """Print what a series or a set says about itself; what is one VDI's is the first one's."""
     if options.json:
-        state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
-        print(json.dumps({**state, **listed}, indent=1))
-        return 0
-    rows = {
-        "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}",
-        "written by": about.written_by,
-        **own,
-        **({} if about.deferred is None else of_values(about.deferred["value_range"])),
-        "precision": about.precision,
-        "lists": "{} x {}".format(*about.window_size),
-        "eye": vector(about.camera.position),
-        "bounds": vector(about.bounds),
-        **LENGTHS,
-    }
-    print(table(rows))
+        print(json.dumps({**state_of(about), **listed}, indent=1))
+    else:
+        print(table(own) + "\n" + text_of(about))
     return 0
 
 

@@ -17,10 +17,11 @@ from pyvista_vdi.errors import (
     with_article,
 )
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
+from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import check_callback
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import (
     GENERATION_NAMES,
@@ -34,8 +35,8 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import bytes_of
 
-_LOOK, _DIAL, _DEFERRAL = (tuple(declared(r)) for r in (Classification, QualityTarget, Deferral))
-_OTHERS = (*GENERATION_NAMES, *_DIAL, *_DEFERRAL, "spacing", "origin")
+_GRID = ("spacing", "origin")
+_OTHERS = (*GENERATION_NAMES, *declared(QualityTarget), *declared(Deferral))
 
 
 def generate_series(
@@ -79,8 +80,8 @@ def generate_series(
         As for :func:`pyvista_vdi.generate`: of a Dask cluster, whose workers make the VDIs of
         chunked volumes. Dask arrays are chunked then, and else brought into memory step by step.
     progress : callable, optional
-        Called with the finished fraction, 0 to 1, of the series where its length is known, else of
-        each step; work stops if it returns ``False``.
+        Called after each step with the finished fraction, where the number of steps is known; work
+        stops if it returns ``False``.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **options
@@ -108,18 +109,18 @@ def generate_series(
     --------
     generate : has the options, and the other errors.
     """
-    check_callback(progress)
     steps, known = _steps(volumes, times)
     given = {"spacing": spacing, "origin": origin, "client": client, "device": device, **options}
     make = StepMaker("generate_series", camera, window_size, **given)
-    sized = steps if known is None else known
-    total = len(sized) if isinstance(sized, Sized) else None
+    sized: Any = steps if known is None else known
+    done = Pieces(progress, len(sized) if isinstance(sized, Sized) else 0)
     vdis: list[VDI] = []
     for volume in steps:
         if known is not None and len(vdis) == len(known):
             raise InvalidArgumentError(f"there are more steps than the {len(vdis)} times")
         with naming(f"step {len(vdis)}"):
-            vdis.append(make(volume, _part(progress, len(vdis), total)))
+            vdis.append(make(volume))
+        done()
     if not vdis:
         raise InvalidArgumentError("there is no step: pass at least one volume")
     return VDISeries(vdis, range(len(vdis)) if known is None else known)
@@ -135,49 +136,48 @@ class StepMaker:
         self, function: str, camera: Any, window_size: Sequence[int], **options: Any
     ) -> None:
         self._camera, self._size = Camera.from_any(camera), check_window_size(window_size)
-        self._grid = {name: options.pop(name, None) for name in ("spacing", "origin")}
+        self._pictures = self._size
+        self._grid = {n: v for n in _GRID if (v := options.pop(n, None)) is not None}
         self._where = {name: options.pop(name, None) for name in ("client", "device")}
-        looks = {name: value for name, value in options.items() if name not in _OTHERS}
-        self._looks = Classification.composited(looks, function, _OTHERS)
-        target = QualityTarget(**{n: options[n] for n in _DIAL if n in options})
-        deferral = Deferral(**{n: options[n] for n in _DEFERRAL if n in options})
+        looks = {n: v for n, v in options.items() if n not in _OTHERS}
+        self._looks = Classification.composited(looks, function, (*_OTHERS, *_GRID))
+        target, deferral, _ = (
+            of(**{n: options[n] for n in declared(of) if n in options})
+            for of in (QualityTarget, Deferral, GenerationOptions)
+        )
         if deferral.deferred:
             self._looks.require_no_look()
             deferral.refuse_target(target)
         if not target:
             options.setdefault("precision", "8-byte")
-        GenerationOptions(**{n: options[n] for n in GENERATION_NAMES if n in options})
-        self._deferred = deferral.deferred
         self._scalars = options.pop("scalars", None), options.pop("preference", "point")
         self._options, self._max_bytes = options, target.max_bytes
         self._dial: dict[str, Any] | None = None  # what the first step chose, where one chooses
 
-    def __call__(self, volume: Any, progress: Progress | None = None) -> VDI:
+    def __call__(self, volume: Any) -> VDI:
         """Return a step's VDI."""
-        if self._grid["spacing"] is not None and not isinstance(volume, Volume):
+        if self._grid and not (hasattr(volume, "GetClassName") or isinstance(volume, Volume)):
             array = volume if self._where["client"] is not None else np.asarray(volume)
-            volume = Volume(array, **{n: v for n, v in self._grid.items() if v is not None})
+            volume = Volume(array, **self._grid)
         volume = as_volume(volume, *self._scalars)
-        volume = volume.in_view(self._camera, window_size=self._size)
-        if not (self._deferred or self._looks.in_place):
+        volume = volume.in_view(self._camera, window_size=self._pictures)
+        if not (self._looks.in_place or self._options.get("classification") == "deferred"):
             # A colour stands for the same value in all steps
             table = self._looks.transfer_function_of(volume)
             self._looks = Classification(transfer_function=table)
-            self._options = {n: v for n, v in self._options.items() if n not in _LOOK}
+            self._options = {n: v for n, v in self._options.items() if n in _OTHERS}
             self._options["transfer_function"] = table
-        vdi = generate(
-            volume, self._camera, self._size, progress=progress, **self._where, **self._options
-        )
-        if self._deferred:
-            self._options["value_range"] = vdi.value_range  # type: ignore[attr-defined]
+        vdi = generate(volume, self._camera, self._size, **self._where, **self._options)
+        if isinstance(vdi, DeferredVDI):
+            self._options["value_range"] = vdi.value_range
         elif self._dial is not None:
             vdi.metadata["dial"] = self._dial
             self._check_bytes(vdi)
         elif dial := vdi.metadata.get("dial"):
             # What was chosen for the first step are the settings of all others
-            self._dial = {**dial, "missed": []}
-            self._size = vdi.window_size
-            self._options = {n: v for n, v in self._options.items() if n not in _DIAL}
+            self._dial, self._size = {**dial, "missed": []}, vdi.window_size
+            dropped = declared(QualityTarget)
+            self._options = {n: v for n, v in self._options.items() if n not in dropped}
             self._options |= {n: dial["chosen"][n] for n in ("max_supersegments", "precision")}
         return vdi
 
@@ -195,23 +195,23 @@ class StepMaker:
 def _steps(
     volumes: Any, times: Iterable[float] | None
 ) -> tuple[Iterable[Any], tuple[float, ...] | None]:
-    """Return the steps' volumes, a sequence where they can be had again, and their times."""
-    known = None if times is None else checked_times(times)
+    """Return the steps' volumes, and their times where they are known."""
+    own: Iterable[float] | None = None
     if hasattr(volumes, "GetOutputPort") or hasattr(volumes, "time_values"):
         from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
         volumes, own = steps_and_times(volumes)
-        known = checked_times(own) if known is None else known
-    elif callable(volumes):
+    elif isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
+        own = volumes.store.times
+        volumes = Called(volumes.at_time, range(len(volumes.store.times)))
+    times = own if times is None else times
+    known = None if times is None else checked_times(times)
+    if callable(volumes):
         if known is None:
             raise InvalidArgumentError(
                 "volumes is a function of the step's index: pass times, one for each step"
             )
         volumes = Called(volumes, range(len(known)))
-    elif isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
-        own = volumes.store.times
-        known = checked_times(own) if known is None else known
-        volumes = Called(volumes.at_time, range(len(own)))
     elif isinstance(volumes, Volume) or hasattr(volumes, "GetClassName"):
         raise InvalidArgumentError(
             "volumes are the steps of a series, got one volume: pass a list, or call generate"
@@ -222,13 +222,6 @@ def _steps(
             f"{with_article(type(volumes).__name__)}: open files by pyvista.read or "
             "pyvista_vdi.open_volume, one step after the other"
         )
-    if known is not None and hasattr(volumes, "__len__") and len(volumes) != len(known):
+    if known is not None and isinstance(volumes, Sized) and len(volumes) != len(known):
         raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")
     return volumes, known
-
-
-def _part(progress: Progress | None, step: int, total: int | None) -> Progress | None:
-    """Return what reports a step's progress as the series'."""
-    if progress is None or total is None:
-        return progress
-    return lambda fraction: progress((step + fraction) / total)

@@ -6,7 +6,6 @@ import errno
 import json
 import os
 import re
-import reprlib
 import sys
 from pathlib import Path
 from typing import IO, Any
@@ -278,7 +277,7 @@ def check_goes_on(path: Any, before: Any, step: Any) -> None:
     for name, (had, has) in pairs.items():
         if had != has:
             raise InvalidArgumentError(
-                f"{path} cannot be continued: its {name} is {reprlib.repr(had)}, and that of this "
-                f"step {reprlib.repr(has)}; give the same view and classification (clim, too), or "
+                f"{path} cannot be continued: its {name} is {had!s:.99}, and that of this step "
+                f"{has!s:.99}; give the same view and classification (clim, too), or "
                 "begin another series"
             )
