@@ -141,10 +141,11 @@ class StepMaker:
         self._where = {name: options.pop(name, None) for name in ("client", "device")}
         looks = {n: v for n, v in options.items() if n not in _OTHERS}
         self._looks = Classification.composited(looks, function, (*_OTHERS, *_GRID))
-        target, deferral, _ = (
+        asked: Any = (
             of(**{n: options[n] for n in declared(of) if n in options})
             for of in (QualityTarget, Deferral, GenerationOptions)
         )
+        target, deferral, _ = asked
         if deferral.deferred:
             self._looks.require_no_look()
             deferral.refuse_target(target)
@@ -167,7 +168,7 @@ class StepMaker:
             self._looks = Classification(transfer_function=table)
             self._options = {n: v for n, v in self._options.items() if n in _OTHERS}
             self._options["transfer_function"] = table
-        vdi = generate(volume, self._camera, self._size, **self._where, **self._options)
+        vdi: Any = generate(volume, self._camera, self._size, **self._where, **self._options)
         if isinstance(vdi, DeferredVDI):
             self._options["value_range"] = vdi.value_range
         elif self._dial is not None:
@@ -179,7 +180,7 @@ class StepMaker:
             dropped = declared(QualityTarget)
             self._options = {n: v for n, v in self._options.items() if n not in dropped}
             self._options |= {n: dial["chosen"][n] for n in ("max_supersegments", "precision")}
-        return vdi
+        return vdi  # type: ignore[no-any-return]
 
     def _check_bytes(self, vdi: VDI) -> None:
         """Warn once of a step that takes more bytes than are allowed."""

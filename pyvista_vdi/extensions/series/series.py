@@ -110,10 +110,10 @@ class VDISeries(VDICollection):
     @overload
     def __getitem__(self, index: slice) -> VDISeries: ...
     def __getitem__(self, index: int | slice) -> VDI | VDISeries:
-        chosen = range(len(self))[index]
-        if isinstance(chosen, range):
+        if isinstance(index, slice):
+            chosen = range(len(self))[index]
             return VDISeries(Called(self._steps.__getitem__, chosen), self.times[index])
-        return self._steps[chosen]
+        return self._steps[range(len(self))[index]]
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISeries:
         return VDISeries(mapped(function, self), self.times)

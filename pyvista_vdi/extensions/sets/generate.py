@@ -103,7 +103,7 @@ def generate_set(
     made = GenerationOptions(**{"view_cone": VIEW_CONE, "precision": "8-byte", **chosen})
     looks = Classification.composited(given, "generate_set", GENERATION_NAMES)
     read = as_volume(volume, looks.scalars, looks.preference)
-    if np.iterable(views) and not isinstance(views, str):
+    if not isinstance(views, int | str) and np.iterable(views):
         if camera is not None or half_angle != 180:
             raise InvalidArgumentError(
                 "camera and half_angle are for a number of views: leave them out with cameras"
@@ -123,7 +123,7 @@ def generate_set(
     read = read.load_in_view(*cameras, window_size=size)
     table, done = looks.transfer_function_of(read), Pieces(progress, len(cameras))
     about = {"classification": looks.describe(), "scalars": read.name}
-    edges = tuple(max(1, round(lists * edge)) for edge in size)
+    edges = max(1, round(lists * size[0])), max(1, round(lists * size[1]))
     vdis = []
     for view in cameras:
         # All of the volume has lists, of the density that was asked for
