@@ -90,12 +90,8 @@ def generate_deferred(
     low, high = as_range(asked)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidArgumentError(
-            f"value_range must be two finite scalars, low < high; got {asked!r}"
-            + (
-                ", as the volume's: give value_range=(low, high)"
-                if deferral.value_range is None
-                else ""
-            )
+            f"value_range must be two finite scalars, low < high; got {asked!r}, as the volume's: "
+            "give value_range=(low, high)"
         )
     points = importance_points(deferral.importance, (low, high))
     given = {each.name: getattr(options, each.name) for each in fields(options)}

@@ -177,8 +177,8 @@ class InSitu:
         self._looks = Classification.composited(looks, "InSitu", others)
         if self._deferral.deferred:
             self._looks.require_no_look()
-            ends = as_range(self._deferral.value_range)
-            importance_points(self._deferral.importance, ends)  # refused before the run
+            ends = as_range(self._deferral.value_range)  # what cannot be is refused before the run
+            importance_points(self._deferral.importance, ends)
             self._function = unclassified(self._looks.interpolation)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})

@@ -140,7 +140,7 @@ def _described(
             **entries,
             **packed,
             "codec": codec,
-            "chunk_rows": CHUNK_ROWS[version],
+            "chunk_rows": CHUNK_ROWS,
             "arrays": {name: layout.to_dict() for name, layout in arrays.items()},
             "metadata": metadata,
         }
