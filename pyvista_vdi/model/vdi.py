@@ -267,13 +267,6 @@ class VDI:
         vdi.packing = packing
         return vdi
 
-    def thinned(self, along_x: int = 1, along_y: int = 1) -> VDI:
-        """Return a VDI of every k-th list along the window's width and height.
-
-        See :func:`pyvista_vdi.model.list_subsampling.subsampled_lists`.
-        """
-        return registry.method("VDI.thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
-
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file that `pyvista_vdi.read` opens.
 

@@ -177,7 +177,6 @@ ENTRIES = {
         None,
     ),
     "VDI.with_precision": lambda vdi: (vdi.with_precision, {"precision": "exact"}, None),
-    "VDI.thinned": lambda vdi: (vdi.thinned, {}, None),
     "VDI.list_at": lambda vdi: (vdi.list_at, {"x": 1, "y": 1}, None),
     "VDI.equals": lambda vdi: (vdi.equals, {"other": vdi}, None),
     "VDI.save": lambda vdi: (

@@ -25,8 +25,8 @@ from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.cli import main
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.vdi_file import chunks, writer
+from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
-from pyvista_vdi.model.list_subsampling import coarser
 from pyvista_vdi.model.packing import channel_differences, colors_of_differences
 
 CODECS = ("lz4", "zstd", "deflate", "none")

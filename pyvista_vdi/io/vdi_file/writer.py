@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, smallest, write_chunks
+from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -29,7 +30,6 @@ from pyvista_vdi.io.vdi_file.layout import (
     version_of,
 )
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.list_subsampling import coarser
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
     Packed8,

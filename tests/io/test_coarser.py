@@ -8,7 +8,7 @@ from extreme_scenes import slabs_vdi
 from ray_scenes import rebuilt
 
 from pyvista_vdi import VDI, Camera
-from pyvista_vdi.model.list_subsampling import coarser
+from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.reference.raycast import centre_ray_scale, render
 
