@@ -28,7 +28,7 @@ class FileFormat:
     read_options: tuple[str, ...] = ()
     write_options: tuple[str, ...] = ()  # beside compression and level
     compressions: tuple[str, ...] = ()  # the first by default; without any neither is an option
-    magic: bytes = b""  # what it begins with, by which it is found in a page
+    head: str = ""  # of a folder or ZIP of VDIs its file that is last in a folder, first in a ZIP
     page: bool = False  # may hold another's file: module has begins_with and data_in
     values: bool = False  # holds deferred VDIs as well
     needs: str = ""  # what its module cannot be loaded without, and the command that installs it

@@ -276,7 +276,7 @@ VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI, or each of a series or set, as .vdi, .exr; all as .html; a set as .cdb",
+        "write a VDI, or each of a series or set, as .vdi, .exr; all of one as .vdis, .html",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),

@@ -9,7 +9,7 @@ from ray_scenes import rebuilt
 from reference.raycast import centre_ray_scale, render
 
 from pyvista_vdi import VDI, Camera
-from pyvista_vdi.model.list_subsampling import coarser
+from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.model.metrics import compare_images
 
 BOUNDS = (-1, 1, -1, 1, -1, 1)

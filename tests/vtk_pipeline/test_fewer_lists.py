@@ -8,7 +8,7 @@ from reference.raycast import render
 from strategies import random_vdi
 
 from pyvista_vdi import Camera
-from pyvista_vdi.model.list_subsampling import lists_crossed
+from pyvista_vdi.vtk_pipeline.interaction.fewer_lists import lists_crossed, subsampled_lists
 
 STRETCHED = np.diag([1.0, 2.0, 3.0, 1.0])
 LENSES = (
@@ -32,7 +32,7 @@ def vdi_of(lens, window, precision="exact", seed=3):
 @pytest.mark.parametrize("steps", [(1, 1), (2, 1), (1, 3), (3, 2)])
 def test_its_picture_is_every_kth_pixel(lens, steps):
     vdi = vdi_of(LENSES[lens], (12, 9))
-    few = vdi.thinned(*steps)
+    few = subsampled_lists(vdi, *steps)
     x, y = (np.arange((k - 1) // 2, n, k) for k, n in zip(steps, vdi.window_size, strict=True))
     assert few.window_size == (len(x), len(y))
     whole = render(vdi, vdi.camera, vdi.window_size)[::-1]
@@ -45,16 +45,11 @@ def test_its_picture_is_every_kth_pixel(lens, steps):
 @pytest.mark.parametrize("precision", ["8-byte"])
 def test_precision_stays(precision):
     vdi = vdi_of({}, (8, 6), precision)
-    few = vdi.thinned(2, 3)
+    few = subsampled_lists(vdi, 2, 3)
     assert few.precision == precision
     again = few.packing.media(few.counts.reshape(-1))
     for name, values in again.items():
         np.testing.assert_array_equal(values, getattr(few, name), err_msg=name)
-
-
-def test_steps_may_be_numpys():
-    vdi = vdi_of({}, (8, 6))
-    assert vdi.thinned(np.int64(2), np.uint8(3)).equals(vdi.thinned(2, 3))
 
 
 @pytest.mark.parametrize("lens", range(2))
