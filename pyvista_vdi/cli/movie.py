@@ -41,8 +41,7 @@ def movie(options: argparse.Namespace) -> int:
     def views(first: Camera, steps: int | None) -> list[Camera]:
         if not (len(keys) > 1 or options.turn or steps):
             raise InvalidArgumentError(
-                "nothing moves: give two views or more (--path A.json B.json ...), a turn (--turn "
-                "DEGREES), or a series"
+                "nothing moves: give --path two views or more, or --turn DEGREES, or a series"
             )
         # A path takes four seconds from one of its views to the next
         frames = options.frames or steps or max(1, round(max(len(keys) - 1, 1) * 4 * options.fps))
@@ -67,16 +66,17 @@ def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], li
     kinds: Any = {".gif": gif, ".mp4": film, ".webm": film | {"codec": "libvpx-vp9"}}
     target = check_writable(with_suffix(Path(options.output), (*kinds,), "a moving picture"))
     steps, how = None, {"device": options.device}
-    if inputs.is_volume(options):
-        how |= inputs.classification(options)
-        shown, draw, size = inputs.read_volume(options), render_volume, options.size or WINDOW_SIZE
-        first = filling_camera(shown.bounds, size)
-    else:
+    draw: Any = render_volume if inputs.is_volume(options) else render
+    if draw is render:
         inputs.refuse(options, inputs.OF_NO_LOOK, "volumes", "this is a VDI: ")
-        shown, draw = inputs.with_look(options, read(options.file), options.file), render
+        shown = inputs.with_look(options, read(options.file), options.file)
         steps = None if getattr(shown, "times", None) is None else len(shown)
         first, size = picture_view(shown if steps is None else shown[0])
-    size = [max(2, n - n % 2) for n in options.size or size]  # films halve their colours' pixels
+    else:
+        how |= inputs.classification(options)
+        shown, size = inputs.read_volume(options), options.size or WINDOW_SIZE
+        first = filling_camera(shown.bounds, size)
+    pixels = [max(2, n - n % 2) for n in options.size or size]  # films need even numbers
     path = views(inputs.camera(options, first), steps)
     with tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder:
         file = Path(folder) / target.name
@@ -88,13 +88,13 @@ def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], li
             raise MissingDependencyError(f"{error}: pip install 'pyvista-vdi[movie]'") from error
         for k, view in enumerate(tqdm(path, "drawing", leave=False, disable=None)):
             now = shown if steps is None else shown[k * steps // len(path)]
-            writer.append_data(to_bytes(draw(now, view, size, **how), options.background))
+            writer.append_data(to_bytes(draw(now, view, pixels, **how), options.background))
         writer.close()
         if not (written := file.stat().st_size):  # an encoder fails silently
             raise VDIFileError(f"{target} could not be written by its encoder")
         file.replace(target)
     print(
-        f"{printable(target.name)}: {len(path)} frames of {size[0]} x {size[1]} pixels, "
+        f"{printable(target.name)}: {len(path)} frames of {pixels[0]} x {pixels[1]} pixels, "
         f"{len(path) / options.fps:.1f} s at {options.fps:g} a second, {mebibytes(written)}"
     )
     return 0

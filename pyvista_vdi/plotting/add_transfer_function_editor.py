@@ -428,8 +428,8 @@ def _histogram(mapper: Any) -> tuple[NDArray[Any], NDArray[Any]] | None:
     """Count a mapper's finite values, whole numbers one a bar; of values that are kept, lengths."""
     if not isinstance(mapper, VDIMapperMethods):
         values = pv.wrap(mapper.GetInput()).active_scalars
-    elif mapper.GetSource() is not None:
-        values = mapper.GetSource().GetVolume().array
+    elif (source := mapper.GetSource()) is not None:
+        values = source.GetVolume().array
     elif (kept := mapper.driver.values_asked_for()) is not None:
         counts, edges = np.histogram(kept.mean, _BARS, (0, 1), weights=kept.steps)
         return counts, np.interp(edges, (0, 1), kept.value_range)
