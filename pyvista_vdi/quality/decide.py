@@ -29,7 +29,6 @@ from pyvista_vdi.quality.frame_state import (
     FrameState,
     FrameTook,
     Generate,
-    Growth,
     InputChanged,
     Interrupted,
     Judge,
@@ -38,7 +37,6 @@ from pyvista_vdi.quality.frame_state import (
     PlaceholderTook,
     Raise,
     RenderMode,
-    Settings,
     Show,
     Sight,
     StoredAsked,
@@ -148,17 +146,6 @@ def busy(state: FrameState, now: float) -> bool:
     """Whether something goes on, or is to be decided, that no frame would show by itself."""
     settles = state.settings.regenerate == "auto" and not state.moving and not _rests(state, now)
     return state.making is not None or state.estimating or settles
-
-
-def growth(settings: Settings, *, moving: bool, watched: bool) -> Growth:
-    """Return whether a set's VDIs that are lacking in a view are made."""
-    if moving:
-        return "later"
-    if settings.regenerate != "auto":
-        return None
-    if watched:
-        return "behind"
-    return "now" if settings.draw == "auto" else None
 
 
 def ssim_of(state: FrameState, vdi: int | None, view: View | None = None) -> float | None:

@@ -77,7 +77,7 @@ _NAMES = {
         "vtkAnnotatedCubeActor vtkAxesActor vtkCaptionActor2D vtkCornerAnnotation vtkScalarBarActor"
     ),
     "vtkRenderingCore": (
-        "vtkActor vtkActor2D vtkAssembly vtkBillboardTextActor3D vtkCamera "
+        "vtkActor vtkActor2D vtkAssembly vtkBillboardTextActor3D vtkCamera vtkCameraInterpolator "
         "vtkColorTransferFunction vtkFollower vtkHardwarePicker vtkHardwareSelector vtkImageActor "
         "vtkImageSlice vtkLight vtkLightKit vtkMapper vtkPolyDataMapper vtkPolyDataMapper2D "
         "vtkProp3D vtkPropAssembly vtkPropCollection vtkPropPicker vtkRenderWindow "

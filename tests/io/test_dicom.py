@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
@@ -145,6 +146,8 @@ def test_other_files_and_series_beside_the_slices(tmp_path):
     (folder / "empty").touch()
     (folder / "noise.dcm").write_bytes(bytes(range(256)) * 8)
     (folder / "sub").mkdir()
+    for number in (1, 2):  # previews
+        Image.fromarray(SCAN[number].astype(np.uint8)).save(folder / f"{number}.png")
     check(pvdi.read_volume(folder), np.diag(SPACING))
     other = write(tmp_path / "other", series="7.8", values=SCAN[:3])
     for file in other.iterdir():

@@ -109,12 +109,8 @@ class Input:
     def rest(self) -> None:
         """End what goes on behind the frames, which may begin anew."""
 
-    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
-        """Choose what a view shows, before a frame.
-
-        ``growth`` says whether VDIs that are lacking are made: ``"now"``, ``"behind"`` the frames,
-        or not yet, ``"later"``, because the view turns; ``None``: never.
-        """
+    def look(self, camera: Camera, device: Any) -> None:
+        """Choose what a view shows, before a frame."""
 
     @property
     def busy(self) -> bool:
@@ -135,10 +131,6 @@ class Input:
     def parts(self) -> list[tuple[VDI, float]]:
         """Return the VDIs that a picture is blended of, with weights; none for one."""
         return []
-
-    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI | None:
-        """Generate what is shown for a view, and show that; ``None`` where this cannot be."""
-        return None
 
 
 class SourceInput(Input):
@@ -487,7 +479,7 @@ def input_of(data: Any) -> Input:
         image = ImageInput(data)
         image.vdi()  # refuse a damaged one now
         return image
-    show = registry.made_of("shown", data)
+    show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
     require_this_build(type(data))
