@@ -77,6 +77,9 @@ _PLACEHOLDER_RATE = 30.0
 #: the share of rays below which it is said to cover too little: corners of bounds are often empty.
 _TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
 
+#: What a view that is far from the VDI's own, without its volume, has as a remedy.
+_GO_BACK = "its own view is plotter.camera = vdi.camera.to_pyvista()"
+
 
 def decide(state: FrameState, event: Event) -> Decision:
     """Return the state after an event, and what is to be done, in this order."""
@@ -442,13 +445,13 @@ def _lacking(of: StoredSeen) -> tuple[Action, ...]:
     if seen.angle > of.cone:
         what = (
             f"the view is {seen.angle:.0f} degrees from the VDI's generating view, which was to "
-            f"serve {of.cone:.0f}: it shows less, and less of what was hidden"
+            f"serve {of.cone:.0f}: it shows less, and less of what was hidden; {_GO_BACK}"
         )
         lacking.append(("angle", what))
     if seen.coverage < _TOO_LITTLE:
         what = (
             f"{1 - seen.coverage:.0%} of the view's rays through the volume leave what the VDI "
-            "covers: there it shows nothing"
+            f"covers: there it shows nothing; {_GO_BACK}"
         )
         lacking.append(("coverage", what))
     if seen.magnification > _TOO_COARSE:

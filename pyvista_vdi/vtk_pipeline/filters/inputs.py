@@ -46,10 +46,7 @@ class Input:
     #: The volume property that classifies values, where they are kept.
     prop: Any = None
     #: What remedies a view that the VDI does not serve, where there is no source.
-    remedy = (
-        "without its volume it cannot be made anew, and plotter.camera = vdi.camera.to_pyvista() "
-        "goes to its own view"
-    )
+    remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
 
