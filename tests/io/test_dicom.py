@@ -73,6 +73,18 @@ def test_every_voxel_is_where_its_slice_says(direction, tmp_path):
     assert volume.name == "series 1.2.3"
 
 
+def test_texts_longer_than_the_standard_has_them_are_read(tmp_path):
+    """As many programs write them; pydicom would warn of each."""
+
+    def edit(data):
+        del data.SeriesDescription  # which keeps what it was checked by
+        with pydicom.config.disable_value_validation():
+            data.SeriesDescription = 70 * "x"
+
+    volume = pvdi.read_volume(write(tmp_path / "scan", edit=edit))
+    assert volume.name == 70 * "x"
+
+
 def test_a_tilted_gantry_shears_the_volume(tmp_path):
     step = np.array([0.0, 0.7, 2.4])  # not along the normal
     volume = pvdi.read_volume(write(tmp_path / "scan", step=step))

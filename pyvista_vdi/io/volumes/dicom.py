@@ -34,6 +34,13 @@ class _Slice(NamedTuple):
 
 def dicom(path: Path) -> list[VolumeInFile]:
     """Return the series of a folder, or that of a file of several frames."""
+    import pydicom
+
+    with pydicom.config.disable_value_validation():  # else it warns of each long number
+        return _series(path)
+
+
+def _series(path: Path) -> list[VolumeInFile]:
     series, damaged, found = defaultdict(list), [], []
     refused: list[tuple[int, VDIError]] = []
     files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
@@ -43,8 +50,6 @@ def dicom(path: Path) -> list[VolumeInFile]:
                 series[one.header.get("SeriesInstanceUID", "")].append(one)
         except UnsupportedError as error:
             refused.append((len(files), error))
-        except ImportError:
-            raise
         except Exception as error:  # damage shows at whatever pydicom comes to first
             damaged.append(f"{file} cannot be read as a DICOM slice: {error}")
     if damaged and series:

@@ -214,32 +214,31 @@ def _calibration(opened: Any) -> tuple[Any, float, float]:
 
 def _described(opened: Any, number: int, series: Any) -> tuple[list[float], str, tuple[str, ...]]:
     """Return the spacing along x, y and z, its unit and the channels' names, as the file says."""
-    page, names, size, unit = series.keyframe, [], [1.0, 1.0, 1.0], ""
-    apart, pixels = True, page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
-    pixels = [1 / n if n else 1.0 for n in pixels]
+    page, names, size, unit, alone = series.keyframe, [], [1.0, 1.0, 1.0], "", ""
+    per = page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
     described = opened.ome_metadata if opened.is_ome else ""
     of_ome = ET.fromstring(described).findall(".//{*}Pixels")[number:] if described else []
     if of_ome:
-        one = of_ome[0]
-        said = {axis: one.get(f"PhysicalSize{axis}") for axis in "XYZ"}
-        units = [one.get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
-        names, apart = [c.get("Name", "") for c in one.findall("{*}Channel")], not said["X"]
-        if said["X"]:
-            pixels, apart = [float(said["X"]), float(said["Y"] or 1)], bool(said["Z"])
-            size, unit = in_one_unit([*pixels, float(said["Z"] or 1)], units)
+        x, y, z = (of_ome[0].get(f"PhysicalSize{axis}") for axis in "XYZ")
+        units = [of_ome[0].get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
+        names = [channel.get("Name", "") for channel in of_ome[0].findall("{*}Channel")]
+        if x:
+            size, unit = in_one_unit([float(x), float(y or 1), float(z or 1)], units)
+            alone = "" if z else f"{x} x {y}"
     elif opened.is_imagej:
         entries = opened.imagej_metadata or {}
-        size, unit = [*pixels, float(entries.get("spacing", 1.0)) or 1.0], entries.get("unit", "")
-        unit = "um" if unit in _MICRONS else str(unit).replace("pixel", "")
+        size = [*(1 / n if n else 1.0 for n in per), float(entries.get("spacing", 1.0)) or 1.0]
+        unit = str(entries.get("unit", "")).replace("pixel", "")
+        unit = "um" if unit in _MICRONS else unit
         names = [str(n) for n in entries.get("Labels", ())]
     elif opened.is_lsm:  # of Zeiss, in metres
         size, unit = [1e6 * float(opened.lsm_metadata[f"VoxelSize{a}"]) for a in "XYZ"], "um"
-    elif int(page.tags.valueof("ResolutionUnit", 1)) == 3:  # an inch's are most often nobody's
-        apart, pixels = False, [10 * n for n in pixels]
-    if not apart:
+    elif int(page.tags.valueof("ResolutionUnit", 1)) == 3 and all(per):
+        alone = f"{10 / per[0]:g} x {10 / per[1]:g} mm"  # an inch's are most often nobody's
+    if alone:
         warn_external(
-            f"{opened.filename} says that pixels are {pixels[0]:g} x {pixels[1]:g}, and not how "
-            "far apart slices are: spacing is taken as 1; give spacing=(x, y, z)"
+            f"{opened.filename} says that pixels are {alone}, and not how far apart slices are: "
+            "spacing is taken as 1; give spacing=(x, y, z)"
         )
     channels = series.shape[axes.index("c")] if "c" in (axes := _axes(series)) else 0
     each = len({*names}) == len(names) == channels and all(names)
