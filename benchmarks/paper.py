@@ -23,7 +23,7 @@ from shared import Case, Latest, Results, execute, load, milliseconds, parser_of
 from shared.volumes import KINDS
 from skimage.transform import resize
 
-from pyvista_vdi import TransferFunction
+from pyvista_vdi import TransferFunction, read_volume
 from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.measure.bench import Bench, accuracy, take_turns
 from pyvista_vdi.quality.frame_rate import FrameRateController
@@ -57,11 +57,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--sizes", nargs="+", type=parse_size, metavar="WxH")
     parser.add_argument("--no-vtk", action="store_true", help="leave out VTK's mappers")
     options = parser.parse_args(arguments)
-    options.volumes = options.volumes or (KINDS if options.whole else SAMPLED)
+    # The paper's own volumes are files: kingsnake=FILE
+    files = dict(each.split("=", 1) for each in options.volumes if "=" in each)
+    options.volumes = [each.partition("=")[0] for each in options.volumes]
+    options.volumes = options.volumes or list(KINDS if options.whole else SAMPLED)
     options.sizes = options.sizes or (SIZES if options.whole else SIZES[:1])
 
     def bench_of(name: str, size: tuple[int, int]) -> Bench:
-        volume = load(name)
+        volume = read_volume(files[name]) if name in files else load(name)
         function = look(name, volume)
         return Bench(volume, function, size, device=options.device, vtk=not options.no_vtk)
 
