@@ -61,20 +61,12 @@ registry.core = registry.Extension(
             compressions=("lz4", "zstd", "deflate", "none"),
             values=True,
         ),
-        registry.FileFormat(
-            ".vti",
-            "pyvista_vdi.vtk_pipeline.filters.vti",
-            compressions=("lz4", "zlib", "lzma", "none"),
-            shared=True,
-            reports_progress=False,
-            needs="VTK",
-            install='pip install "pyvista-vdi[plot]"',
-        ),
     ),
     readers={
         "": "pyvista_vdi.plotting.imports:volumes_in",
     },
     methods={
+        "Camera.to_pyvista": "pyvista_vdi.plotting.imports:camera_to_pyvista",
         "DeferredVDI.classified": "pyvista_vdi.api.deferred:classified",
         "VDICollection.classified": "pyvista_vdi.api.deferred:classified_each",
         "TransferFunction.from_arguments": (
@@ -86,7 +78,6 @@ registry.core = registry.Extension(
         "VDI.from_image": "pyvista_vdi.vtk_pipeline:vdi_from_image",
         "VDI.plot": "pyvista_vdi.plotting.accessor:plot",
         "VDI.save": "pyvista_vdi.io:write",
-        "VDI.thinned": "pyvista_vdi.model.list_subsampling:subsampled_lists",
         "Volume.read": "pyvista_vdi.io.volumes:read_volume",
         "Volume.from_vtk": "pyvista_vdi.vtk_pipeline:volume_from_vtk",
         "Volume.with_scalars": "pyvista_vdi.plotting.volumes:as_image",

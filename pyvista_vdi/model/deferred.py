@@ -14,11 +14,10 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
-    UnsupportedError,
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_floats, as_number, as_range
-from pyvista_vdi.model.list_subsampling import length_per_depth
+from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 
 if TYPE_CHECKING:
@@ -281,15 +280,11 @@ class DeferredVDI:
         """Return it with supersegments of fewer bytes: ``"exact"``, ``"8-byte"``.
 
         In 8 bytes depths have 14 bits of the list's extent, the mean 3825 steps over the range of
-        values, the spread 4 significant bits and the share 8 bits. There are no 16-byte ones:
-        UnsupportedError.
+        values, the spread 4 significant bits and the share 8 bits.
         """
         if precision == self.precision:
             return self
-        if precision == "16-byte":
-            raise UnsupportedError(
-                "a DeferredVDI has no 16-byte supersegments: choose 'exact' or '8-byte'"
-            )
+        check_precision(precision)
         lists = self._lists
         mean = self.mean.astype(np.float64)
         low, spread = np.zeros_like(mean), lists.optical_depth
@@ -403,3 +398,15 @@ def lengths_of(lists: VDI) -> Floats:
     per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
     thickness = lists.back.astype(np.float64) - lists.front
     return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
+
+
+def length_per_depth(
+    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
+    constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
+        np.linalg.inv(camera.model_to_view)[:3, :3].T
+    )
+    return np.linalg.norm(
+        constant + u[:, np.newaxis] * along_u + v[:, np.newaxis, np.newaxis] * along_v, axis=-1
+    )

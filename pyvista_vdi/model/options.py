@@ -20,6 +20,7 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import (
     as_flag,
     as_float,
+    as_range,
     as_whole,
     check_callback,
     memory_limit_bytes,
@@ -252,7 +253,7 @@ class GenerationOptions(MediumOptions):
         Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
         see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
         by least error or within ``tolerance``. ``"homogeneity"`` cuts without regard to it.
-    precision : {"exact", "16-byte", "8-byte"}
+    precision : {"exact", "8-byte"}
         What a supersegment takes; see :meth:`VDI.with_precision`.
     sample_distance, lights, ambient_occlusion, memory_limit
         As for :class:`MediumOptions`. The light is baked into the colours: it stays as it is where
@@ -327,6 +328,11 @@ class Deferral(Options):
                     f"{name}={getattr(self, name)!r} says what is kept to be classified "
                     f"afterwards: give classification='deferred' as well, or leave {name} out"
                 )
+        low, high = (0, 1) if self.value_range is None else as_range(self.value_range)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise InvalidArgumentError(
+                f"value_range must be two finite scalars, low < high; got {self.value_range!r}"
+            )
 
     @property
     def deferred(self) -> bool:

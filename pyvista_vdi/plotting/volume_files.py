@@ -46,7 +46,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     if is_vdi_image(data):
         raise InvalidVolumeError(
             f"{file} is a VDI in its VTK form, not a volume: "
-            "pyvista_vdi.render(pyvista.read(path), camera) shows it"
+            "plotter.add_vdi(pyvista.read(path)) shows it"
         )
     place = to_world(data.direction_matrix * np.array(data.spacing), data.origin)
     active, found = data.active_scalars_info, []

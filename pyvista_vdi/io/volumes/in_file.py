@@ -192,7 +192,7 @@ def placed(
         name=volume.name,
         blanked=volume.blanked,
     )
-    other.unit = volume.unit
+    other.unit = volume.unit if spacing is None else ""  # another spacing may be in another
     return other
 
 

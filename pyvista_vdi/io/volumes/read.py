@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidVolumeError,
     MissingDependencyError,
@@ -81,8 +80,6 @@ def read_volume(
         If the format's library is not installed.
     """
     file, asked = Path(as_path(path)), series if array is None else array
-    if file.suffix and (own := registry.reader(file.suffix.lower())) is not None:
-        return placed(own(file), spacing, origin)
     if (volumes_in := (kind := _format(path)).volumes_in) is None:
         store = open_store(
             f"{os.fspath(path)}::{asked}" if isinstance(asked, str) else path,

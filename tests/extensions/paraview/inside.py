@@ -132,8 +132,6 @@ def pipeline(folder):
     simple.SaveData(str(folder / "small.vdi"), source, Precision="8-byte", Compression="zstd")
     reader = simple.OpenDataFile(str(folder / "brain.vdi"))
     simple.SaveData(str(folder / "again.vdi"), reader)
-    simple.SaveData(str(folder / "again.exr"), reader)
-    simple.SaveData(str(folder / "third.vdi"), simple.OpenDataFile(str(folder / "again.exr")))
     picture = simple.VDIToImage(Input=source, Azimuth=AZIMUTH)
     view = show_picture(picture, SIZE)
     simple.SaveScreenshot(str(folder / "picture.png"), view, ImageResolution=SIZE)
