@@ -1,4 +1,4 @@
-"""A plume that rises in a wind: a series of VDIs, saved, opened, and played.
+"""A plume that rises in a wind: a series of VDIs, written step by step, opened, and played.
 
 What one should see: a yellow and violet plume that rises step by step and bends to the right, while
 the view turns around it.
@@ -35,18 +35,18 @@ def density(step: int) -> pvdi.Volume:
 
 
 def main() -> None:
-    """Make the series and its file, and show it, or write a movie."""
+    """Write the series, and show it, or write a movie."""
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "series.gif")
     off_screen = len(sys.argv) > 1 or pv.OFF_SCREEN
     camera = pvdi.Camera((1.5, -5, 1), (0, 0, 0), (0, 0, 1))
     look = {"cmap": "inferno", "opacity": "linear", "clim": (0, 255)}
-    made = pvdi.generate_series(density, camera, SIZE, 0.1 * np.arange(STEPS), **look)
-
-    file = made.save(target.with_suffix(".vdis"))
-    memory = sum(step.n_supersegments * 8 for step in made)
-    on_disk = file.stat().st_size
-    print(f"{file.name}: {on_disk / 2**20:.1f} MiB for {memory / 2**20:.1f} MiB of VDIs")
-    series = pvdi.read(file)  # by anybody: the volumes are not needed any more
+    folder = target.with_suffix(".vdis")
+    with pvdi.SeriesWriter(folder, camera, SIZE, overwrite=True, **look) as out:
+        for step in range(STEPS):
+            out.append(density(step), 0.1 * step)
+    on_disk = sum(file.stat().st_size for file in folder.iterdir())
+    print(f"{folder.name}: {len(out)} steps, {on_disk / 2**20:.1f} MiB")
+    series = pvdi.read(folder)  # by anybody: the volumes are not needed any more
 
     plotter = pv.Plotter(off_screen=off_screen, window_size=SIZE)
     actor = plotter.add_vdi(series, show_scalar_bar=False)

@@ -78,7 +78,6 @@ registry.core = registry.Extension(
         "VDI.from_image": "pyvista_vdi.vtk_pipeline:vdi_from_image",
         "VDI.plot": "pyvista_vdi.plotting.accessor:plot",
         "VDI.save": "pyvista_vdi.io:write",
-        "VDI.thinned": "pyvista_vdi.model.list_subsampling:subsampled_lists",
         "Volume.read": "pyvista_vdi.io.volumes:read_volume",
         "Volume.from_vtk": "pyvista_vdi.vtk_pipeline:volume_from_vtk",
         "Volume.with_scalars": "pyvista_vdi.plotting.volumes:as_image",

@@ -12,8 +12,6 @@ are seen from six views between theirs. Both fluids are clear, and what is mixed
 
 # sphinx_gallery_thumbnail_path = 'images/gallery-mixing_from_all_sides.jpg'
 
-import warnings
-
 import matplotlib.pyplot as plt
 
 import pyvista_vdi as pvdi
@@ -21,19 +19,16 @@ import pyvista_vdi as pvdi
 field = pvdi.examples.load_rayleigh_taylor()
 x, y, z = field.center
 camera = pvdi.Camera((x - 350, y - 320, z + 130), field.center, (0, 0, 1))
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore", pvdi.VDIWarning)  # eight are few: the set says what it lacks
-    vdis = pvdi.generate_set(
-        field,
-        "sphere",
-        (240, 180),
-        camera=camera,
-        max_views=8,
-        lists=0.8,
-        max_supersegments=10,
-        cmap="Spectral_r",
-        opacity=[0, 0, 0.08, 0.3, 0.08, 0, 0],
-    )
+vdis = pvdi.generate_set(
+    field,
+    8,
+    (240, 180),
+    camera=camera,
+    lists=0.8,
+    max_supersegments=10,
+    cmap="Spectral_r",
+    opacity=[0, 0, 0.08, 0.3, 0.08, 0, 0],
+)
 
 # %%
 # A set is drawn as a VDI is; ``vdis.save("mixing.vdiset")`` would keep it.

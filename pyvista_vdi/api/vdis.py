@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.model.classification import Classification, refuse_keywords
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.levels import nearest_depth
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest, QualityTarget
@@ -122,9 +121,8 @@ def generate(
     target_fps : float, optional
         Least full frames per second, predicted for this device. Goes before quality.
     max_bytes : int, optional
-        Most bytes of the VDI on the device. A file has these before they are compressed, and a
-        few KiB of metadata. Goes before all others. Limits without a quality give the best
-        that is within them.
+        Most bytes of the VDI on the device, not of files. Goes before all others. Limits
+        without a quality give the best that is within them.
     target_angle : float
         Degrees by which the view is turned from V_O for which the SSIM is predicted.
     lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
@@ -192,8 +190,7 @@ def generate(
     Warns
     -----
     VDIWarning
-        If a target cannot be reached, where the nearest is made, or the camera sees nothing of
-        the volume.
+        If a target cannot be reached (the nearest is made), or the camera sees no volume.
 
     Examples
     --------
@@ -236,34 +233,19 @@ def generate(
         progress=progress,
         metadata={"classification": look.describe(), "scalars": read.name},
     )
+    from pyvista_vdi.quality.dial import warn_missed
     from pyvista_vdi.quality.probe import generate_anywhere
 
+    vdi: Any
     if deferral.deferred:
-        kept = generate_deferred(
-            request, deferral, lambda asked: generate_anywhere(asked, target, client)
-        )
-        _warn_if_unseen(kept, request)
-        warn_of_range(kept, read)
-        return kept  # type: ignore[no-any-return]
-    vdi = generate_anywhere(request, target, client)
-    _warn_if_unseen(vdi, request)
-    if target:
-        from pyvista_vdi.quality.dial import warn_missed
-
-        warn_missed(vdi)
-    return vdi
-
-
-def _warn_if_unseen(vdi: VDI | DeferredVDI, request: GenerationRequest) -> None:
-    """Warn of a VDI that is empty because the camera looks past the volume."""
-    if vdi.n_supersegments:
-        return
-    if nearest_depth(request.volume, request.camera, request.window_size) is None:
-        warn_external(
-            "the VDI is empty: the camera sees nothing of the volume, whose bounds are "
-            f"{request.volume.bounds}; look at them, for instance from "
-            "pyvista_vdi.model.standard_cases.filling_camera(volume.bounds, window_size)"
-        )
+        vdi = generate_deferred(request, deferral, lambda it: generate_anywhere(it, target, client))
+        warn_of_range(vdi, read)
+    else:
+        vdi = generate_anywhere(request, target, client)
+    warn_missed(vdi)
+    if not vdi.n_supersegments and nearest_depth(read, request.camera, request.window_size) is None:
+        warn_external(f"the VDI is empty: the camera sees nothing of the bounds {read.bounds}")
+    return vdi  # type: ignore[no-any-return]
 
 
 def estimate(
@@ -375,7 +357,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> Any:
     -------
     VDI or DeferredVDI or VDISeries or VDISet
         The same to the last bit if this package wrote the file, of ``.exr`` within float32's
-        rounding; what is lost with other programs' files is said in the documentation of files.
+        rounding (docs/files.md).
 
     Raises
     ------

@@ -214,12 +214,9 @@ def output(options: Options, text: str = ".vdi, .exr or .html to write") -> None
     options.add_argument("-o", "--output", metavar="FILE", required=True, help=text)
 
 
-def volume(options: Options, *instead: tuple[str, str]) -> None:
-    """Add the volume: a file's name, or one that is known; and where its voxels lie.
-
-    ``instead`` are switches that do without one, with what they say.
-    """
-    _file_or_example(options, "file", VOLUME_FILE, "VOLUME", instead=instead)
+def volume(options: Options) -> None:
+    """Add the volume: a file's name, or one that is known; and where its voxels lie."""
+    _file_or_example(options, "file", VOLUME_FILE, "VOLUME")
 
 
 def volumes(options: Options) -> None:
@@ -242,12 +239,9 @@ def _file_or_example(
     text: str,
     metavar: str,
     nargs: str = "?",
-    instead: tuple[tuple[str, str], ...] = (),
     **more: Any,
 ) -> None:
     source = options.add_mutually_exclusive_group(required=True)
-    for flag, what in instead:
-        switch(source, flag, what)
     option(source, name, text, metavar, nargs=nargs, **more)
     option(
         source,

@@ -42,8 +42,7 @@ def info(options: argparse.Namespace) -> int:
         print(json.dumps(rows, indent=1) if options.json else _volume_text(source, rows))
         return 0
     about = read_info(options.file)
-    state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
-    print(json.dumps(state, indent=1) if options.json else _text(about))
+    print(json.dumps(state_of(about), indent=1) if options.json else text_of(about))
     return 0
 
 
@@ -158,7 +157,13 @@ def _store_rows(store: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def _text(about: FileInfo) -> str:
+def state_of(about: FileInfo) -> dict[str, Any]:
+    """Return what a file says about itself, as JSON can hold it."""
+    return {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
+
+
+def text_of(about: FileInfo) -> str:
+    """Return what a file says about itself, as a table."""
     width, height = about.window_size
     view = about.camera
     lens = (

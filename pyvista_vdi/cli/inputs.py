@@ -148,14 +148,14 @@ def is_volume(options: argparse.Namespace) -> bool:
 
 def require_vdi(file: str, verb: str) -> None:
     """Refuse a volume where a VDI is wanted, and say how the command makes one."""
-    if is_vdi_file(file) or holds(file) in ("series", "set"):
-        return
-    if not (is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long a name, too
-        raise VDIFileError(f"{printable(file)} does not exist: check the file's name")
-    raise UnsupportedError(
-        f"{printable(file)} is no VDI, which is what {verb} takes; of a volume, "
-        f"'pyvista-vdi generate {printable(file)} -o FILE.vdi' makes one"
-    )
+    named = printable(file)
+    if not (is_vdi_file(file) or is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long
+        raise VDIFileError(f"{named} does not exist: check the file's name")
+    if not is_vdi_file(file) and holds(file) not in ("series", "set"):
+        raise UnsupportedError(
+            f"{named} is no VDI, which is what {verb} takes; of a volume, 'pyvista-vdi generate "
+            f"{named} -o FILE.vdi' makes one"
+        )
 
 
 def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:
@@ -281,17 +281,9 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
         raise
 
 
-def require_new(path: Path, options: argparse.Namespace) -> None:
-    """Refuse to replace results that ``--resume`` could go on with."""
-    if path.exists() and not options.resume:
-        raise InvalidArgumentError(
-            f"{path} is there already: --resume goes on with it, or choose another --out"
-        )
-
-
 @contextmanager
-def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
-    """Show a bar that is alive; after Ctrl-C say what ``--resume`` can go on with."""
+def measuring(label: str) -> Iterator[DelayedBar]:
+    """Show a bar that is alive."""
     bar, finished = DelayedBar(label=label), Event()
 
     def pulse() -> None:
@@ -302,12 +294,6 @@ def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
     try:
         pulsing.start()
         yield bar
-    except KeyboardInterrupt:
-        if results is not None and results.exists():
-            print(
-                f"\nWhat was measured is in {printable(results)}: --resume goes on", file=sys.stderr
-            )
-        raise
     finally:
         finished.set()
         bar.close()

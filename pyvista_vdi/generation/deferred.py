@@ -101,7 +101,7 @@ def generate_deferred(
     metadata: dict[str, Any] = dict(made.metadata)
     for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
         metadata.pop(name)
-    if not volume.chunked:  # else all would be read for it
+    if volume.chunks is None:  # else all would be read for it
         metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
     lists = VDI(
         made.camera,

@@ -32,7 +32,7 @@ def suffixes() -> tuple[str, ...]:
 
 def format_named(path: Any) -> FileFormat | None:
     """Return the format that a file's name stands for; ``None`` if it stands for none."""
-    name = str(path).lower()
+    name = str(path).lower().rstrip("/\\")  # as shells complete a folder's
     return next((each for each in registry.formats() if name.endswith(each.suffix)), None)
 
 
@@ -45,7 +45,7 @@ def format_of(path: Any) -> FileFormat | None:
     if found is not None and found.page:
         page = found.load()
         for inside in registry.formats():
-            if inside.magic and page.begins_with(path, inside.magic):
+            if inside.head and page.begins_with(path, inside.head):
                 return inside
     return found
 

@@ -3,6 +3,7 @@
 Whoever gives such an array has its library. Nothing is read until a part is asked for.
 """
 
+import functools
 import importlib
 import itertools
 import math
@@ -173,8 +174,9 @@ class ChunkedArray:
         """Return what tells the array's files from others, empty where it is in none here."""
         return digests_of(self._array)
 
+    @functools.cached_property
     def ends(self) -> tuple[float, float]:
-        """Return the least and the largest scalar, NaN left out; all chunks are read for it."""
+        """The least and the largest scalar, NaN left out; all chunks are read for it, once."""
         counts = [-(-n // chunk) for n, chunk in zip(self.shape, self.chunks, strict=True)]
         low, high = [np.nan], [np.nan]
         for at in itertools.product(*map(range, counts)):

@@ -1,7 +1,9 @@
 """Several VDIs of one scene, shown as one: what extensions derive series and sets from."""
 
+import os
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 from pyvista_vdi import registry
@@ -72,3 +74,42 @@ class VDICollection(Sequence[VDI]):
     def _mapped(self: _Collection, function: Callable[[VDI], VDI]) -> _Collection:
         """Return it with what a function makes of each VDI, when that is asked for."""
         raise NotImplementedError
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write all in one file, or a page that shows it, whole or not at all.
+
+        :func:`pyvista_vdi.read` opens both.
+
+        Parameters
+        ----------
+        path : path-like
+            The target; its name ends in ``.vdis`` for a series, in ``.vdiset`` for a set, or in
+            ``.html``.
+        **options
+            ``precision`` (by default a series' first step's, and else ``"8-byte"``),
+            ``compression`` (``"zstd"``, and ``"deflate"`` in a page) and ``level`` as for
+            :meth:`VDI.save`; ``progress``, called with the finished fraction. For pages ``title``,
+            ``background`` and ``controls`` as well, and of a series ``autoplay``.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        VDIFileError
+            If the target cannot be written.
+        InvalidArgumentError
+            If an option is out of its range, or one is a look, which :meth:`classified` takes.
+        """
+        method = registry.method(f"{type(self).__name__}.save")
+        return method(self, path, **options)  # type: ignore[no-any-return]
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Return what a notebook shows: a viewer, or a picture."""
+        text = {"text/plain": repr(self)}
+        if self.value_range is not None:  # pages show colours
+            return text
+        name = f"{type(self).__name__}._repr_mimebundle_"
+        return registry.method(name, lambda *_: text)(self, include, exclude)

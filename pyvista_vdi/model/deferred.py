@@ -17,7 +17,6 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_floats, as_number, as_range
-from pyvista_vdi.model.list_subsampling import length_per_depth
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 
@@ -399,3 +398,15 @@ def lengths_of(lists: VDI) -> Floats:
     per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
     thickness = lists.back.astype(np.float64) - lists.front
     return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
+
+
+def length_per_depth(
+    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
+    constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
+        np.linalg.inv(camera.model_to_view)[:3, :3].T
+    )
+    return np.linalg.norm(
+        constant + u[:, np.newaxis] * along_u + v[:, np.newaxis, np.newaxis] * along_v, axis=-1
+    )

@@ -20,6 +20,7 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import (
     as_flag,
     as_float,
+    as_range,
     as_whole,
     check_callback,
     memory_limit_bytes,
@@ -327,6 +328,11 @@ class Deferral(Options):
                     f"{name}={getattr(self, name)!r} says what is kept to be classified "
                     f"afterwards: give classification='deferred' as well, or leave {name} out"
                 )
+        low, high = (0, 1) if self.value_range is None else as_range(self.value_range)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise InvalidArgumentError(
+                f"value_range must be two finite scalars, low < high; got {self.value_range!r}"
+            )
 
     @property
     def deferred(self) -> bool:

@@ -139,31 +139,6 @@ class VDI:
         self._check_media()
 
     @classmethod
-    def _of_packing(
-        cls,
-        camera: Camera,
-        window_size: tuple[int, int],
-        offsets: NDArray[np.uint64],
-        packing: Packed8,
-        bounds: ArrayLike,
-        *,
-        depth_origin: float,
-        metadata: Mapping[str, Any],
-    ) -> VDI:
-        """Return a VDI of 8-byte supersegments that are valid; arrays are made when asked for."""
-        vdi = cls.__new__(cls)
-        vdi.camera, vdi.window_size = camera, window_size
-        vdi._set_frame(bounds, depth_origin, metadata)
-        vdi.offsets = _array("offsets", offsets, np.uint64, ())
-        vdi.packing = packing
-        occupied = np.flatnonzero(vdi.counts)
-        if occupied.size and not camera.parallel_projection:
-            first = packing.media_at(offsets.view(np.int64)[occupied], occupied, "front")["front"]
-            if not first.min() >= np.float64(-vdi.depth_origin):
-                vdi._check_media()  # says which
-        return vdi
-
-    @classmethod
     def _of_values(cls, values: ClassifiedValues, metadata: Mapping[str, Any]) -> VDI:
         """Return the VDI that a transfer function makes of values; arrays are made later."""
         vdi, lists = cls.__new__(cls), values.lists
@@ -187,32 +162,18 @@ class VDI:
         self.metadata = dict(metadata or {})
 
     def __getattr__(self, name: str) -> Any:
-        """Make the arrays of a packed VDI, or of a classified one."""
-        if name in ("offsets", *_MEDIA) and self.values is not None:
-            made = self.values.made()
-            for array in ("offsets", *_MEDIA):
-                setattr(self, array, getattr(made, array))
-            return vars(self)[name]
-        if name not in _MEDIA or "packing" not in vars(self):
+        """Make the arrays of a classified VDI."""
+        if name not in ("offsets", *_MEDIA) or self.values is None:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        assert isinstance(self.packing, Packed8)
-        for array, values in self.packing.media(self.counts.reshape(-1)).items():
-            values.setflags(write=False)
-            setattr(self, array, values)
+        made = self.values.made()
+        for array in ("offsets", *_MEDIA):
+            setattr(self, array, getattr(made, array))
         return vars(self)[name]
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and other processes are given: arrays, not what they are made of."""
         arrays = {} if self.values is None else {"offsets": self.offsets}
         return {**vars(self), **arrays, "values": None}
-
-    def _media_at(
-        self, rows: NDArray[np.int64], lists: NDArray[np.int64], *names: str
-    ) -> Mapping[str, NDArray[np.float32]]:
-        """Return the named arrays' values for some supersegments, in these lists."""
-        if "front" not in vars(self) and isinstance(self.packing, Packed8):
-            return self.packing.media_at(rows, lists, *names)
-        return {name: getattr(self, name)[rows] for name in names}
 
     @property
     def n_supersegments(self) -> int:
@@ -309,13 +270,6 @@ class VDI:
         vdi = VDI(self.camera, self.window_size, **arrays)
         vdi.packing = packing
         return vdi
-
-    def thinned(self, along_x: int = 1, along_y: int = 1) -> VDI:
-        """Return a VDI of every k-th list along the window's width and height.
-
-        See :func:`pyvista_vdi.model.list_subsampling.subsampled_lists`.
-        """
-        return registry.method("VDI.thinned")(self, along_x, along_y)  # type: ignore[no-any-return]
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a ``.vdi``, ``.exr`` or ``.html`` file that `pyvista_vdi.read` opens.

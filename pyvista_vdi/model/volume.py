@@ -275,7 +275,7 @@ class Volume(Geometry):
     @functools.cached_property
     def _range(self) -> tuple[float, float]:
         if self.chunks is not None:
-            return self.chunks.ends()
+            return self.chunks.ends
         if self.array.dtype.kind != "f":
             return float(self.scalars.min()), float(self.scalars.max())
         low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)

@@ -139,7 +139,7 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         return first_camera(renderer, renderer.ComputeVisiblePropBounds())
 
     def add_time_slider(self, plotter: Any, **options: Any) -> Any:
-        """Show a slider that sets :attr:`time`, and that follows it while the series plays.
+        """Show a slider that sets :attr:`time`, and in each frame shows that of the step drawn.
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ class PlotterVDIActor(VDIActorMethods, Volume):
 
         def follow(*_: Any) -> None:
             shown, representation = actor(), bar()
-            if shown is not None and representation is not None and shown.playing:
+            if shown is not None and representation is not None and shown.series is not None:
                 representation.SetValue(shown.time)
 
         plotter.renderer.AddObserver("StartEvent", follow)

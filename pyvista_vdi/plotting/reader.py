@@ -7,12 +7,13 @@ from typing import Any
 import pyvista as pv
 
 from pyvista_vdi.io import read
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.inputs import as_any_vdi
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 
 
 def read_vdi(path: str, **options: Any) -> pv.ImageData:
-    """Read a ``.vdi`` file, or a deep OpenEXR image, as PyVista reads any file.
+    """Read a ``.vdi`` file, a deep OpenEXR image, or a ``.vdis`` series' first step.
 
     Parameters
     ----------
@@ -34,4 +35,6 @@ def read_vdi(path: str, **options: Any) -> pv.ImageData:
     InvalidArgumentError
         If an option is not one of the file's format.
     """
-    return pv.wrap(vdi_to_image(as_any_vdi(read(path, **options))))
+    found = read(path, **options)
+    vdi = found[0] if isinstance(found, VDICollection) else found
+    return pv.wrap(vdi_to_image(as_any_vdi(vdi)))

@@ -22,9 +22,6 @@ from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, volume_from_vtk
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
-#: Names of files whose readers announce times; that of legacy .vtk files announces others.
-_WITH_TIMES = (".vti", ".pvti", ".vtkhdf")
-
 
 def volumes_in(file: Path) -> list[VolumeInFile]:
     """Return the arrays of a uniform grid in a file, read by PyVista.
@@ -93,7 +90,8 @@ def steps_of(path: str | os.PathLike[str]) -> tuple[Sequence[Any], tuple[float, 
         reader: Any = pv.get_reader(path)
         if hasattr(reader, "time_values"):
             return steps_and_times(reader)
-        if Path(path).suffix.lower() in _WITH_TIMES:
+        # That of legacy .vtk files announces others
+        if Path(path).suffix.lower() in (".vti", ".pvti", ".vtkhdf"):
             return steps_and_times(reader.reader)
     except Exception:  # of each format; reading it as one volume says what is wrong
         return (), ()

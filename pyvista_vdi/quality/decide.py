@@ -29,7 +29,6 @@ from pyvista_vdi.quality.frame_state import (
     FrameState,
     FrameTook,
     Generate,
-    Growth,
     InputChanged,
     Interrupted,
     Judge,
@@ -38,7 +37,6 @@ from pyvista_vdi.quality.frame_state import (
     PlaceholderTook,
     Raise,
     RenderMode,
-    Settings,
     Show,
     Sight,
     StoredAsked,
@@ -78,6 +76,9 @@ _PLACEHOLDER_RATE = 30.0
 #: Pixels as wide as one list from which on a VDI without its volume is said to be too coarse, and
 #: the share of rays below which it is said to cover too little: corners of bounds are often empty.
 _TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
+
+#: What a view that is far from the VDI's own, without its volume, has as a remedy.
+_GO_BACK = "its own view is plotter.camera = vdi.camera.to_pyvista()"
 
 
 def decide(state: FrameState, event: Event) -> Decision:
@@ -145,17 +146,6 @@ def busy(state: FrameState, now: float) -> bool:
     """Whether something goes on, or is to be decided, that no frame would show by itself."""
     settles = state.settings.regenerate == "auto" and not state.moving and not _rests(state, now)
     return state.making is not None or state.estimating or settles
-
-
-def growth(settings: Settings, *, moving: bool, watched: bool) -> Growth:
-    """Return whether a set's VDIs that are lacking in a view are made."""
-    if moving:
-        return "later"
-    if settings.regenerate != "auto":
-        return None
-    if watched:
-        return "behind"
-    return "now" if settings.draw == "auto" else None
 
 
 def ssim_of(state: FrameState, vdi: int | None, view: View | None = None) -> float | None:
@@ -455,13 +445,13 @@ def _lacking(of: StoredSeen) -> tuple[Action, ...]:
     if seen.angle > of.cone:
         what = (
             f"the view is {seen.angle:.0f} degrees from the VDI's generating view, which was to "
-            f"serve {of.cone:.0f}: it shows less, and less of what was hidden"
+            f"serve {of.cone:.0f}: it shows less, and less of what was hidden; {_GO_BACK}"
         )
         lacking.append(("angle", what))
     if seen.coverage < _TOO_LITTLE:
         what = (
             f"{1 - seen.coverage:.0%} of the view's rays through the volume leave what the VDI "
-            "covers: there it shows nothing"
+            f"covers: there it shows nothing; {_GO_BACK}"
         )
         lacking.append(("coverage", what))
     if seen.magnification > _TOO_COARSE:

@@ -20,9 +20,6 @@ from pyvista_vdi.quality.frame_rate import FrameRate
 
 #: What can be raycast for a frame.
 RenderMode: TypeAlias = Literal["vdi", "volume"]
-#: When VDIs are made that a set lacks in a view: with its frame, behind the frames, or when the
-#: view has ceased to turn; ``None``: never.
-Growth: TypeAlias = Literal["now", "behind", "later"] | None
 
 
 class Request(Protocol):

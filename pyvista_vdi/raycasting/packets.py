@@ -120,16 +120,13 @@ def share_lit(
     counts = offsets[lists + 1] - offsets[lists]
     begins = np.cumsum(counts) - counts
     places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
-    own = np.repeat(lists, counts)
-    media = vdi._media_at(places, own, "optical_depth", "front", "back")
-    if optical_depths is not None:
-        media = {**media, "optical_depth": optical_depths(places)}
-    optical_depth = media["optical_depth"].astype(np.float64)
+    optical_depth = vdi.optical_depth[places] if optical_depths is None else optical_depths(places)
+    optical_depth = optical_depth.astype(np.float64)
     before = np.cumsum(optical_depth) - optical_depth
     before -= np.repeat(before[begins], counts)
     last = begins + np.add.reduceat(before < _DARK, begins) - 1  # that light gets to
     left = (_DARK - before[last]) / np.maximum(optical_depth[last], np.finfo(np.float32).tiny)
-    front, back = (media[face][last].astype(np.float64) for face in ("front", "back"))
+    front, back = (faces[places[last]].astype(np.float64) for faces in (vdi.front, vdi.back))
     depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
     through = np.add.reduceat(optical_depth, begins) < _DARK
     shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))

@@ -289,8 +289,8 @@ class PreparedVDI:
         first, last = offsets[occupied], offsets[occupied + 1] - 1
         near, far = (depth - self.depth_origin for depth in depths)
         front, back = (
-            np.clip(vdi._media_at(rows, occupied, face)[face].astype(np.float64), near, far)
-            for face, rows in (("front", first), ("back", last))
+            np.clip(faces[rows].astype(np.float64), near, far)
+            for faces, rows in ((vdi.front, first), (vdi.back, last))
         )
         rounded = np.maximum(np.abs(front), np.abs(back))
         if not (self.parallel or self.shifted):

@@ -33,7 +33,7 @@ OWNERS = {
     "mpi4py": ("extensions.large",),
     "paraview": ("extensions.paraview",),
     "pyopencl": ("device",),
-    "pyvista": ("plotting", "examples", "extensions.series", "extensions.web", "measure", "cli"),
+    "pyvista": ("plotting", "examples", "extensions.web", "measure", "cli"),
     "trame": ("extensions.web",),
     "traitlets": ("extensions.web",),
     "vtk": (),
@@ -82,7 +82,7 @@ LEVELS_WITHIN = {
 #: Rooms that need VTK or PyVista in order to be imported.
 WITH_VTK = (
     *("vtk_pipeline", "plotting", "extensions.paraview", "extensions.web.scenes"),
-    *("extensions.series.pyvista_reader", "extensions.series.shown", "extensions.sets.shown"),
+    *("extensions.series.shown", "extensions.sets.shown"),
     "extensions.paraview.parts",
 )
 

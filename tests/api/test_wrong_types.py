@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import ast
 import contextlib
-import functools
 import importlib
 import inspect
 import re
-import shutil
 import warnings
 from pathlib import Path
 
@@ -76,11 +74,6 @@ def write(path, step, time, **options):
         out.append(step, time)
 
 
-def in_cinema(vdi_set, path, **options):
-    shutil.rmtree("c.cdb", ignore_errors=True)
-    vdi_set.save_cinema(path, **options)
-
-
 def series_of(vdi):
     return pvdi.VDISeries.of([vdi, vdi])
 
@@ -135,13 +128,13 @@ ENTRIES = {
         pvdi.generate_set,
         {"volume": VOLUME, "views": [CAMERA], "window_size": (16, 12), "lists": 0.5}
         | {"max_supersegments": 4, "transfer_function": TABLE},
-        ["camera", "target_ssim", "max_bytes", "max_views", "progress"],
+        ["camera", "half_angle", "progress"],
     ),
     "SeriesWriter": lambda vdi: (
         write,
         {"path": "w.vdis", "camera": CAMERA, "window_size": SIZE, "transfer_function": TABLE}
         | {"step": VOLUME, "time": 0, "overwrite": True},
-        ["precision", "tolerance", "key_every", "compression", "level", "append", "quality"],
+        ["precision", "compression", "level", "append", "quality"],
     ),
     "InSitu": lambda vdi: (
         in_situ,
@@ -178,14 +171,12 @@ ENTRIES = {
     "VDISet": lambda vdi: (pvdi.VDISet, {"views": [vdi]}, None),
     "VDISet.of": lambda vdi: (pvdi.VDISet.of, {"vdis": [vdi]}, None),
     "VDISet.nearest": lambda vdi: (pvdi.VDISet.of([vdi]).nearest, {"camera": CAMERA}, None),
-    "VDISet.add": lambda vdi: (pvdi.VDISet.of([vdi]).add, {"vdi": vdi}, None),
     "VDI": lambda vdi: (
         pvdi.VDI,
         {name: getattr(vdi, name) for name in inspect.signature(pvdi.VDI).parameters},
         None,
     ),
     "VDI.with_precision": lambda vdi: (vdi.with_precision, {"precision": "exact"}, None),
-    "VDI.thinned": lambda vdi: (vdi.thinned, {}, None),
     "VDI.list_at": lambda vdi: (vdi.list_at, {"x": 1, "y": 1}, None),
     "VDI.equals": lambda vdi: (vdi.equals, {"other": vdi}, None),
     "VDI.save": lambda vdi: (
@@ -196,22 +187,12 @@ ENTRIES = {
     "VDISeries.save": lambda vdi: (
         series_of(vdi).save,
         {"path": "v.vdis"},
-        ["path", "precision", "compression", "level", "progress", "tolerance", "key_every"],
+        ["path", "precision", "compression", "level", "progress"],
     ),
     "VDISet.save": lambda vdi: (
         pvdi.VDISet.of([vdi]).save,
         {"path": "v.vdiset"},
-        ["precision", "compression", "level", "progress", "tolerance"],
-    ),
-    "VDISet.save_cinema": lambda vdi: (
-        functools.partial(in_cinema, pvdi.VDISet.of([vdi])),
-        {"path": "c.cdb"},
-        ["background", "vdis", "device", "progress"],
-    ),
-    "cinema.write": lambda vdi: (
-        importlib.import_module("pyvista_vdi.extensions.sets.cinema").write,
-        {"vdi_set": 0, "path": "d.cdb"},
-        None,
+        ["precision", "compression", "level", "progress"],
     ),
     "Camera.azimuth": lambda vdi: (CAMERA.azimuth, {"degrees": 1}, None),
     "Camera.tile": lambda vdi: (

@@ -62,9 +62,9 @@ def with_pyvista(plotter: pvdi.Plotter, grid: pv.ImageData) -> pvdi.VDI:
 def of_several(folder: Path, volumes: list[pvdi.Volume], camera: pvdi.Camera) -> None:
     """Make VDIs of several times, and of several views."""
     series = pvdi.generate_series(volumes, camera, (64, 48), cmap="bone", quality="high")
-    with pvdi.SeriesWriter(folder / "a.vdis", camera, (64, 48), tolerance=0.01, clim=(0, 9)) as out:
+    with pvdi.SeriesWriter(folder / "a.vdis", camera, (64, 48), level=3, clim=(0, 9)) as out:
         out.append(volumes[0], 0.5)
-    views = pvdi.generate_set(volumes[0], [camera], max_views=9, ambient_occlusion=True)
+    views = pvdi.generate_set(volumes[0], [camera], lists=0.5, ambient_occlusion=True)
     assert len(series) == len(views)
 
 
@@ -75,6 +75,5 @@ def mistakes(grid: pv.ImageData, camera: pvdi.Camera, plotter: pvdi.Plotter) -> 
     pvdi.generate(grid, 5, (64, 48))  # type: ignore[arg-type]
     pvdi.render("a.vdi", camera)  # type: ignore[arg-type]
     plotter.add_vdi(grid, precision="half")  # type: ignore[arg-type]
-    pvdi.generate_series([grid], camera, (64, 48), colour_map="bone")  # type: ignore[call-arg]
-    pvdi.generate_series([grid], camera, (64, 48), clim="all", shade=3)  # type: ignore[arg-type]
-    pvdi.generate_set(grid, precision="exact")  # type: ignore[call-arg]
+    pvdi.generate_series([grid], 5, (64, 48))  # type: ignore[arg-type]
+    pvdi.generate_set(grid, half_angle="wide")  # type: ignore[arg-type]

@@ -28,7 +28,6 @@ RIGHT = {
     "serve": "v.npy --port 0 --shade",
     "info": "v.npy",
     "compare": "v.npy --out new --size 12x8 --angles 5 --repeats 1 --no-vtk --shade",
-    "benchmark": "--out new.json --datasets v.npy --no-vtk",
     "tradeoff": "v.npy --out new --quick --no-vtk --shade",
     "convert": "a.vdi -o old.vdi",
     "series": "v.npy -o old.vdis --size 12x8 --shade",
@@ -75,14 +74,13 @@ WRONG = {
     "--fps": (*NOT_ABOVE_0, "1e9"),
     "--frames": NO_COUNT,
     "--generations": NO_COUNT,
+    "--half-angle": (*NOT_ABOVE_0, "181"),
     "--host": ("'no such host'", "999.1.1.1"),
     "--importance": ("x", "''", "1,nan", "5"),
     "--interpolation": NO_CHOICE,
-    "--key-every": NO_COUNT,
     "--lists": NOT_ABOVE_0,
     "--max-bytes": NOT_ABOVE_0,
     "--max-supersegments": (*NO_COUNT, "4097"),
-    "--max-views": NO_COUNT,
     "--memory-limit": (*NOT_ABOVE_0, "5parsecs"),
     "--n-colors": NO_COUNT,
     "--name": ("a/b",),
@@ -129,6 +127,7 @@ WRONG = {
     "--view-angle": (*NOT_ABOVE_0, "180"),
     "--view-cone": (*BELOW_0, "91"),
     "--view-up": (*NO_XYZ, "0 0 0"),
+    "--views": NO_COUNT,
     "--volume": ("none.npy", "a=none.npy", "''"),
     # Of stores of chunks, which refuse more
     "--channel": (),
@@ -142,7 +141,6 @@ OF_A_VERB = {
     ("generate", "--elevation"): (*NO_NUMBER, "91", "-150"),
     ("view", "--target-fps"): BELOW_0,
     ("convert", "--thickness"): NO_NUMBER,
-    ("series", "--tolerance"): (*BELOW_0, "1"),
     ("tradeoff", "--repeats"): NO_COUNT,
     ("generate", "--output"): tuple(name.format(".vdi") for name in NO_TARGET),
     ("render", "--output"): tuple(name.format(".png") for name in NO_TARGET),
@@ -154,7 +152,6 @@ OF_A_VERB = {
     ("set", "--output"): tuple(name.format(".vdiset") for name in NO_TARGET),
     ("compare", "--out"): ("v.npy", "v.npy/a"),
     ("tradeoff", "--out"): ("v.npy", "v.npy/a"),
-    ("benchmark", "--out"): tuple(name.format(".json") for name in NO_TARGET),
 }
 #: Files in place of the verb's first.
 FILES = {

@@ -102,7 +102,7 @@ def test_wrong_arguments_are_refused_by_name(runtime, affine):
 
 
 #: Rooms whose module ``kernels`` declares what is in their folder of ``opencl/``.
-ROOMS = ("generation", "raycasting", "volume", "extensions.large", "extensions.series")
+ROOMS = ("generation", "raycasting", "volume", "extensions.large")
 #: ``-D`` options that every program of a room may have, and those that kernels must have beside.
 OPTIONS = {room: Variant("ushort").defines for room in ("generation", "volume", "extensions.large")}
 LISTS = {"DEPTH": "PARALLEL", "PACKED": 0}
@@ -124,7 +124,6 @@ OF_KERNELS = {
     "PROJECT": {"BLEND_MODE": 1},
     "PROJECT_16": {"BLEND_MODE": 3},
     "OPTICAL_DEPTHS": {"GRID_PART": 1},
-    "DECODE_LISTS": {"GRID": 16, "TAU_BASE": 16256, "TAU_CODES": 4096},
 }
 
 

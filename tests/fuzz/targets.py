@@ -16,12 +16,10 @@ import itertools
 import json
 import os
 import re
-import struct
 import tempfile
 import tracemalloc
 import warnings
 import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -30,7 +28,6 @@ from typing import Any
 
 import numpy as np
 from fuzz.choices import JUNK, NUMBERS, Choices
-from stepped_vdis import frames_of
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
@@ -38,8 +35,6 @@ from pyvista_vdi import VDI, Camera, DeferredVDI, TransferFunction, Volume, cli,
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
 from pyvista_vdi.extensions.series import files as series_files
-from pyvista_vdi.extensions.series import layout
-from pyvista_vdi.extensions.series import reader as series_reader
 from pyvista_vdi.extensions.sets import files as set_files
 from pyvista_vdi.extensions.web import messages
 from pyvista_vdi.extensions.web.page import DATA_TYPE
@@ -49,9 +44,6 @@ from pyvista_vdi.model import host_memory
 #: Bytes that a byte of a file may become (docs/robustness.md): a block of 128 KiB from 4 bytes is
 #: Zstandard's best, and an array is held twice while it is decoded, a third time as the VDI's.
 VDI_RATIO = 3 * 2**15
-#: Of a series: a supersegment takes nine bytes before they are compressed, and while it is decoded
-#: some forty numbers of 8 bytes; and a few steps are kept.
-VDIS_RATIO = 64 * 2**15
 #: Bytes that reading takes for itself, whatever the file.
 OWN_BYTES = 8 * 2**20
 
@@ -108,7 +100,7 @@ def limited(device_bytes: int = DEVICE_BYTES) -> Iterator[None]:
 
 def _steps_of(path: Path) -> Iterator[VDI]:
     """The steps of a series that can be read; the first ones, where it has many."""
-    steps = series_reader.StepsReader(path)
+    steps = series_files.read(path)
     for i in range(min(len(steps), 6)):
         with contextlib.suppress(VDIError):
             yield steps[i]
@@ -127,8 +119,8 @@ def _views_of(path: Path) -> Iterator[VDI]:
 READERS: dict[str, tuple[int, Callable[[Path], Any], Callable[[Path], Iterable[VDI]]]] = {
     "vdi": (VDI_RATIO, io.read_info, lambda path: [io.read(path)]),
     "html": (VDI_RATIO, io.read_info, lambda path: [io.read(path)]),
-    "vdis": (VDIS_RATIO, series_files.read_info, _steps_of),
-    "vdiset": (VDIS_RATIO, set_files.read_info, _views_of),
+    "vdis": (VDI_RATIO, series_files.read_info, _steps_of),
+    "vdiset": (VDI_RATIO, set_files.read_info, _views_of),
 }
 
 
@@ -235,85 +227,34 @@ def _read_changed(choices: Choices, members: dict[str, bytes]) -> None:
 
 
 @cache
-def _series_parts(index: int, compression: str, tolerance: float) -> tuple[bytes, list[Any]]:
-    """A small series' head, and each frame's header, text, arrays."""
-    first, rng = base_vdi(index), np.random.default_rng(index)
-    arrays = _arrays(first)
-    for name in ("color", "optical_depth"):
-        arrays[name] = arrays[name] * rng.random(arrays[name].shape)
-    second = _with(first, metadata={"sample_distance": 0.5}, **arrays)
-    steps = [step.with_precision("8-byte") for step in (first, second, second, first)]
-    path = work_folder() / "base.vdis"
-    pvdi.VDISeries.of(steps).save(path, compression=compression, tolerance=tolerance)
-    content, frames, found = path.read_bytes(), [], frames_of(path)
-    path.unlink()
-    for place, header in found:
-        data = memoryview(content)[place + layout.HEADER_BYTES :][: header.n_bytes]
-        codec = "none" if header.kind == layout.VDI_FILE else compression
-        frames.append((header, layout.read_text(data)[0], layout.read_arrays(data, codec)))
-    return content[: found[0][0]], frames
-
-
-def vdis_frames(data: bytes) -> None:
-    """A ``.vdis`` file whose frames were changed, with checksums that fit."""
-    choices = Choices(data)
-    compression = choices.pick(COMPRESSIONS)
-    head, frames = _series_parts(
-        choices.integer(0, 7), compression, choices.pick((0.0, 0.05, 0.05))
-    )
-    content = head
-    for header, text, arrays in frames:
-        text = {name: value for name, value in text.items() if name != "arrays"}
-        arrays = dict(arrays)
-        if choices.chance(3):
-            edited = choices.edited(text)
-            text = edited if isinstance(edited, dict) else {}
-        for _ in range(choices.integer(0, 3)):
-            if arrays:
-                name = choices.pick(sorted(arrays))
-                array = arrays[name]
-                patched = choices.patched(array.tobytes())
-                kind = choices.pick((array.dtype.str, "|u1", "<u2", "<u4", "<u8", "<f4"))
-                whole = len(patched) // np.dtype(kind).itemsize * np.dtype(kind).itemsize
-                arrays[name] = np.frombuffer(patched[:whole], kind)
-        codec = "none" if header.kind == layout.VDI_FILE else compression
-        with contextlib.suppress(VDIError):  # what JSON does not hold
-            frame = layout.content_bytes(text, arrays, codec, 1)
-            kind, by = header.kind, header.by
-            if choices.chance(6):
-                by, kind = choices.integer(-1, 4), choices.integer(0, 3)
-            header = layout.FrameHeader(
-                *(header.what, header.number, kind, by),
-                *(header.time, len(frame), zlib.crc32(frame)),
-            )
-            content += header.to_bytes() + frame
-    content = choices.patched(content) if choices.chance(8) else content
-    _read_all("vdis", content)
-
-
-@cache
-def _set_parts(index: int, compression: str) -> tuple[dict[str, Any], bytes]:
-    """A small set's head, and the bytes behind it."""
+def _archive_members(kind: str, index: int, compression: str) -> dict[str, bytes]:
+    """What is in a small series, or a small set."""
     first = base_vdi(index)
     vdis = [_with(first, camera=first.camera.azimuth(angle)) for angle in (0, 20, 40)]
-    path = pvdi.VDISet.of(vdis).save(work_folder() / "base.vdiset", compression=compression)
-    content, begin = path.read_bytes(), frames_of(path)[0][0]
+    several: Any = pvdi.VDISeries if kind == "vdis" else pvdi.VDISet
+    path = several.of(vdis).save(work_folder() / f"base.{kind}", compression=compression)
+    with zipfile.ZipFile(path) as archive:
+        members = {info.filename: archive.read(info) for info in archive.infolist()}
     path.unlink()
-    return json.loads(content[len(set_files.MAGIC) + layout.HEAD.size : begin]), content[begin:]
+    return members
 
 
-def vdiset_heads(data: bytes) -> None:
-    """A ``.vdiset`` file whose head was changed, with a checksum that fits."""
+def archive_heads(data: bytes) -> None:
+    """A series or a set whose JSON was changed, with a checksum that fits, or whose bytes were."""
     choices = Choices(data)
-    head, content = _set_parts(choices.integer(0, 7), choices.pick(COMPRESSIONS))
+    kind = choices.pick(("vdis", "vdiset"))
+    members = dict(_archive_members(kind, choices.integer(0, 7), choices.pick(COMPRESSIONS)))
+    name = "series.json" if kind == "vdis" else "set.json"
+    head = json.loads(members[name])
     for _ in range(choices.integer(0, 3)):
         head = choices.edited(head)
-    text = json.dumps(head).encode("utf-8", "surrogatepass")
-    begin = struct.pack("<II", layout.FORMAT_VERSION, len(text))
-    checksum = zlib.crc32(text, zlib.crc32(begin))
-    content = set_files.MAGIC + begin + struct.pack("<I", checksum) + text + content
-    content = choices.patched(content) if choices.chance(4) else content
-    _read_all("vdiset", content)
+    members[name] = json.dumps(head).encode("utf-8", "surrogatepass")
+    buffer = text_io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(zipfile.ZipInfo(name), content)
+    content = buffer.getvalue()
+    _read_all(kind, choices.patched(content) if choices.chance(4) else content)
 
 
 @cache
@@ -886,8 +827,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
         *(
             vdi_members,
             deferred_members,
-            vdis_frames,
-            vdiset_heads,
+            archive_heads,
             html_patches,
             served_messages,
         ),

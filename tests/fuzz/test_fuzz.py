@@ -20,8 +20,7 @@ CORPUS = Path(__file__).parent / "corpus"
 #: Inputs of each target, where they are not 50: together some ten seconds on two cores; nightly
 #: runs run.py.
 EXAMPLES = {
-    "vdis_frames": 20,
-    "vdiset_heads": 20,
+    "archive_heads": 40,
     "command_line": 30,
     "public_functions": 25,
     "served_messages": 200,

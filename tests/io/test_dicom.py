@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIWarning
@@ -70,6 +71,18 @@ def test_every_voxel_is_where_its_slice_says(direction, tmp_path):
     volume = pvdi.read_volume(write(tmp_path / "scan", direction))
     check(volume, direction * SPACING)
     assert volume.name == "series 1.2.3"
+
+
+def test_texts_longer_than_the_standard_has_them_are_read(tmp_path):
+    """As many programs write them; pydicom would warn of each."""
+
+    def edit(data):
+        del data.SeriesDescription  # which keeps what it was checked by
+        with pydicom.config.disable_value_validation():
+            data.SeriesDescription = 70 * "x"
+
+    volume = pvdi.read_volume(write(tmp_path / "scan", edit=edit))
+    assert volume.name == 70 * "x"
 
 
 def test_a_tilted_gantry_shears_the_volume(tmp_path):
@@ -145,6 +158,8 @@ def test_other_files_and_series_beside_the_slices(tmp_path):
     (folder / "empty").touch()
     (folder / "noise.dcm").write_bytes(bytes(range(256)) * 8)
     (folder / "sub").mkdir()
+    for number in (1, 2):  # previews
+        Image.fromarray(SCAN[number].astype(np.uint8)).save(folder / f"{number}.png")
     check(pvdi.read_volume(folder), np.diag(SPACING))
     other = write(tmp_path / "other", series="7.8", values=SCAN[:3])
     for file in other.iterdir():

@@ -88,8 +88,9 @@ def test_times_channels_and_colours_of_simpleitk(tmp_path):
     sitk.WriteImage(image, str(tmp_path / "b.mha"))
     assert np.array_equal(pvdi.read_volume(tmp_path / "b.mha", channel=1).array, scan())
     colors = np.random.default_rng(2).integers(0, 255, (5, 6, 7, 4), np.uint8)
-    sitk.WriteImage(itk_image(colors, isVector=True)[1], str(tmp_path / "c.mha"))
-    assert np.array_equal(pvdi.read_volume(tmp_path / "c.mha").array, colors)
+    for name in ("c.mha", "c.nii"):
+        sitk.WriteImage(itk_image(colors, isVector=True)[1], str(tmp_path / name))
+        assert np.array_equal(pvdi.read_volume(tmp_path / name).array, colors)
 
 
 def nifti(path, *, sform=None, qfac=1.0, quaternion=None, slope=0.0, shift=0.0, unit=2):
@@ -361,6 +362,14 @@ def test_what_is_no_stack_of_slices_is_refused(tmp_path):
     write_slices(tmp_path, [np.zeros((6, 5), np.uint8), np.zeros((6, 7), np.uint8)])
     with pytest.raises(InvalidVolumeError, match=r"slice_1\.png has \(6, 7\) pixels"):
         pvdi.read_volume(tmp_path)
+    write_slices(tmp_path, [np.zeros((6, 5), np.uint8), np.zeros((6, 5), np.uint16)])
+    with pytest.raises(InvalidVolumeError, match=r"slice_1\.png has .* type uint16"):
+        pvdi.read_volume(tmp_path)
+    write_slices(tmp_path, scan(np.uint8)[:2], "tif")
+    with pytest.raises(InvalidVolumeError, match="holds TIFF and PNG files"):
+        pvdi.read_volume(tmp_path)
+    for path in tmp_path.glob("*.tif"):
+        path.unlink()
     (tmp_path / "slice_1.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     with pytest.raises(InvalidVolumeError, match=r"slice_1\.png cannot be read as a picture"):
         pvdi.read_volume(tmp_path)

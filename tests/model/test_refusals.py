@@ -287,7 +287,6 @@ REFUSED = {
         ),
         ({"metadata": [1]}, "metadata must be a dictionary; got list"),
     ],
-    VALID.thinned: [(steps, "every k-th list") for steps in ((0, 1), (1, 7), (True, 1), (1.5, 1))],
     long_list(DEPTH_CODES + 1).with_precision: [
         (("8-byte",), "a list of 16384 supersegments .* 'exact'"),
         (("4-byte",), "'exact' or '8-byte'; got '4-byte'"),

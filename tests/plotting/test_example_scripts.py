@@ -16,6 +16,8 @@ import pytest
 from PIL import Image
 from skimage.io import imread
 
+import pyvista_vdi as pvdi
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
@@ -143,9 +145,8 @@ def test_interactive_example_writes_an_animation_with_a_new_vdi(tmp_path):
 @pytest.mark.slow
 def test_series_example_writes_a_movie_of_its_steps(tmp_path):
     said, target = run_example("series.py", tmp_path)
-    sizes = re.search(r"series\.vdis: ([\d.]+) MiB for ([\d.]+) MiB", said)
-    assert sizes is not None, said
-    assert float(sizes[1]) < 0.3 * float(sizes[2])
+    assert "series.vdis: 12 steps" in said
+    assert len(pvdi.read(target.with_suffix(".vdis"))) == 12
     frames, size = gif(target)
     assert (size, len(frames)) == ((480, 360), 12)
     dark = [(frames[k].mean(axis=2) < 128).mean() for k in (0, 4, 8)]
@@ -155,7 +156,7 @@ def test_series_example_writes_a_movie_of_its_steps(tmp_path):
 @pytest.mark.slow
 def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
     said, target = run_example("sets.py", tmp_path)
-    assert "'below_target': 0" in said
+    assert "sets.vdiset: 32 VDIs" in said
     frames, size = gif(target)
     assert (size, len(frames)) == ((200, 150), 24)
     for k in (0, 7, 12, 23):  # from every side there is a knot
@@ -163,10 +164,11 @@ def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
 
 
 @pytest.mark.slow
-def test_tradeoff_example_draws_its_three_fronts(tmp_path):
+def test_tradeoff_example_draws_its_fronts(tmp_path):
     said, target = run_example("tradeoff.py", tmp_path)
     assert all(f"{kind}: " in said for kind in ("frame", "memory", "generation"))
-    panels = np.array_split(imread(target)[..., :3].astype(int), 3, axis=1)
+    picture = imread(target)[..., :3].astype(int)
+    panels = [half for row in np.array_split(picture, 2) for half in np.array_split(row, 2, axis=1)]
     assert all(np.ptp(panel) > 100 for panel in panels)
 
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pyvista_vdi.quality.decide import busy, decide, growth, placeholder_share
+from pyvista_vdi.quality.decide import busy, decide, placeholder_share
 from pyvista_vdi.quality.frame_state import (
     AskAgain,
     AskPolicy,
@@ -489,21 +489,6 @@ def test_placeholders_have_few_rays_until_their_cost_is_known():
     assert placeholder_share(state, 10_000)[1] == pytest.approx(0.1, abs=0.01)
     with pytest.raises(FrozenInstanceError):
         state.making = None
-
-
-@pytest.mark.parametrize(
-    ("chosen", "moving", "watched", "grows"),
-    [
-        ({}, False, True, "behind"),
-        ({}, False, False, "now"),
-        ({"draw": "vdi"}, False, False, None),
-        ({"regenerate": "never"}, False, True, None),
-        ({"regenerate": "never"}, True, True, "later"),
-        ({}, True, False, "later"),
-    ],
-)
-def test_when_a_set_grows(chosen, moving, watched, grows):
-    assert growth(Settings(**chosen), moving=moving, watched=watched) == grows
 
 
 def test_a_stored_vdi_that_failed_is_tried_again_when_another_is_due():

@@ -208,8 +208,7 @@ def assert_axe_finds_nothing(page, within="document"):
 class Page:
     """A page with a viewer; ``page`` is Playwright's.
 
-    ``asked`` has the names of the files that were asked for, and the range of each or None. Parts
-    are given of those whose names are in ``in_parts``. ``urls`` has what else was asked for.
+    ``asked`` has the names of the files that were asked for; ``urls`` has what else was asked for.
     """
 
     def __init__(self, context):
@@ -221,8 +220,8 @@ class Page:
         self.page.on("request", lambda request: self.urls.append(request.url))
         self.page.route(SITE + "**", self.answer)
 
-    def begin_anew(self, files=None, expected=None, in_parts=()):
-        self.files, self.expected, self.in_parts = dict(files or {}), expected, in_parts
+    def begin_anew(self, files=None, expected=None):
+        self.files, self.expected = dict(files or {}), expected
         self.asked, self.urls, self.complaints = [], [], []
 
     def hear(self, message):
@@ -237,14 +236,7 @@ class Page:
     def answer(self, route):
         name = route.request.url.removeprefix(SITE).partition("?")[0]
         content = self.files.get(name)
-        part = re.fullmatch(r"bytes=(\d+)-(\d+)", route.request.headers.get("range", ""))
-        self.asked.append((name, part and tuple(map(int, part.groups()))))
-        if part and name in self.in_parts:
-            begin, last = self.asked[-1][1]
-            sent = content[begin : last + 1]
-            where = f"bytes {begin}-{begin + len(sent) - 1}/{len(content)}"
-            route.fulfill(status=206, body=sent, headers={"Content-Range": where})
-            return
+        self.asked.append(name)
         module = resources.files("pyvista_vdi.extensions.web") / "viewer" / name
         if content is None and name.endswith(".js") and module.is_file():
             content = module.read_text(encoding="utf-8")
@@ -311,12 +303,11 @@ def open_page(chromium, shared_pages):
     """Open a page with a viewer of ``size`` CSS pixels, the one of ``files`` that has ``name``, or
     a ``url`` of the disk or of a server, which must ask for nothing from elsewhere.
 
-    ``before`` runs before anything else, ``script`` before there is a viewer. Of files named in
-    ``in_parts`` the server gives parts. What the page complains of fails the test, but for what
-    ``expected`` (a pattern) is found in. Without ``options`` of Playwright's context a page of the
-    same scripts is shared by the tests of a file, each of which has a viewer of its own; but a
-    viewer that shows ``data``, the bytes of a file, is shared as well: a test leaves it as it was,
-    but for its view, its planes and its background.
+    ``before`` runs before anything else, ``script`` before there is a viewer. What the page
+    complains of fails the test, but for what ``expected`` (a pattern) is found in. Without
+    ``options`` of Playwright's context a page of the same scripts is shared by the tests of a file,
+    each of which has a viewer of its own; but a viewer that shows ``data``, the bytes of a file, is
+    shared as well: a test leaves it as it was, but for its view, its planes and its background.
     """
     contexts, pages, used = [], [], []
 
@@ -336,7 +327,6 @@ def open_page(chromium, shared_pages):
         name=None,
         url=None,
         expected=None,
-        in_parts=(),
         **options,
     ):
         shared = not (options or name or url)
@@ -350,7 +340,7 @@ def open_page(chromium, shared_pages):
                 contexts.append(page.page.context)
         if shared:
             used.append((page, data))
-        page.begin_anew(files, expected, in_parts)
+        page.begin_anew(files, expected)
         pages.append((page, url))
         if url is None and name is None:
             if fresh:

@@ -11,7 +11,7 @@ BROUGHT_BY = {
     r"\.exr|\bexr\b": "deep_exr",
     r"\.html|\bhtml\b|\bserve\b": "web",
     r"\.vdis\b|\bseries\b|VDISeries|SeriesWriter|generate_series": "series",
-    r"\.vdiset\b|\bset\b|VDISet|generate_set|cinema": "sets",
+    r"\.vdiset\b|\bset\b|VDISet|generate_set": "sets",
     r"\bparaview\b": "paraview",
     r"InSitu": "insitu",
     r"generate_on_mpi|--scheduler|\bchunks\b": "large",

@@ -7,7 +7,6 @@ import functools
 import numpy as np
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.series import layout
 
 SIZE = (24, 14)
 
@@ -65,15 +64,6 @@ def same(one, other):
     return one.equals(other) and one.precision == other.precision and one.metadata == other.metadata
 
 
-def damaged(path, change):
-    """Return a copy of a file in which ``change`` has changed the bytes."""
-    data = bytearray(path.read_bytes())
-    change(data)
-    other = path.with_name(f"damaged{path.suffix}")
-    other.write_bytes(data)
-    return other
-
-
 def packed_steps(n, **options):
     """The first steps of a scene, packed."""
     made = stepped_vdi if "metadata" in options else _kept
@@ -81,14 +71,3 @@ def packed_steps(n, **options):
 
 
 _kept = functools.cache(stepped_vdi)
-
-
-def frames_of(path):
-    """Where a file's frames of steps begin, and their headers."""
-    data, found = path.read_bytes(), []
-    place = len(layout.MAGIC) + layout.HEAD.size + layout.HEAD.unpack_from(data, 8)[1]
-    while header := layout.FrameHeader.of_bytes(data[place : place + layout.HEADER_BYTES]):
-        if header.what == layout.STEP:
-            found.append((place, header))
-        place += layout.HEADER_BYTES + header.n_bytes
-    return found

@@ -56,22 +56,16 @@ def write(vdi: VDI, path: Any, *, progress: Progress | None = None) -> Path:
     return Path(path).resolve()
 
 
-def read(
-    path: Any,
-    *,
-    camera: Any = None,
-    thickness: float | None = None,
-    progress: Progress | None = None,
-) -> VDI:
+def read(path: Any, *, progress: Progress | None = None, **options: Any) -> VDI:
     """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`."""
-    vdi, _ = _vdi(path, camera, thickness)
+    vdi, _ = _vdi(path, **options)
     Pieces(progress, 1)()
     return vdi
 
 
 def read_info(path: Any) -> FileInfo:
     """Return what a file says about itself; all samples are read for it."""
-    vdi, header = _vdi(path, None, None)
+    vdi, header = _vdi(path)
     return FileInfo(
         path=Path(path),
         format_version=VERSION,
@@ -113,7 +107,7 @@ def _deep_image(path: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     return deep[0]
 
 
-def _vdi(path: Any, camera: Any, thickness: float | None) -> tuple[VDI, dict[str, Any]]:
+def _vdi(path: Any, camera: Any = None, thickness: Any = None) -> tuple[VDI, dict[str, Any]]:
     """Return the VDI and the header of a file."""
     header, pixels = _deep_image(path)
     record, display = _record(header, path), np.array(header["displayWindow"])
@@ -191,9 +185,7 @@ def _pixels(vdi: VDI, array: NDArray[Any]) -> NDArray[Any]:
     return np.ascontiguousarray(pixels.reshape(height, width)[::-1])
 
 
-def _samples_in(
-    header: dict[str, Any], pixels: dict[str, NDArray[Any]], size: tuple[int, int], path: Any
-) -> tuple[NDArray[np.int64], dict[str, NDArray[Any]]]:
+def _samples_in(header: Any, pixels: Any, size: Any, path: Any) -> tuple[Any, dict[str, Any]]:
     """Return each sample's list, and the channels, of the pixels in the display window."""
     names = [name for name in ("Z", "ZBack", "A", "R", "G", "B", "tau") if name in pixels]
     if not {"Z", "A", "R", "G", "B"} <= {*names}:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Formatter
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +22,19 @@ from pyvista_vdi.extensions.large.on_mpi import (
     require_same,
     together,
 )
-from pyvista_vdi.extensions.series.continuing import check_goes_on, checked_way, refused
-from pyvista_vdi.extensions.series.generate import checked_deferral
 from pyvista_vdi.extensions.series.series import checked_time
-from pyvista_vdi.extensions.series.writer import SeriesWriter
+from pyvista_vdi.extensions.series.writer import (
+    SeriesWriter,
+    check_goes_on,
+    checked_way,
+    refused,
+)
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_whole, not_taken, three_wholes
+from pyvista_vdi.model.checks import as_range, as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.deferred import importance_points
 from pyvista_vdi.model.options import (
     GENERATION_NAMES,
     Deferral,
@@ -42,11 +46,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Grid, Volume
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from pyvista_vdi.extensions.series.keywords import InSituOptions
 
 _DEFERRAL = tuple(declared(Deferral))
 
@@ -129,7 +128,7 @@ class InSitu:
         append: bool = False,
         overwrite: bool = False,
         device: DeviceLike | None = None,
-        **options: Unpack[InSituOptions],
+        **options: Any,
     ) -> None:
         self._comm = comm = mpi().COMM_WORLD if comm is None else checked_ranks(comm)
         self._device, self._closed, self._step = device, False, 0
@@ -178,10 +177,11 @@ class InSitu:
         self._looks = Classification.composited(looks, "InSitu", others)
         if self._deferral.deferred:
             self._looks.require_no_look()
+            ends = as_range(self._deferral.value_range)  # what cannot be is refused before the run
+            importance_points(self._deferral.importance, ends)
             self._function = unclassified(self._looks.interpolation)
         chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
         self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
-        self._deferral = checked_deferral(self._deferral, self._options)
         points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
         of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
         self._grid = Grid(points, of.spacing, of.origin, of.direction)
@@ -305,7 +305,7 @@ class InSitu:
         return time
 
     def close(self) -> None:
-        """Finish the series' file; what was appended is readable before. No step comes after."""
+        """End the run: no step comes after, and others may write."""
         self._closed = True
         if self._writer is not None:
             self._writer.close()

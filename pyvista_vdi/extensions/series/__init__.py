@@ -15,7 +15,7 @@ EXTENSION = Extension(
             ".vdis",
             "pyvista_vdi.extensions.series.files",
             holds="series",
-            magic=b"\x89VDIS\r\n\x1a",
+            head="series.json",
             verbs="pyvista_vdi.extensions.series.cli",
         ),
     ),
@@ -27,7 +27,7 @@ EXTENSION = Extension(
     verbs=(
         Verb(
             "series",
-            "write VDIs, or those of volumes, that are time steps to one file",
+            "write VDIs, or those of volumes, that are time steps to a series",
             "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
             "pyvista_vdi.extensions.series.cli:add_options",
             "pyvista_vdi.extensions.series.cli:series",

@@ -6,10 +6,8 @@ import argparse
 import json
 import math
 import sys
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +15,7 @@ from typing import Any
 
 from pyvista_vdi import registry
 from pyvista_vdi.cli import declare
-from pyvista_vdi.cli.files import of_values
+from pyvista_vdi.cli.files import state_of, text_of
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     OF_ANY_VOLUME,
@@ -32,15 +30,15 @@ from pyvista_vdi.cli.inputs import (
     with_look,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
-from pyvista_vdi.cli.text import LENGTHS, mebibytes, printable, table, vector
+from pyvista_vdi.cli.text import mebibytes, printable, table
 from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.extensions.series import files as of_series
-from pyvista_vdi.extensions.series.layout import SUFFIX
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.series.writer import SeriesWriter
-from pyvista_vdi.io import check_write_options, checked_target, read_info
+from pyvista_vdi.extensions.series.archive import SERIES, Kind
+from pyvista_vdi.extensions.series.generate import StepMaker
+from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range, range_of
+from pyvista_vdi.io import FileInfo, check_write_options, checked_target, is_vdi_file, read_info
 from pyvista_vdi.io import read as read_vdi
-from pyvista_vdi.io.files import format_named, holds
+from pyvista_vdi.io.files import format_named
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, declared
@@ -54,173 +52,129 @@ OF_READ_IMAGES = ("camera_json", "thickness")
 
 
 def series(options: argparse.Namespace) -> int:
-    """Write a series of the files that are named: VDIs, series of them, or volumes."""
+    """Write a series of the files that are named: VDIs or volumes."""
     files = in_order(options.files)
-    kinds = [_kind(file) for file in files]
-    if len(set(kinds)) > 1:
+    of_vdis = is_vdi_file(files[0])
+    if any(is_vdi_file(file) != of_vdis for file in files):
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
-    if kinds[0] != "volume":
+    if of_vdis:
         of_volumes = (*OF_ANY_VOLUME, *PLACE, "view_angle", "sample_distance", "memory_limit")
         refuse(options, (*of_volumes, "scheduler", *declared(Deferral)), "volumes")
-    if options.times is not None and kinds[0] == "series":
-        raise InvalidArgumentError("the series have their own times: leave out --times")
-    if kinds[0] == "volume":
-        steps = steps_of_volumes(files, options, in_chunks=True)
+        steps = [_step_of_vdi(file) for file in files]
     else:
-        steps = _steps_of_vdis(files)
-    if kinds[0] != "series":
-        steps = _timed(steps, options.times)
+        steps = steps_of_volumes(files, options, in_chunks=True)
+    times = _times(steps, options.times)
     looks = classification(options)
     Classification.composited(looks, "series")  # refused before a volume is read
     looks |= kept_values(options)
-    target = check_writable(with_suffix(Path(options.output), (SUFFIX,), "a series")).resolve()
-    # A writer's file grows step by step: it gets its name when it is whole, and all have been read
-    with (
-        tempfile.TemporaryDirectory(prefix=".pyvista-vdi-", dir=target.parent) as folder,
-        _connected(options.scheduler) as client,
-        measuring("writing a series") as bar,
-    ):
-        part = Path(folder) / target.name
-        if kinds[0] == "volume":
-            _write_volumes(part, steps, options, {"client": client, **looks}, bar)
-        else:
-            with SeriesWriter(part, **_of_the_series(options)) as out:
-                for i, step in enumerate(steps):
-                    out.append(step.read(), step.time)
-                    bar((i + 1) / len(steps))
-        part.replace(target)
-    about = of_series.read_info(options.output)
-    print(f"{printable(options.output)}: {len(about.times)} steps, {mebibytes(about.file_bytes)}")
+    check_writable(with_suffix(Path(options.output), (SERIES.suffix,), "a series"))
+    address = options.scheduler
+    connected = nullcontext() if address is None else registry.generator("clients")(address)
+    with connected as client, measuring("writing a series") as bar:
+        vdi_of = _reader(steps) if of_vdis else _maker(steps, options, client, looks)
+        vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
+        target = vdis.save(
+            options.output, progress=bar, **{"precision": "8-byte", **of_the_file(options)}
+        )
+    size = mebibytes(target.stat().st_size)
+    print(f"{printable(options.output)}: {len(vdis)} steps, {size}")
     return 0
 
 
-def _write_volumes(
-    target: Path, steps: list[Step], options: argparse.Namespace, more: dict[str, Any], bar: Any
-) -> None:
-    """Write VDIs of volumes, all from the view that the first one has."""
+def _maker(
+    steps: Sequence[Step], options: argparse.Namespace, client: Any, looks: dict[str, Any]
+) -> Callable[[int], VDI]:
+    """Return what makes the VDI of a step's volume, all from the view that the first one has."""
     with naming(steps[0].name):
-        volume = steps[0].read()
-    view = generating_view(options, volume)
-    with SeriesWriter(
-        target,
-        view,
-        options.size,
-        max_supersegments=options.max_supersegments,
-        sample_distance=options.sample_distance,
-        memory_limit=options.memory_limit,
-        device=options.device,
-        **_of_the_series(options),
-        **more,
-    ) as out:
-        for i, step in enumerate(steps):
-            with naming(step.name):
-                volume = step.read() if i else volume
-                out.append(as_seen(options, volume, view), step.time)
-            bar((i + 1) / len(steps))
+        first = steps[0].read()
+    view = generating_view(options, first)
+    names = ("max_supersegments", "sample_distance", "memory_limit", "device")
+    chosen = {name: getattr(options, name) for name in names}
+    make = StepMaker("series", view, options.size, client=client, **chosen, **looks)
+
+    def vdi_of(i: int) -> VDI:
+        with naming(f"{steps[i].name}: step {i}"):
+            return make(as_seen(options, steps[i].read() if i else first, view))
+
+    return vdi_of
 
 
-def _connected(address: str | None) -> Any:
-    """Connect to a Dask scheduler, if one is given."""
-    return nullcontext() if address is None else registry.generator("clients")(address)
+def _reader(steps: Sequence[Step]) -> Callable[[int], VDI]:
+    """Return what reads the VDI of a step, and refuses what is not of the first one's kind."""
+    ends = range_of(steps[0].read())
+
+    def vdi_of(i: int) -> VDI:
+        vdi: VDI = steps[i].read()
+        check_range(vdi, ends, steps[i].name)
+        return vdi
+
+    return vdi_of
 
 
-def _of_the_series(options: argparse.Namespace) -> dict[str, Any]:
-    return {**of_the_file(options), "tolerance": options.tolerance, "key_every": options.key_every}
+def _step_of_vdi(file: str) -> Step:
+    """Return a step of a file, with the time that a simulation has written."""
+    at = as_number(read_info(file).metadata.get("time"))
+    return Step(file, None if math.isnan(at) else at, partial(read_vdi, file))
 
 
-def _steps_of_vdis(files: Sequence[str]) -> list[Step]:
-    """Return the steps of files that hold VDIs or series of them."""
-    steps = []
-    for file in files:
-        if holds(file) == "series":
-            series = read_vdi(file)
-            for i, at in enumerate(series.times):
-                steps.append(Step(f"{file}, step {i}", at, partial(series.__getitem__, i)))
-        else:
-            at = as_number(read_info(file).metadata.get("time"))  # as a simulation's is written
-            steps.append(Step(file, None if math.isnan(at) else at, partial(read_vdi, file)))
-    return steps
-
-
-def _timed(steps: Sequence[Step], given: Sequence[float] | None) -> list[Step]:
-    """Return steps with the times that are given, else with the files' where these ascend."""
+def _times(steps: Sequence[Step], given: Sequence[float] | None) -> Sequence[float]:
+    """Return the times that are given, else the files' where these ascend, else numbers."""
     if given is not None:
         if len(given) != len(steps):
             raise InvalidArgumentError(
                 f"--times gives a time to each step: there are {len(steps)} steps and "
                 f"{len(given)} times"
             )
-        return [replace(step, time=at) for step, at in zip(steps, given, strict=True)]
+        return given
     known = [step.time for step in steps if step.time is not None]
-    if known and (len(known) < len(steps) or any(b <= a for a, b in pairwise(known))):
+    if len(known) == len(steps) and all(a < b for a, b in pairwise(known)):
+        return known
+    if known:
         print(
             "The times in the files do not ascend, or some have none: steps are numbered "
             "(--times gives times)",
             file=sys.stderr,
         )
-        return [replace(step, time=None) for step in steps]
-    return list(steps)
-
-
-def _kind(file: str) -> str:
-    from pyvista_vdi.io import is_vdi_file
-
-    if holds(file) == "series":
-        return "series"
-    return "VDI" if is_vdi_file(file) else "volume"
+    return range(len(steps))
 
 
 def info(options: argparse.Namespace) -> int:
-    """Print what a file of a series says about itself."""
-    about = of_series.read_info(options.file)
+    """Print what a series says about itself."""
+    times = of_series.read(options.file).times
+    steps = {"steps": f"{len(times)}, times {times[0]:g} to {times[-1]:g}"}
+    return print_info(options, of_series.read_info(options.file), steps, {"times": times})
+
+
+def print_info(
+    options: argparse.Namespace, about: FileInfo, own: dict[str, str], listed: dict[str, Any]
+) -> int:
+    """Print what a series or a set says about itself; what is one VDI's is the first one's."""
     if options.json:
-        state = {**vars(about), "path": str(about.path), "camera": about.camera.to_dict()}
-        print(json.dumps(state, indent=1))
-        return 0
-    width, height = about.window_size
-    state_of = "" if about.closed else ", not closed: still being written, or cut off"
-    print(
-        table(
-            {
-                "file": f"{about.path}, {mebibytes(about.file_bytes)}, {about.codec}{state_of}",
-                "written by": f"{about.written_by}, format version {about.format_version}",
-                "steps": f"{len(about.times)}, times {about.times[0]:g} to {about.times[-1]:g}",
-                **({} if about.value_range is None else of_values(about.value_range)),
-                "keys": f"{len(about.keys)} steps need no other",
-                "bytes a step": f"{min(about.step_bytes)} to {max(about.step_bytes)}",
-                "precision": about.precision
-                + (f", within a tolerance of {about.tolerance:g}" if about.tolerance else ""),
-                "lists": f"{width} x {height}",
-                "eye": vector(about.camera.position),
-                "bounds": vector(about.bounds),
-                **LENGTHS,
-            }
-        )
-    )
+        print(json.dumps({**state_of(about), **listed}, indent=1))
+    else:
+        print(table(own) + "\n" + text_of(about))
     return 0
 
 
 def convert(options: argparse.Namespace) -> int:
-    """Write a series anew, as a page, or each of its steps to a file of its own."""
-    refuse(options, OF_READ_IMAGES, "deep images, .exr, and this is a series")
+    """Write a series as one file, as a page, or each of its steps to a file of its own."""
+    return convert_several(options, of_series.read, SERIES)
+
+
+def convert_several(options: argparse.Namespace, read: Callable[[str], Any], kind: Kind) -> int:
+    """Write a series or a set as one file, as a page, or each VDI to a file of its own."""
+    refuse(options, OF_READ_IMAGES, f"deep images, .exr, and this is a {kind.name}")
     target, arguments = Path(options.output), of_the_file(options)
     found = format_named(target)
-    steps: VDISeries = with_look(
-        options,
-        of_series.read(options.file),
-        options.file,
-        colors=found is not None and found.suffix not in (SUFFIX, ".vdi"),
-    )
-    if found is not None and (found.suffix == SUFFIX or found.page):
+    together = found is not None and (found.page or found.suffix == kind.suffix)
+    colors = found is not None and found.suffix not in (kind.suffix, ".vdi")
+    vdis = with_look(options, read(options.file), options.file, colors=colors)
+    if together:
         with measuring("converting") as bar:
-            steps.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
+            vdis.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
         say_written([target])
         return 0
-    return write_each(steps, target, arguments)
-
-
-def write_each(vdis: Sequence[VDI], target: Path, arguments: dict[str, Any]) -> int:
-    """Write each of several VDIs to a file of its own, named by a number."""
+    # Name each by a number
     digits = max(4, len(str(len(vdis) - 1)))
     files = [
         target.with_name(f"{target.stem}_{i:0{digits}}{target.suffix}") for i in range(len(vdis))
@@ -238,7 +192,7 @@ def write_each(vdis: Sequence[VDI], target: Path, arguments: dict[str, Any]) -> 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the verb ``series``."""
     text = (
-        f"VDIs, or other series, .vdis; or volumes, each {declare.VOLUME_FILE}. Of a store, a "
+        f"VDIs; or volumes, each {declare.VOLUME_FILE}. Of a store, a "
         ".pvd, a .vti.series and other files with time steps all are taken. Names in a shell's "
         "order are put in that of their numbers, step_2 before step_10"
     )
@@ -247,14 +201,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     times = "of the steps, ascending (default: those in the files, else 0,1,2,...)"
     declare.option(parser, "--times", times, "A,B,...", declare.parse_numbers)
     group = parser.add_argument_group("file")
-    text = (
-        "what colours times opacity, and opacities, of a supersegment may differ by, 0 to 1, where "
-        "that saves bytes (default: 0, every bit is kept)"
-    )
-    declare.option(group, "--tolerance", text, "T", declare.parse_number, default=0.0)
-    text = "most steps from one that needs no other to the next (default: 16)"
-    declare.option(group, "--key-every", text, "N", declare.parse_count, default=16)
-    text = "of the supersegments (default: 8-byte, the only one that is written by differences)"
+    text = "of the supersegments (default: 8-byte)"
     declare.option(group, "--precision", text, choices=PRECISIONS)
     text = "zstd (default), lz4, deflate or none"
     declare.option(group, "--compression", text, choices=("zstd", "lz4", "deflate", "none"))

@@ -7,39 +7,50 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.extensions.series.reader import SeriesInfo, StepsReader
-from pyvista_vdi.extensions.series.series import VDISeries, refuse_look
-from pyvista_vdi.extensions.series.steps_writer import write
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.extensions.series.archive import SERIES, Archive, write
+from pyvista_vdi.extensions.series.series import VDISeries, checked_times, refuse_look
 from pyvista_vdi.io.files import format_named
 from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 
 
 def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Path:
-    """Write a file of a series, or a page that plays it: see :meth:`VDISeries.save`."""
-    refuse_look(series, options)
+    """Write one file with a series, or a page that plays it: see :meth:`VDISeries.save`."""
+    refuse_look(options)
     found = format_named(path)
     if found is not None and found.page:
         as_vdi(series[0])  # refuses what has no colours
         return found.load().write_series(series, path, **options)  # type: ignore[no-any-return]
-    return write(series, series.times, path, **options)
+    if options.get("precision") is None:
+        options["precision"] = series[0].precision
+    return write(path, SERIES, {"times": series.times}, series, **options)
 
 
-def write_steps(
-    vdis: Sequence[VDI], times: Sequence[float], path: str | os.PathLike[str], **options: Any
-) -> Path:
+def write_steps(vdis: Sequence[VDI], times: Sequence[float], path: str, **options: Any) -> Path:
     """Write the VDIs of several times as a series."""
     return save(VDISeries(vdis, times), path, **options)
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
-    """Read a series from a .vdis file; steps are decoded when they are asked for."""
-    steps = StepsReader(path)
+    """Read a series; its steps are read when they are asked for."""
+    steps = Archive(path, SERIES)
+    if not len(steps):
+        raise VDIFileError(f"{path} has no finished step: none has been written yet")
     Pieces(progress, 1)()
-    return VDISeries(steps, steps.times)
+    return VDISeries(steps, times_of(steps))
 
 
-def read_info(path: str | os.PathLike[str]) -> SeriesInfo:
-    """Read what a .vdis file says about itself, without its steps: errors as for :func:`read`."""
-    return StepsReader(path).info()
+def times_of(steps: Archive) -> tuple[float, ...]:
+    """Return the times of a stored series."""
+    try:
+        return checked_times(steps.about["times"])
+    except InvalidArgumentError as error:
+        steps.refuse(f"its times cannot be ({error})")
+
+
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
+    """Read what a series says about itself, without its arrays: errors as for :func:`read`."""
+    return Archive(path, SERIES).info()

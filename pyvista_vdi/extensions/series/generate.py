@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Iterable, Sequence, Sized
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.api import generate
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidArgumentTypeError,
@@ -18,40 +17,30 @@ from pyvista_vdi.errors import (
     with_article,
 )
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
-from pyvista_vdi.generation.deferred import generate_deferred, unclassified
+from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_range, check_callback
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.deferred import importance_points
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import (
     GENERATION_NAMES,
     Deferral,
     GenerationOptions,
-    GenerationRequest,
     QualityTarget,
     declared,
 )
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import bytes_of, warn_missed
-from pyvista_vdi.quality.probe import generate_anywhere
+from pyvista_vdi.quality.dial import bytes_of
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from pyvista_vdi.extensions.series.keywords import SeriesOptions, VolumesLike
-
-_DIAL = tuple(declared(QualityTarget))
 _GRID = ("spacing", "origin")
-_DEFERRAL = tuple(declared(Deferral))
+_OTHERS = (*GENERATION_NAMES, *declared(QualityTarget), *declared(Deferral))
 
 
 def generate_series(
-    volumes: VolumesLike,
+    volumes: Any,
     camera: CameraLike,
     window_size: WindowSize,
     times: Iterable[float] | None = None,
@@ -61,7 +50,7 @@ def generate_series(
     client: ClientLike | None = None,
     progress: Progress | None = None,
     device: DeviceLike | None = None,
-    **options: Unpack[SeriesOptions],
+    **options: Any,
 ) -> VDISeries:
     """Generate the VDIs of a volume that changes in time, all from one view.
 
@@ -91,20 +80,19 @@ def generate_series(
         As for :func:`pyvista_vdi.generate`: of a Dask cluster, whose workers make the VDIs of
         chunked volumes. Dask arrays are chunked then, and else brought into memory step by step.
     progress : callable, optional
-        Called with the finished fraction, 0 to 1, of the series where its length is known, else of
-        each step; work stops if it returns ``False``.
+        Called after each step with the finished fraction, where the number of steps is known; work
+        stops if it returns ``False``.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **options
         All else that :func:`pyvista_vdi.generate` takes, classification included. ``precision`` is
-        ``"8-byte"`` by default, which is what files of series are made for.
+        ``"8-byte"`` by default.
 
     Returns
     -------
     VDISeries
-        In memory. Its ``volumes`` are the steps' as :class:`Volume` where they can be had again:
-        where ``volumes`` is a sequence, a function or a source. To write a series that need not
-        fit in memory, see :class:`pyvista_vdi.SeriesWriter`.
+        In memory. To write a series that need not fit in memory, see
+        :class:`pyvista_vdi.SeriesWriter`.
 
     Raises
     ------
@@ -121,183 +109,110 @@ def generate_series(
     --------
     generate : has the options, and the other errors.
     """
-    check_callback(progress)
-    steps, known_times = _steps(volumes, times)
-    make = StepMaker(
-        "generate_series",
-        camera,
-        window_size,
-        device=device,
-        client=client,
-        spacing=spacing,
-        origin=origin,
-        **options,
-    )
-    sized = steps if known_times is None else known_times
-    total = len(sized) if isinstance(sized, Sized) else None
+    steps, known = _steps(volumes, times)
+    given = {"spacing": spacing, "origin": origin, "client": client, "device": device, **options}
+    make = StepMaker("generate_series", camera, window_size, **given)
+    sized: Any = steps if known is None else known
+    done = Pieces(progress, len(sized) if isinstance(sized, Sized) else 0)
     vdis: list[VDI] = []
     for volume in steps:
-        if known_times is not None and len(vdis) == len(known_times):
+        if known is not None and len(vdis) == len(known):
             raise InvalidArgumentError(f"there are more steps than the {len(vdis)} times")
         with naming(f"step {len(vdis)}"):
-            vdis.append(make(volume, _part(progress, len(vdis), total)))
-        warn_missed(vdis[-1])
-    again: Sequence[Volume] | None = None
-    if isinstance(steps, Sized) and hasattr(steps, "__getitem__"):
-        again = Called(partial(_volume_at, make, steps), range(len(vdis)))
+            vdis.append(make(volume))
+        done()
     if not vdis:
         raise InvalidArgumentError("there is no step: pass at least one volume")
-    series = VDISeries(vdis, range(len(vdis)) if known_times is None else known_times, again)
-    series._maker = make
-    return series
-
-
-def _volume_at(make: StepMaker, steps: Any, i: int) -> Volume:
-    return make.volume(steps[i])
+    return VDISeries(vdis, range(len(vdis)) if known is None else known)
 
 
 class StepMaker:
-    """Makes a VDI of each volume that it is called with, all by what the first one implied."""
+    """Makes a VDI of each volume that it is called with, all by what the first one implied.
+
+    ``options``: those of :func:`generate_series`. They are checked here, before a volume is read.
+    """
 
     def __init__(
-        self,
-        function: str,
-        camera: Any,
-        window_size: Sequence[int],
-        default_precision: str = "8-byte",
-        *,
-        device: Any = None,
-        client: Any = None,
-        **given: Any,
+        self, function: str, camera: Any, window_size: Sequence[int], **options: Any
     ) -> None:
-        self._camera = Camera.from_any(camera)
-        self._size = self._pictures = check_window_size(window_size)
-        self._device, self._client = device, client
-        others = (*GENERATION_NAMES, *_DIAL, *_GRID, *_DEFERRAL)
-        looks = {n: v for n, v in given.items() if n not in others}
-        self._looks = Classification.composited(looks, function, others)
-        self._target = QualityTarget(**{n: given[n] for n in _DIAL if n in given})
-        self.deferral = Deferral(**{n: given[n] for n in _DEFERRAL if n in given})
-        if self.deferral.deferred:
-            self._looks.require_no_look()
-            self.deferral.refuse_target(self._target)
-            self._table: TransferFunction | None = unclassified(self._looks.interpolation)
-        else:
-            self._table = None
-        options = {n: given[n] for n in GENERATION_NAMES if n in given}
-        if not self._target:
-            options.setdefault("precision", default_precision)
-        self._options = GenerationOptions(**options)
-        self.deferral = checked_deferral(self.deferral, self._options)
-        self._grid = {n: given[n] for n in _GRID if given.get(n) is not None}
-        self._chosen: dict[str, Any] = {}
-        self._max_bytes = self._target.max_bytes
-
-    def __call__(
-        self,
-        volume: Any,
-        progress: Progress | None = None,
-        *,
-        camera: Any = None,
-        window_size: Sequence[int] | None = None,
-    ) -> VDI:
-        """Return a step's VDI."""
-        volume = self.volume(volume)
-        # The first step's range is all steps', while a property's functions have theirs in each
-        if self._table is None or self._looks.in_place:
-            self._table = self._looks.transfer_function_of(volume)
-        request = GenerationRequest(
-            volume,
-            self._table,
-            self._camera if camera is None else Camera.from_any(camera),
-            self._size if window_size is None else check_window_size(window_size),
-            self._options,
-            self._device,
-            progress,
-            {"classification": self._looks.describe(), "scalars": volume.name, **self._chosen},
+        self._camera, self._size = Camera.from_any(camera), check_window_size(window_size)
+        self._pictures = self._size
+        self._grid = {n: v for n in _GRID if (v := options.pop(n, None)) is not None}
+        self._where = {name: options.pop(name, None) for name in ("client", "device")}
+        looks = {n: v for n, v in options.items() if n not in _OTHERS}
+        self._looks = Classification.composited(looks, function, (*_OTHERS, *_GRID))
+        asked: Any = (
+            of(**{n: options[n] for n in declared(of) if n in options})
+            for of in (QualityTarget, Deferral, GenerationOptions)
         )
-        if self.deferral.deferred:
-            kept = generate_deferred(request, self.deferral, self._anywhere)
-            self.deferral = dataclasses.replace(self.deferral, value_range=kept.value_range)
-            return kept  # type: ignore[return-value]
-        vdi = self._anywhere(request)
-        if self._target:
-            self._keep_the_choice(vdi)
-        elif self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
+        target, deferral, _ = asked
+        if deferral.deferred:
+            self._looks.require_no_look()
+            deferral.refuse_target(target)
+        if not target:
+            options.setdefault("precision", "8-byte")
+        self._scalars = options.pop("scalars", None), options.pop("preference", "point")
+        self._options, self._max_bytes = options, target.max_bytes
+        self._dial: dict[str, Any] | None = None  # what the first step chose, where one chooses
+
+    def __call__(self, volume: Any) -> VDI:
+        """Return a step's VDI."""
+        if self._grid and not (hasattr(volume, "GetClassName") or isinstance(volume, Volume)):
+            array = volume if self._where["client"] is not None else np.asarray(volume)
+            volume = Volume(array, **self._grid)
+        volume = as_volume(volume, *self._scalars)
+        volume = volume.in_view(self._camera, window_size=self._pictures)
+        if not (self._looks.in_place or self._options.get("classification") == "deferred"):
+            # A colour stands for the same value in all steps
+            table = self._looks.transfer_function_of(volume)
+            self._looks = Classification(transfer_function=table)
+            self._options = {n: v for n, v in self._options.items() if n in _OTHERS}
+            self._options["transfer_function"] = table
+        vdi: Any = generate(volume, self._camera, self._size, **self._where, **self._options)
+        if isinstance(vdi, DeferredVDI):
+            self._options["value_range"] = vdi.value_range
+        elif self._dial is not None:
+            vdi.metadata["dial"] = self._dial
+            self._check_bytes(vdi)
+        elif dial := vdi.metadata.get("dial"):
+            # What was chosen for the first step are the settings of all others
+            self._dial, self._size = {**dial, "missed": []}, vdi.window_size
+            dropped = declared(QualityTarget)
+            self._options = {n: v for n, v in self._options.items() if n not in dropped}
+            self._options |= {n: dial["chosen"][n] for n in ("max_supersegments", "precision")}
+        return vdi  # type: ignore[no-any-return]
+
+    def _check_bytes(self, vdi: VDI) -> None:
+        """Warn once of a step that takes more bytes than are allowed."""
+        if self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
             warn_external(
                 f"max_bytes={self._max_bytes} is not kept by all steps: one has {bytes_of(vdi)} "
                 "bytes on the device, with what was chosen for the first step; allow less, or "
                 "begin with a step that has as much to show"
             )
-            self._max_bytes = None  # told once
-        return vdi
-
-    def _anywhere(self, request: GenerationRequest) -> VDI:
-        return generate_anywhere(request, self._target, self._client)
-
-    def volume(self, volume: Any) -> Volume:
-        """Return what a user calls a step's volume as a :class:`Volume`."""
-        if self._grid and not hasattr(volume, "GetClassName") and not isinstance(volume, Volume):
-            array = volume if self._client is not None else np.asarray(volume)
-            volume = Volume(array, **self._grid)
-        volume = as_volume(volume, self._looks.scalars, self._looks.preference)
-        return volume.in_view(self._camera, window_size=self._pictures)
-
-    def _keep_the_choice(self, vdi: VDI) -> None:
-        """Take what the dial chose for the first step as the settings of all others."""
-        self._target = QualityTarget()
-        self._size = vdi.window_size
-        # Missed targets are told once
-        self._chosen = {"dial": {**vdi.metadata["dial"], "missed": []}}
-        chosen = vdi.metadata["dial"]["chosen"]
-        self._options = dataclasses.replace(
-            self._options,
-            max_supersegments=chosen["max_supersegments"],
-            precision=chosen["precision"],
-        )
-
-
-def checked_deferral(deferral: Deferral, options: GenerationOptions) -> Deferral:
-    """Return what is to be kept, or raise now what generation would raise of it for any volume."""
-    if not deferral.deferred:
-        return deferral
-    ends = deferral.value_range
-    if ends is None:  # that of the first step: any that the points of importance lie in
-        points = importance_points(deferral.importance, (0.0, 1.0)) or ((0.0, 1.0),)
-        ends = points[0][0], max(points[-1][0], points[0][0] + 1)
-    request = GenerationRequest(
-        Volume(np.zeros((2, 2, 2), np.uint8), (1.0, 1.0, 1.0)),
-        unclassified("nearest"),
-        Camera((0, 0, 1), (0, 0, 0), (0, 1, 0)),
-        (1, 1),
-        options,
-    )
-    generate_deferred(request, dataclasses.replace(deferral, value_range=ends), lambda _: None)
-    if deferral.value_range is None:
-        return deferral
-    return dataclasses.replace(deferral, value_range=as_range(ends))
+            self._max_bytes = None
 
 
 def _steps(
     volumes: Any, times: Iterable[float] | None
 ) -> tuple[Iterable[Any], tuple[float, ...] | None]:
-    """Return the steps' volumes, a sequence where they can be had again, and their times."""
-    known = None if times is None else checked_times(times)
+    """Return the steps' volumes, and their times where they are known."""
+    own: Iterable[float] | None = None
     if hasattr(volumes, "GetOutputPort") or hasattr(volumes, "time_values"):
         from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 
         volumes, own = steps_and_times(volumes)
-        known = checked_times(own) if known is None else known
-    elif callable(volumes):
+    elif isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
+        own = volumes.store.times
+        volumes = Called(volumes.at_time, range(len(volumes.store.times)))
+    times = own if times is None else times
+    known = None if times is None else checked_times(times)
+    if callable(volumes):
         if known is None:
             raise InvalidArgumentError(
                 "volumes is a function of the step's index: pass times, one for each step"
             )
         volumes = Called(volumes, range(len(known)))
-    elif isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
-        own = volumes.store.times
-        known = checked_times(own) if known is None else known
-        volumes = Called(volumes.at_time, range(len(own)))
     elif isinstance(volumes, Volume) or hasattr(volumes, "GetClassName"):
         raise InvalidArgumentError(
             "volumes are the steps of a series, got one volume: pass a list, or call generate"
@@ -308,13 +223,6 @@ def _steps(
             f"{with_article(type(volumes).__name__)}: open files by pyvista.read or "
             "pyvista_vdi.open_volume, one step after the other"
         )
-    if known is not None and hasattr(volumes, "__len__") and len(volumes) != len(known):
+    if known is not None and isinstance(volumes, Sized) and len(volumes) != len(known):
         raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")
     return volumes, known
-
-
-def _part(progress: Progress | None, step: int, total: int | None) -> Progress | None:
-    """Return what reports a step's progress as the series'."""
-    if progress is None or total is None:
-        return progress
-    return lambda fraction: progress((step + fraction) / total)

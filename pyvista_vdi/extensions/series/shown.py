@@ -68,7 +68,7 @@ class SeriesInput(Input):
         """Pause, and leave no thread."""
         self.player.close()
 
-    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
+    def look(self, camera: Camera, device: Any) -> None:
         """Decode for a device."""
         self.player.device = device
 
@@ -89,15 +89,3 @@ class SeriesInput(Input):
     def complaint(self, error: BaseException) -> str:
         """Return that a step is left out."""
         return f"a step is left out: {type(error).__name__}: {error}"
-
-    @property
-    def remedy(self) -> str:  # type: ignore[override]
-        """What remedies a view that the step does not serve."""
-        at_hand = self.player.series.volumes is not None
-        return "actor.regenerate() makes this step anew" if at_hand else super().remedy
-
-    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI | None:
-        """Generate the step that is shown for another view, and show that as long as it is."""
-        vdi = self.player.series.generate(self.player.step, camera, window_size)
-        self.player.replace(vdi)
-        return self.vdi()

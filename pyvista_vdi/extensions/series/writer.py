@@ -1,52 +1,49 @@
-"""Writes .vdis files, step by step."""
+"""Writes a series step by step, into a folder that others read meanwhile."""
 
 from __future__ import annotations
 
-import contextlib
+import errno
+import json
 import os
-from typing import TYPE_CHECKING, Any, BinaryIO
+import re
+import sys
+from pathlib import Path
+from typing import IO, Any
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming
-from pyvista_vdi.extensions.series import layout
-from pyvista_vdi.extensions.series.continuing import Begun
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming, warn_external
+from pyvista_vdi.extensions.series.archive import SERIES, Archive, head_bytes, name_of
+from pyvista_vdi.extensions.series.files import times_of
 from pyvista_vdi.extensions.series.generate import StepMaker
-from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
+from pyvista_vdi.extensions.series.series import check_range, checked_time, range_of
+from pyvista_vdi.io import check_write_options
+from pyvista_vdi.io.vdi_file.description import to_json
+from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
+from pyvista_vdi.model.whole_file import as_path, whole_file, with_suffix
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from pyvista_vdi.extensions.series.keywords import WriterOptions
+_NUMBERED = re.compile(r"\d{6,}\.vdi")
 
 
 class SeriesWriter:
-    """Writes a ``.vdis`` file while what it shows is still being computed.
+    """Writes a series while what it shows is still being computed.
 
-    Each step is on its way to the disk, with its checksum, when :meth:`append` returns: other
-    processes read it then, and it stays readable if this one is killed. :meth:`close` adds an
-    index, which only makes opening faster. A file that has steps already is not replaced unless
-    that is asked for.
+    It is a folder of numbered ``.vdi`` files, and ``series.json``, which has their times. Each step
+    is whole and on the disk when :meth:`append` returns: other processes read it then, and it stays
+    if this one is killed. A series that is there already is not replaced unless that is asked for,
+    and while one writer is at work another one is refused.
 
     Parameters
     ----------
     path : path-like
-        The target; its name ends in ``.vdis``.
+        The folder; its name ends in ``.vdis``.
     camera : pyvista.Camera or vtkCamera or Camera, optional
         The generating view V_O of volumes; not needed where VDIs are appended.
     window_size : (int, int), optional
         Width and height in pixels, likewise.
     precision : {"8-byte", "exact"}
-        Of the supersegments, see :meth:`VDI.with_precision`. Steps are written by their
-        differences for ``"8-byte"`` alone.
-    tolerance : float
-        With 0 steps are read to the last bit of their precision. Else colours times opacity, and
-        opacities, of each supersegment may differ by so much, 0 to 1, where that saves bytes.
-        (The option of :func:`pyvista_vdi.generate` of the same name keeps its default.)
-    key_every : int
-        After so many steps at most one is written that needs no other.
+        Of the supersegments, see :meth:`VDI.with_precision`.
     compression : {"zstd", "lz4", "deflate", "none"}
         As for :meth:`VDI.save`.
     level : int, optional
@@ -54,10 +51,10 @@ class SeriesWriter:
     device : str, int or device, optional
         Where volumes become VDIs.
     append : bool, default: False
-        Go on with the file, if it is there already: times must be above that of its last step,
-        camera, window size and classification the same, and so the four arguments above.
+        Continue the series, if it is there already: times must be above that of its last step,
+        camera, window size and classification the same.
     overwrite : bool, default: False
-        Replace the file at once, if it is there already.
+        Remove the series at once, if it is there already.
     **options
         For volumes: what :func:`pyvista_vdi.generate_series` takes, classification and ``client``
         included.
@@ -65,10 +62,10 @@ class SeriesWriter:
     Raises
     ------
     VDIFileError
-        If the target cannot be written, is there already (without ``append`` and ``overwrite``), or
-        its name ends in something else.
+        If the target cannot be written, is there already (without ``append`` and ``overwrite``), is
+        being written by another writer, or its name ends in something else.
     InvalidArgumentError
-        If an argument is out of its range, or not that of the file which is appended to.
+        If an argument is out of its range, or not that of the series which is continued.
     TypeError
         If a keyword is unknown.
 
@@ -86,14 +83,12 @@ class SeriesWriter:
         window_size: WindowSize | None = None,
         *,
         precision: str = "8-byte",
-        tolerance: float = 0.0,
-        key_every: int = KEY_EVERY,
         compression: str = "zstd",
         level: int | None = None,
         device: DeviceLike | None = None,
         append: bool = False,
         overwrite: bool = False,
-        **options: Unpack[WriterOptions],
+        **options: Any,
     ) -> None:
         self._make: StepMaker | None = None
         if (camera is None) != (window_size is None) or (options and camera is None):
@@ -102,26 +97,43 @@ class SeriesWriter:
                 "nor options of generation"
             )
         if camera is not None and window_size is not None:
-            self._make = StepMaker(
-                "SeriesWriter", camera, window_size, precision, device=device, **options
+            given = {"precision": precision, "device": device, **options}
+            self._make = StepMaker("SeriesWriter", camera, window_size, **given)
+        self._how = {"precision": precision, "compression": compression, "level": level}
+        check_write_options(name_of(0), self._how)
+        append, overwrite = checked_way(append, overwrite)
+        self.path = Path(os.path.realpath(with_suffix(as_path(path), (SERIES.suffix,), "a series")))
+        if self.path.is_file():
+            raise VDIFileError(
+                f"{self.path} is one file, and a series is written step by step into a folder: "
+                "choose another name, or move the file away"
             )
-        self._steps = StepsWriter(precision, tolerance, key_every, compression, level)
-        if self._make is not None and self._make.deferral.deferred:
-            self._steps.require_no_tolerance()
-        self.path = check_writable(with_suffix(as_path(path), (layout.SUFFIX,), "a series"))
-        self._begun = Begun.of(self.path, append, overwrite)
-        if self._begun is None:
-            with whole_file(self.path) as stream:
-                self._steps.begin(stream)
-        else:
-            self._steps.go_on(self._begun)
-            if self._make is not None:
-                self._begun.check_kept(self._make.deferral)
-        self._stream: BinaryIO | None = self.path.open("r+b")
-        if self._begun is None:
-            self._stream.seek(0, os.SEEK_END)
-        else:
-            self._stream.seek(self._begun.end)  # its index, if there is one, is written anew
+        self._times: list[float] = []
+        self._range: tuple[float, float] | None = None  # of the values that steps keep
+        self._before: Any = None  # the last step of an earlier run, to compare the next one with
+        self._lock: IO[bytes] | None = _locked(self.path)
+        try:
+            self._begin(append, overwrite)
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self, append: bool, overwrite: bool) -> None:
+        """Find what an earlier run has written, and refuse, remove or continue it."""
+        head = self.path / SERIES.head
+        numbered = [file for file in self.path.iterdir() if _NUMBERED.fullmatch(file.name)]
+        if overwrite:
+            for file in (head, *numbered):
+                file.unlink(missing_ok=True)
+        elif append and (numbered or head.exists()):
+            steps = Archive(self.path, SERIES)
+            self._times = list(times_of(steps))
+            if self._times:
+                self._before = steps[-1]
+                self._range = range_of(self._before)
+        elif numbered:
+            raise refused(self.path, f" with {len(numbered)} .vdi files")
+        self._write_times(self._times)
 
     def append(self, step: Any, time: float | None = None) -> VDI:
         """Write the next step.
@@ -136,7 +148,7 @@ class SeriesWriter:
         Returns
         -------
         VDI
-            What was written, before what ``tolerance`` takes from it.
+            What was written.
 
         Raises
         ------
@@ -144,10 +156,9 @@ class SeriesWriter:
             If the time does not ascend, a volume is given without camera and window, or what is
             appended to has another view or classification.
         VDIFileError
-            If the file is closed or cannot be written; what was finished stays readable.
+            If the writer is closed or the step cannot be written; the steps before stay.
         """
         time = self.checked_time(time)
-        assert self._stream is not None
         if not isinstance(step, VDI | DeferredVDI):
             if self._make is None:
                 raise InvalidArgumentError(
@@ -156,50 +167,41 @@ class SeriesWriter:
                 )
             with naming(f"step {len(self)}"):
                 step = self._make(step)
-        if self._begun is not None:
-            self._begun.check(step)
-            self._begun = None  # by what is written now, as in any file
-        begin, before = self._stream.tell(), len(self._steps)
-        try:
-            self._stream.truncate()  # half a step, or an index, of a run before
-            self._steps.write(self._stream, step, time)
-        except OSError as error:
-            self._undo(begin)
-            raise VDIFileError(
-                f"{self.path} could not be written: {error.strerror}; "
-                f"its {len(self._steps)} steps can be read"
-            ) from error
-        except BaseException:  # Ctrl-C, as others: half a step would part the index from the steps
-            if len(self._steps) == before:
-                self._stream.seek(begin)
-                self._stream.truncate()
-            raise
+        if self._before is not None:
+            check_goes_on(self.path, self._before, step)
+        if not self._times:
+            self._range = range_of(step)
+        check_range(step, self._range, f"number {len(self)}")
+        # The step first: one whose time is not known is none, and is replaced by the next
+        step.save(self.path / name_of(len(self)), **self._how)
+        self._write_times([*self._times, time])
+        self._before = None
         return step  # type: ignore[no-any-return]
 
     def checked_time(self, time: float | None) -> float:
         """Return the next step's time, or raise what :meth:`append` would raise for it."""
-        if self._stream is None:
+        if self._lock is None:
             raise VDIFileError(
                 f"{self.path} is closed: no step can be appended; make another SeriesWriter with "
-                "append=True to go on"
+                "append=True to continue"
             )
-        return self._steps.checked_time(time)
+        value = float(len(self)) if time is None else checked_time(time)
+        if self._times and not value > self._times[-1]:
+            raise InvalidArgumentError(
+                f"times must ascend; got {value} after {self._times[-1]}, that of the last step"
+            )
+        return value
+
+    def _write_times(self, times: list[float]) -> None:
+        with whole_file(self.path / SERIES.head) as stream:
+            stream.write(head_bytes(SERIES, {"times": times}))
+        self._times = times
 
     def close(self) -> None:
-        """Write the index, bring the file to the disk and close it; once is enough."""
-        stream, self._stream = self._stream, None
-        if stream is None:
-            return
-        try:
-            with stream:
-                stream.truncate()
-                self._steps.finish(stream)
-                stream.flush()
-                os.fsync(stream.fileno())
-        except OSError as error:
-            raise VDIFileError(
-                f"{self.path} could not be written: {error.strerror}; its steps can be read"
-            ) from error
+        """End: no step comes after, and others may write."""
+        lock, self._lock = self._lock, None
+        if lock is not None:
+            lock.close()
 
     def __enter__(self) -> SeriesWriter:
         return self
@@ -208,13 +210,74 @@ class SeriesWriter:
         self.close()
 
     def __len__(self) -> int:
-        return len(self._steps)
+        return len(self._times)
 
-    def _undo(self, begin: int) -> None:
-        """Take back a frame that could not be finished."""
-        stream, self._stream = self._stream, None
-        assert stream is not None
-        with contextlib.suppress(OSError):
-            stream.close()
-        with contextlib.suppress(OSError):
-            os.truncate(self.path, begin)
+
+def _locked(folder: Path) -> IO[bytes]:
+    """Return a file that is locked as long as it is open, and no longer than this process lives."""
+    try:
+        folder.mkdir(exist_ok=True)
+        stream = (folder / "writer.lock").open("ab")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise VDIFileError(
+            f"{folder} cannot be written: {reason}; choose another folder"
+        ) from error
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno not in (errno.EAGAIN, errno.EACCES, errno.EDEADLK):
+            warn_external(
+                f"{folder} is on a file system without locks ({error.strerror}): nothing keeps a "
+                "second writer from it, whose steps would replace these"
+            )
+            return stream
+        stream.close()
+        raise VDIFileError(
+            f"{folder} is being written by another SeriesWriter: close that, or end its process, "
+            "and try again; or choose another name"
+        ) from None
+    return stream
+
+
+def checked_way(append: Any, overwrite: Any) -> tuple[bool, bool]:
+    """Return both as truth values, or raise InvalidArgumentError if both are asked for."""
+    append, overwrite = as_flag(append, "append"), as_flag(overwrite, "overwrite")
+    if append and overwrite:
+        raise InvalidArgumentError(
+            "append=True continues a series and overwrite=True replaces it: pass one of them"
+        )
+    return append, overwrite
+
+
+def refused(path: Path, with_what: str) -> VDIFileError:
+    """Return the error by which a file is kept from being replaced."""
+    return VDIFileError(
+        f"{path} is there already{with_what}: pass append=True to go on with it, overwrite=True to "
+        "replace it, or another name"
+    )
+
+
+def check_goes_on(path: Any, before: Any, step: Any) -> None:
+    """Raise InvalidArgumentError if a VDI has another view or classification than one before."""
+    pairs: dict[str, tuple[Any, Any]] = {
+        name: (getattr(before, name, None), getattr(step, name, None))
+        for name in ("camera", "window_size", "value_range", "importance")
+    }
+    for name in ("transfer_function", "lights", "ambient_occlusion"):
+        said = (json.loads(to_json(vdi.metadata.get(name))) for vdi in (before, step))
+        pairs[name] = tuple(said)
+    for name, (had, has) in pairs.items():
+        if had != has:
+            raise InvalidArgumentError(
+                f"{path} cannot be continued: its {name} is {had!s:.99}, and that of this step "
+                f"{has!s:.99}; give the same view and classification (clim, too), or "
+                "begin another series"
+            )

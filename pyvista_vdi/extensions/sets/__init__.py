@@ -14,7 +14,7 @@ EXTENSION = Extension(
             ".vdiset",
             "pyvista_vdi.extensions.sets.files",
             holds="set",
-            magic=b"\x89VDIV\r\n\x1a",
+            head="set.json",
             verbs="pyvista_vdi.extensions.sets.cli",
         ),
     ),
@@ -24,15 +24,12 @@ EXTENSION = Extension(
     verbs=(
         Verb(
             "set",
-            "write VDIs of a volume from as many sides as pictures from everywhere need",
+            "write VDIs of a volume from several sides, of which the nearest is drawn",
             "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
             "pyvista_vdi.extensions.sets.cli:add_options",
             "pyvista_vdi.extensions.sets.cli:generate",
         ),
     ),
-    methods={
-        "VDISet.save": "pyvista_vdi.extensions.sets.files:save",
-        "VDISet.save_cinema": "pyvista_vdi.extensions.sets.cinema:write",
-    },
-    requires=("series",),  # whose files theirs are but for the head
+    methods={"VDISet.save": "pyvista_vdi.extensions.sets.files:save"},
+    requires=("series",),  # which are stored in the same way
 )

@@ -1,4 +1,4 @@
-"""What a mapper draws of a set: the VDIs nearest to the view, others decoded ahead, more made."""
+"""What a mapper draws of a set: the VDIs nearest to the view; others are read ahead."""
 
 from __future__ import annotations
 
@@ -6,52 +6,44 @@ import threading
 from typing import Any
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError
+from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.extensions.series.player import MEMORY, ON_DEVICE, Decoding, bring
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
+from pyvista_vdi.extensions.sets.vdi_set import MOST_BLENDED, VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.worker import Job, Worker
-from pyvista_vdi.raycasting.prepared import prepared_vdi
+from pyvista_vdi.quality.worker import Worker
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 
-#: How many of the VDIs nearest to a view are decoded.
+#: How many of the VDIs nearest to a view are read.
 _AHEAD = 8
-#: Degrees by which a view must have turned, or come nearer, until another is looked at to grow.
-_MOVED = 1.0
 
 
 class SetInput(Input):
     """The VDI of a set that is nearest to the view, or a blend of several.
 
-    :meth:`look` is told where the thread that draws looks from, and :meth:`advance` is called
-    between two frames. Another thread decodes what is nearest to the view, and brings it to the
-    device, as far as there is memory; a third makes VDIs of views that do not reach the set's
-    target.
+    :meth:`look` is told where the thread that draws looks from. Another thread reads what is
+    nearest to the view, and brings it to the device, as far as there is memory.
     """
 
     collection: VDISet
+    remedy = "generate a set with more views, or with views of this kind"
 
     def __init__(self, vdi_set: VDISet) -> None:
         super().__init__()
         self.collection = vdi_set
         self.memory: float = MEMORY
-        self._device: Any = None
-        self._view: Camera = vdi_set.cameras[0]
-        self._weights = vdi_set.weights(self._view)
+        self._weights = vdi_set.weights(vdi_set.cameras[0])
+        self._order = [i for i, _ in self._weights]  # all VDIs, the nearest first
         self._lock = threading.Lock()
         self._ready: dict[int, VDI] = {}
-        self._bytes: dict[int, float] = {}
         self._broken: set[int] = set()
         self._decoder = Worker("pyvista-vdi set")
-        self._grower = Worker("pyvista-vdi set's growth")
-        self._grown_for: Camera | None = None
         self._kept: dict[int, DeferredInput] = {}  # of what is drawn, where it keeps values
 
     def vdi(self) -> VDI | None:
-        """Return the nearest VDI, decoded now if it is not ready."""
+        """Return the nearest VDI, read now if it is not ready."""
         self._vdi = self._seen(self._weights[0][0])
         return self._vdi
 
@@ -88,31 +80,19 @@ class SetInput(Input):
 
     def rest(self) -> None:
         """Leave no thread; the next frame may begin anew."""
-        for worker in (self._decoder, self._grower):
-            worker.clear()
-            worker.join()
+        self._decoder.clear()
+        self._decoder.join()
         with self._lock:
             self._ready.clear()
-            self._bytes.clear()
 
-    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
-        """Choose what a view shows, and decode what is near it; grow where the picture lacks."""
-        self._view, self._device = camera, device
-        self._weights = self.collection.weights(camera)
+    def look(self, camera: Camera, device: Any) -> None:
+        """Choose what a view shows, and read what is near it."""
+        distances = self.collection.distances(camera)
+        with self._lock:
+            self._weights = self.collection.weights(camera)
+            self._order = [int(i) for i in distances.argsort(kind="stable")]
         if not self._decoder.running and self._wanted() is not None:
             self._decoder.put(Decoding(lambda on, _report: self._decode(on), device))
-        if growth == "later" and self._grower.running:
-            self._grower.clear()
-            self._grown_for = None
-        elif growth == "behind":
-            self._grow_behind()
-        elif growth == "now":
-            self._grow_now()
-
-    @property
-    def busy(self) -> bool:
-        """Whether a VDI is being made, or was made and :meth:`advance` has not taken it."""
-        return self._grower.job is not None
 
     def parts(self) -> list[tuple[VDI, float]]:
         """Return what a picture is blended of, with weights; the nearest first."""
@@ -138,69 +118,16 @@ class SetInput(Input):
             self._keep(i, known)
         return known
 
-    def _grow_behind(self) -> None:
-        """Generate a VDI of the view behind the frames, if its picture misses the target."""
-        view, before = self._view, self._grown_for
-        if self.busy or not self.collection.can_grow:
-            return
-        if before is not None and self.collection.apart(view, before) < _MOVED:
-            return
-        self._grown_for = view
-
-        def make(runtime: Runtime, _report: Any) -> list[VDI]:
-            vdi = self.collection.lacking(view)
-            if vdi is not None:
-                prepared_vdi(runtime, vdi)
-            return [] if vdi is None else [vdi]
-
-        self._grower.put(Job(make, self._device))
-
-    def _grow_now(self) -> None:
-        """Add a VDI of the view to the set, made first, if its picture misses the target."""
-        view = self._view
-        if view == self._grown_for or not self.collection.can_grow:
-            return
-        self._grown_for = view
-        vdi = self.collection.lacking(view)
-        if vdi is not None:
-            self.collection.add(vdi)
-            self._keep(len(self.collection) - 1, vdi)
-            self._weights = self.collection.weights(view)
-
-    def advance(self) -> bool:
-        """Add what was made to the set; whether there is another VDI to be drawn."""
-        made = self._grower.take()
-        for vdi in made or ():
-            self.collection.add(vdi)
-            self._keep(len(self.collection) - 1, vdi)
-        return bool(made)
-
-    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI:
-        """Add a VDI of a view to the set."""
-        if camera is None:
-            raise InvalidArgumentError(
-                "nothing shows this actor, so there is no view: pass camera, or add the actor to "
-                "a renderer first"
-            )
-        vdi = self.collection.generate(camera)
-        self.collection.add(vdi)
-        return vdi
-
-    def _order(self) -> list[int]:
-        """Return all VDIs, the nearest to the view first."""
-        return [int(i) for i in self.collection.distances(self._view).argsort(kind="stable")]
+    def _fitting(self) -> list[int]:
+        """Return the nearest VDIs that there is memory for, and at least those that are drawn."""
+        largest = max((1.0, *(v.nbytes * (1 + ON_DEVICE) for v in self._ready.values())))
+        return self._order[: max(MOST_BLENDED, min(_AHEAD, int(self.memory / largest)))]
 
     def _wanted(self) -> int | None:
-        """Return the next VDI to be decoded; None where enough are, or there is no memory."""
+        """Return the next VDI to be read; None where enough are."""
         with self._lock:
-            order, drawn = self._order(), dict(self._weights)
-            taken, each = sum(self._bytes.values()), max(self._bytes.values(), default=0.0)
-            last = max((order.index(k) for k in self._ready if k not in drawn), default=-1)
-            for rank, i in enumerate(order[:_AHEAD]):
-                if i not in self._ready and i not in self._broken:
-                    # In place of one that is farther, where memory is not enough
-                    return i if taken + each <= self.memory or rank < last else None
-        return None
+            known = self._ready.keys() | self._broken
+            return next((i for i in self._fitting() if i not in known), None)
 
     def _decode(self, runtime: Runtime) -> bool:
         while (i := self._wanted()) is not None and self._decoder.running:
@@ -217,12 +144,8 @@ class SetInput(Input):
         return True
 
     def _keep(self, i: int, vdi: VDI) -> None:
-        """Keep a decoded VDI, and let go of the farthest where memory is not enough."""
-        drawn = dict(self._weights)
+        """Keep a VDI that was read, and drop those that are far."""
         with self._lock:
-            self._ready[i], self._bytes[i] = vdi, vdi.nbytes * (1 + ON_DEVICE)
-            for k in reversed(self._order()):
-                if sum(self._bytes.values()) <= self.memory:
-                    break
-                if k in self._ready and k not in drawn and k != i:
-                    del self._ready[k], self._bytes[k]
+            self._ready[i] = vdi
+            near = self._fitting()
+            self._ready = {k: kept for k, kept in self._ready.items() if k in near or k == i}

@@ -3,53 +3,34 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import Any, Protocol, overload
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
-from pyvista_vdi.extensions.series.series import Made, as_step, check_range, range_of
+from pyvista_vdi.extensions.series.series import as_steps, mapped
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import each_of
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
 
-#: Degrees by which a V_O may be farther than the nearest and still be seen: benchmarks/sets.py.
+#: Degrees by which a V_O may be farther than the nearest and still be seen.
 BLEND = 6.0
 #: Tangent of half the angle of VTK's lens.
 _LENS = math.tan(math.radians(15))
-#: VDIs with other colours that are kept, as those that were decoded last are.
-_KEPT = 8
 #: Most V_Os that a picture is blended of.
 MOST_BLENDED = 3
-
-
-class Maker(Protocol):
-    """What makes VDIs of other views of the volume."""
-
-    def __call__(self, camera: Camera) -> VDI:
-        """Return a VDI of a view."""
-        ...
-
-    def lacking(self, vdi_set: VDISet, camera: Camera) -> VDI | None:
-        """Return a VDI of a view that does not reach what the set is to reach, else None."""
-        ...
 
 
 class VDISet(VDICollection):
     """The VDIs of one scene from many views V_O: a sequence of :class:`VDI`.
 
     Made by :func:`pyvista_vdi.generate_set`, by :func:`pyvista_vdi.read` from a ``.vdiset`` file,
-    whose VDIs are decoded when they are asked for, or by :meth:`of` from VDIs at hand; one that was
-    read is pickled as the name of its file.
+    whose VDIs are read when they are asked for, or by :meth:`of` from VDIs at hand; one that was
+    read is pickled as its path.
     :func:`pyvista_vdi.render`, :func:`pyvista_vdi.pick` and ``Plotter.add_vdi`` take it as they
     take a VDI, and look at that which was made nearest to the view.
 
@@ -63,8 +44,8 @@ class VDISet(VDICollection):
         Width and height of the pictures that it is for; by default the first VDI's.
     bounds : sequence of float, optional
         Of the VDIs, in the model frame; by default the first one's.
-    about : mapping, optional
-        What made it, as JSON can hold it: see :attr:`about`.
+    camera : Camera, optional
+        The view to begin with; by default the first V_O.
 
     Raises
     ------
@@ -79,10 +60,6 @@ class VDISet(VDICollection):
         As above.
     bounds : tuple of float
         As above.
-    about : dict
-        What made it. ``camera``; ``target_ssim``; ``chosen``: ``lists`` per pixel along an edge and
-        ``max_supersegments``; ``reached``: of how many ``directions`` the SSIM was measured, the
-        ``least`` and the ``mean``.
     """
 
     def __init__(
@@ -92,14 +69,14 @@ class VDISet(VDICollection):
         *,
         window_size: Sequence[int] | None = None,
         bounds: Sequence[float] | None = None,
-        about: Mapping[str, Any] | None = None,
+        camera: Any = None,
     ) -> None:
         if not isinstance(views, Sequence):
             raise InvalidArgumentTypeError(
                 f"views must be a sequence of VDIs, got {type(views).__name__}: pass a list"
             )
         if cameras is None:
-            cameras = [as_step(vdi).camera for vdi in views]
+            cameras = [vdi.camera for vdi in as_steps(views, "a set")]
         elif not np.iterable(cameras):
             raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
         cameras = [Camera.from_any(camera) for camera in cameras]
@@ -115,14 +92,10 @@ class VDISet(VDICollection):
         if given.shape != (6,) or not np.isfinite(given).all():
             raise InvalidArgumentError(f"bounds must be six finite numbers; got {bounds!r}")
         self.bounds: tuple[float, ...] = tuple(given.tolist())
-        if not isinstance(about, Mapping | None):
-            raise InvalidArgumentTypeError(f"about must be a mapping of names; got {about!r}")
-        self.about: dict[str, Any] = dict(about or {})
-        self._views, self._added = views, list[VDI]()
-        self._cameras = tuple(cameras)
+        self._views, self._cameras = views, tuple(cameras)
+        self._begin = self._cameras[0] if camera is None else Camera.from_any(camera)
         self._places = self._places_of(self._cameras)
         self._blend = BLEND
-        self._maker: Maker | None = None  # of the volume, where it is at hand
 
     @classmethod
     def of(cls, vdis: Iterable[VDI], *, window_size: Sequence[int] | None = None) -> VDISet:
@@ -142,11 +115,8 @@ class VDISet(VDICollection):
         InvalidVDIError
             If one is no VDI, or they are of other bounds than the first.
         """
-        if isinstance(vdis, VDI | DeferredVDI):
-            raise InvalidVDIError("a set is made of several VDIs: pass them in a list")
-        views = tuple(as_step(vdi) for vdi in each_of(vdis))
+        views = as_steps(vdis, "a set")
         for i, vdi in enumerate(views):
-            check_range(vdi, range_of(views[0]), f"view {i}")
             if vdi.bounds != views[0].bounds:
                 raise InvalidVDIError(
                     f"the VDIs of a set are of one scene: number {i} has the bounds "
@@ -156,12 +126,8 @@ class VDISet(VDICollection):
 
     @property
     def camera(self) -> Camera:
-        """The view to begin with, for pictures of :attr:`window_size`; else the first V_O.
-
-        Of a sphere the one that told distance and lens, of cameras the first.
-        """
-        stored = self.about.get("camera")
-        return self._cameras[0] if stored is None else Camera.from_dict(stored)
+        """The view to begin with, for pictures of :attr:`window_size`."""
+        return self._begin
 
     @property
     def picture_size(self) -> tuple[int, int]:
@@ -183,11 +149,7 @@ class VDISet(VDICollection):
     def __getitem__(self, index: int | slice) -> VDI | list[VDI]:
         if isinstance(index, slice):
             return [self[i] for i in range(len(self))[index]]
-        i, n = self._place(index, "VDIs"), len(self._views)
-        return self._views[i] if i < n else self._added[i - n]
-
-    def __iter__(self) -> Iterator[VDI]:
-        return (self[i] for i in range(len(self)))
+        return self._views[self._place(index, "VDIs")]
 
     @property
     def blend(self) -> float:
@@ -206,13 +168,12 @@ class VDISet(VDICollection):
         self._blend = value
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISet:
-        """Return a set of what a function makes of each VDI, when that is asked for."""
         found = VDISet(
-            Made(function, self, _KEPT),
+            mapped(function, self),
             self.cameras,
             window_size=self.window_size,
             bounds=self.bounds,
-            about=self.about,
+            camera=self.camera,
         )
         found.blend = self.blend
         return found
@@ -230,17 +191,6 @@ class VDISet(VDICollection):
             The view; its model transform places the set.
         """
         return _apart(self._places, self._places_of([Camera.from_any(camera)]))
-
-    def apart(self, one: Any, other: Any) -> float:
-        """Return how far the eyes of two views are from each other, as :meth:`distances` does.
-
-        Parameters
-        ----------
-        one, other : Camera or vtkCamera or pyvista.Camera
-            The views.
-        """
-        first, second = self._places_of([Camera.from_any(view) for view in (one, other)])
-        return float(_apart(first[None], second[None])[0])
 
     def nearest(self, camera: Any) -> int:
         """Return the index of the VDI whose V_O is nearest to a view; of two, the earlier.
@@ -281,110 +231,6 @@ class VDISet(VDICollection):
             The view.
         """
         return [(self[i], weight) for i, weight in self.weights(camera)]
-
-    @property
-    def can_grow(self) -> bool:
-        """Whether the volume is at hand, so that :meth:`generate` works: of files it is not."""
-        return self._maker is not None
-
-    def generate(self, camera: Any) -> VDI:
-        """Return a VDI of another view, made as those of the set were.
-
-        Parameters
-        ----------
-        camera : Camera or vtkCamera or pyvista.Camera
-            A view of the set's :attr:`window_size`; the VDI covers the whole volume.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the volume is not at hand.
-        """
-        if self._maker is None:
-            raise InvalidArgumentError(
-                "the volume of this set is not at hand: make it by generate_set, or generate VDIs "
-                "of the volume and add them"
-            )
-        return self._maker(Camera.from_any(camera))
-
-    def lacking(self, camera: Any) -> VDI | None:
-        """Return a VDI of a view, made if the set's picture of it misses the target, else None.
-
-        Parameters
-        ----------
-        camera : Camera or vtkCamera or pyvista.Camera
-            As for :meth:`generate`, whose error it has, too.
-        """
-        if self._maker is None:
-            return self.generate(camera)
-        return self._maker.lacking(self, Camera.from_any(camera))
-
-    def add(self, vdi: VDI) -> None:
-        """Add a VDI of the same scene, as from another thread.
-
-        Parameters
-        ----------
-        vdi : VDI
-            Of the same bounds.
-
-        Raises
-        ------
-        InvalidVDIError
-            If it has other bounds.
-        """
-        vdi = as_step(vdi)
-        check_range(vdi, self.value_range, "this one")
-        if vdi.bounds != self.bounds:
-            raise InvalidVDIError(
-                f"the VDIs of a set are of one scene: this one has the bounds {vdi.bounds}, the "
-                f"set {self.bounds}"
-            )
-        self._added.append(vdi)
-        self._cameras = (*self._cameras, vdi.camera)
-        # Last: threads that look for the nearest find no VDI that is not there yet
-        self._places = np.concatenate([self._places, self._places_of([vdi.camera])])
-
-    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdiset`` file, or a page that shows it; it appears whole or not at all.
-
-        :func:`pyvista_vdi.read` opens both.
-
-        Parameters
-        ----------
-        path : path-like
-            The target; its name ends in ``.vdiset``, or in ``.html``.
-        **options
-            ``precision`` (``"8-byte"``), ``tolerance`` (0), ``compression`` (``"zstd"``) and
-            ``level`` (1) as for :class:`pyvista_vdi.SeriesWriter`; ``progress``, called with the
-            finished fraction. For pages ``title``, ``background`` and ``controls`` as well.
-
-        Returns
-        -------
-        pathlib.Path
-            The file.
-
-        Raises
-        ------
-        VDIFileError
-            If the target cannot be written.
-        InvalidArgumentError
-            If an option is out of its range, or one is a look, which :meth:`classified` takes.
-        """
-        return registry.method("VDISet.save")(self, path, **options)  # type: ignore[no-any-return]
-
-    def save_cinema(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a Cinema database (specification D): a folder of pictures and their table.
-
-        See :func:`pyvista_vdi.extensions.sets.cinema.write`.
-        """
-        return registry.method("VDISet.save_cinema")(self, path, **options)  # type: ignore[no-any-return]
-
-    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
-        """Return what a notebook shows: a viewer, or a picture."""
-        text = {"text/plain": repr(self)}
-        if self.value_range is not None:  # pages show colours
-            return text
-        return registry.method("VDISet._repr_mimebundle_", lambda *_: text)(self, include, exclude)
 
     def __repr__(self) -> str:
         width, height = self.window_size

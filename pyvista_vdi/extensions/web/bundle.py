@@ -26,7 +26,7 @@ WORKER = "worker.js"
 SPAWN = "spawn.js"
 
 #: What reads and plays series, which pages without a series do not have.
-OF_SERIES = ("differences.js", "frames.js", "player.js", "series.js", "steps.js", "surround.js")
+OF_SERIES = ("player.js", "series.js", "surround.js")
 
 #: What edits the transfer function of values, which pages of colours do not have.
 OF_VALUES = ("editor.js",)

@@ -20,16 +20,15 @@ from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
+from pyvista_vdi.extensions.series.archive import SERIES, SET, write_to
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter, write_all
-from pyvista_vdi.extensions.sets.files import write_all as write_all_views
+from pyvista_vdi.extensions.sets.files import about
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.io.progress import Progress
-from pyvista_vdi.io.vdi_file import reader
+from pyvista_vdi.io.vdi_file import reader, writer
 from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.metrics import check_background, over_background
@@ -49,6 +48,8 @@ _STILL_EDGE, _STILL_QUALITY = 480, 75
 _PART = 3 << 20
 #: Bytes of a page within which its data begin: behind the still picture.
 _HEAD = 1 << 20
+#: Where in a ZIP its first member's name stands, and base64 text of all that may be looked for.
+_NAME_AT, _NAMES = 30, 128
 
 # To its end, or to that of a file that was cut
 _DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
@@ -107,7 +108,7 @@ class View:
     #: What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scenes.scene`
     scene: bytes | None = None
     attributes: dict[str, str] = field(default_factory=dict)  # of the element
-    #: Parts of a .vdis file; the first shows its first step. Or those of a .vdiset file
+    #: Parts of the file of a series or a set; the first shows its first VDI
     series: Sequence[bytes] = ()
     deferred: Mapping[str, Any] | None = None  # what lists that keep values are about
 
@@ -183,7 +184,7 @@ def assembled(
         if view.vdi is not None:
             stream = io.BytesIO()
             shown = progress if number == 0 else None
-            write_to(stream, view.vdi, DEFLATE, level, shown, deferred=view.deferred)
+            writer.write_to(stream, view.vdi, DEFLATE, level, shown, deferred=view.deferred)
             data = stream.getvalue()
             cut = _end_of_coarse(stream)
             files = [data[:cut], data[cut:]]
@@ -255,8 +256,6 @@ def write_series(
     path: str | os.PathLike[str],
     *,
     precision: str = "8-byte",
-    tolerance: float = 0.0,
-    key_every: int = KEY_EVERY,
     compression: str = DEFLATE,
     level: int | None = None,
     title: str | None = None,
@@ -269,17 +268,10 @@ def write_series(
 
     With ``autoplay`` it plays as soon as it is opened.
     """
-    target = Path(os.path.realpath(check_writable(Path(path))))
-    check_controls(controls)
     view = _view_of(series[0], background)
     view.attributes = {"autoplay": ""} if autoplay else {}
-    writer, stream = StepsWriter(precision, tolerance, key_every, compression, level), io.BytesIO()
-    cut = write_all(stream, writer, series, series.times, progress)
-    view.series = in_parts(stream.getvalue(), cut)
-    content = assembled([view], title=target.stem if title is None else title, controls=controls)
-    with whole_file(target) as out:
-        out.write(content)
-    return target
+    how = {"precision": precision, "compression": compression, "level": level}
+    return _write_several(view, path, series, title, controls, progress=progress, **how)
 
 
 def write_set(
@@ -287,26 +279,46 @@ def write_set(
     path: str | os.PathLike[str],
     *,
     precision: str = "8-byte",
-    tolerance: float = 0.0,
     compression: str = DEFLATE,
-    level: int = 1,
+    level: int | None = None,
     title: str | None = None,
     background: Sequence[float] = (0.0, 0.0, 0.0),
     controls: str = "all",
     progress: Progress | None = None,
 ) -> Path:
     """Write a page that shows a set: see :meth:`pyvista_vdi.VDISet.save`, and :func:`page`."""
-    target = Path(os.path.realpath(check_writable(Path(path))))
-    check_controls(controls)
     view = _view_of(vdi_set[vdi_set.nearest(vdi_set.camera)], background)
     view.still_size = vdi_set.window_size
-    writer, stream = StepsWriter(precision, tolerance, 1, compression, level), io.BytesIO()
-    cut = write_all_views(stream, writer, vdi_set, progress)
-    view.series = in_parts(stream.getvalue(), cut)
+    how = {"precision": precision, "compression": compression, "level": level}
+    return _write_several(view, path, vdi_set, title, controls, progress=progress, **how)
+
+
+def _write_several(
+    view: View,
+    path: str | os.PathLike[str],
+    vdis: VDISeries | VDISet,
+    title: str | None,
+    controls: str,
+    **how: Any,
+) -> Path:
+    """Write a page of a series or a set that a viewer shows."""
+    target = Path(os.path.realpath(check_writable(Path(path))))
+    check_controls(controls)
+    view.series = in_parts(*several(vdis, **how))
     content = assembled([view], title=target.stem if title is None else title, controls=controls)
     with whole_file(target) as out:
         out.write(content)
     return target
+
+
+def several(vdis: VDISeries | VDISet, **how: Any) -> tuple[bytes, int]:
+    """Return the file of a series or a set, and how many bytes of it show its first VDI."""
+    stream = io.BytesIO()
+    if isinstance(vdis, VDISeries):
+        cut = write_to(stream, SERIES, {"times": vdis.times}, vdis, **how)
+    else:
+        cut = write_to(stream, SET, about(vdis), vdis, **how)
+    return stream.getvalue(), cut
 
 
 def check_controls(controls: str) -> dict[str, str]:
@@ -317,7 +329,7 @@ def check_controls(controls: str) -> dict[str, str]:
 
 
 def in_parts(data: bytes, cut: int) -> list[bytes]:
-    """Return the parts in which a page holds a .vdis or .vdiset file; the first has ``cut`` bytes.
+    """Return the parts in which a page holds a series or a set; the first has ``cut`` bytes.
 
     Or a few more: base64 text is decoded by threes of bytes.
     """
@@ -335,22 +347,22 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     return reader.read_info(path, stream=data_in(path))
 
 
-def begins_with(path: str | os.PathLike[str], magic: bytes) -> bool:
-    """Whether the file in a page begins so; False where there is none."""
+def begins_with(path: str | os.PathLike[str], head: str) -> bool:
+    """Whether the file in a page is a ZIP whose first member has that name."""
     try:
         with Path(path).open("rb") as stream:
             found = _DATA.search(stream.read(_HEAD))
     except (OSError, TypeError, ValueError):
         return False
-    text = found[1].lstrip()[: -(-len(magic) // 3) * 4] if found else b""
+    text = found[1].lstrip()[:_NAMES] if found else b""
     try:
-        return base64.b64decode(text).startswith(magic)
+        return base64.b64decode(text)[_NAME_AT:].startswith(head.encode())
     except binascii.Error:
         return False
 
 
 def data_in(path: str | os.PathLike[str]) -> BinaryIO:
-    """Return the .vdi file in a page, or the .vdis one."""
+    """Return the file in a page, of a VDI, a series or a set."""
     try:
         content = Path(path).read_bytes()
     except (OSError, TypeError, ValueError) as error:

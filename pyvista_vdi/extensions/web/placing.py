@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.extensions.series.series import Called, VDISeries
-from pyvista_vdi.extensions.series.steps_writer import KEY_EVERY, StepsWriter
-from pyvista_vdi.extensions.series.steps_writer import write_all as write_series
-from pyvista_vdi.extensions.sets.files import write_all as write_set
+from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.vdi import VDI
@@ -91,19 +88,23 @@ def array_of(matrix: Any) -> NDArray[np.float64]:
 
 
 #: Of deflate: files are a hundredth longer than by 6, its default, in half the time.
-_EFFORT = 4
+EFFORT = 4
 
 
-def encoded(vdi: VDI, *, coarse: bool = False) -> bytes:
-    """Return the file of a VDI in the 8-byte form, deflated.
+def bare(vdi: VDI) -> VDI:
+    """Return a VDI in the 8-byte form without metadata, of which a page need know nothing.
 
-    It has no metadata: a table of 4096 colours would be longer than a small VDI, and a page need
-    not know what made it. Nor has it a coarse level, unless that is asked for.
+    A table of 4096 colours would be longer than a small VDI.
     """
     bare = copy.copy(vdi.with_precision("8-byte"))
     bare.metadata = {}
+    return bare
+
+
+def encoded(vdi: VDI, *, coarse: bool = False) -> bytes:
+    """Return the file of a bare VDI, deflated, with or without its coarse level."""
     stream = io.BytesIO()
-    write_to(stream, bare, "deflate", _EFFORT, coarse=coarse)
+    write_to(stream, bare(vdi), "deflate", EFFORT, coarse=coarse)
     return stream.getvalue()
 
 
@@ -114,22 +115,4 @@ def several_of(actor: Any) -> VDISeries | VDISet | None:
         shown = shown.classified(volume_property=actor.GetProperty())
     if shown is None or multiplier == 1:
         return shown
-    vdis = Called(lambda i: thinned(shown[i], multiplier), range(len(shown)))
-    if actor.series is not None:
-        return VDISeries(vdis, shown.times)
-    size, bounds = shown.window_size, shown.bounds
-    return VDISet(vdis, shown.cameras, window_size=size, bounds=bounds, about=shown.about)
-
-
-def encoded_many(shown: VDISeries | VDISet) -> tuple[bytes, int]:
-    """Return the file of a series or a set, and how many bytes of it show its first VDI.
-
-    In the 8-byte form, by zstd.
-    """
-    stream = io.BytesIO()
-    if isinstance(shown, VDISeries):
-        writer = StepsWriter("8-byte", 0.0, KEY_EVERY, "deflate", None)
-        cut = write_series(stream, writer, shown, shown.times, None)
-    else:
-        cut = write_set(stream, StepsWriter("8-byte", 0.0, 1, "deflate", None), shown)
-    return stream.getvalue(), cut
+    return shown._mapped(lambda vdi: thinned(vdi, multiplier))

@@ -17,7 +17,7 @@ import secrets
 import threading
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import SplitResult, quote, urlsplit
 
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
@@ -30,11 +30,6 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from pyvista_vdi.extensions.series.keywords import Look
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web
@@ -379,7 +374,7 @@ def serve(
     device: DeviceLike | None = None,
     announce: Callable[[str], object] | None = print,
     wait: bool = True,
-    **classification: Unpack[Look],
+    **classification: Any,
 ) -> Server:
     """Serve VDIs of a volume to web pages, which draw them at their own rate.
 

@@ -16,8 +16,8 @@ from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, camera_of, viewer_camera
-from pyvista_vdi.extensions.web.page import check_controls, edited, refuse_look
-from pyvista_vdi.extensions.web.placing import encoded_many
+from pyvista_vdi.extensions.web.page import check_controls, edited, refuse_look, several
+from pyvista_vdi.extensions.web.placing import EFFORT, bare
 from pyvista_vdi.extensions.web.still import picture, stand_in, still
 from pyvista_vdi.io import write_png
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
@@ -356,7 +356,7 @@ class VDIWidget(anywidget.AnyWidget):
         if vdi is None:
             return b""
         if not isinstance(vdi, VDI | DeferredVDI):
-            return encoded_many(vdi)[0]
+            return several(vdi._mapped(bare), compression="deflate", level=EFFORT)[0]
         fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
         sent: Any = vdi.with_precision(self._precision or "8-byte") if fits else vdi
         about = None

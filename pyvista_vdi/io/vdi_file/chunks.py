@@ -187,21 +187,6 @@ def workers() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(_n_threads())
 
 
-def chunk_sizes(data: bytes, layout: Layout, codec: str) -> list[int]:
-    """Return the bytes of each chunk of an array that says so only in the chunks' own headers.
-
-    Raises DamagedChunkError if the headers are not those of such an array.
-    """
-    view, sizes, begin = memoryview(data), [], 0
-    for first in range(0, layout.n_rows, layout.chunk_rows):
-        raw = min(layout.chunk_rows, layout.n_rows - first) * layout.row_bytes
-        sizes.append(raw if codec == "none" else chunk_size(view[begin:], raw, codec))
-        begin += sizes[-1]
-        if begin > len(view):
-            raise DamagedChunkError(f"the data end before row {first + layout.chunk_rows}")
-    return sizes
-
-
 def chunk_size(view: memoryview, raw: int, codec: str) -> int:
     """Return the bytes of the compressed chunk that begins here, its header checked.
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-#: Highest version of the format; files of this and of lower versions are read.
-FORMAT_VERSION = 4
+#: Highest version of the format, and the lowest that is read.
+FORMAT_VERSION, LEAST_VERSION = 4, 2
 
 #: What is written for each precision: version 3 only where version 2 has no place for it.
 _VERSION_OF = {"exact": 2, "8-byte": 3}
@@ -22,9 +22,9 @@ _VERSION_OF = {"exact": 2, "8-byte": 3}
 #: The codec of version 4, which browsers decode by themselves, and the version of no other.
 DEFLATE = "deflate"
 
-#: Rows of an array in one chunk, for each version. What one chunk holds of all arrays, 1.5 MiB,
+#: Rows of an array in one chunk. What one chunk holds of all arrays, 1.5 MiB,
 #: stays in a core's cache until it has been decoded; larger chunks do not compress better.
-CHUNK_ROWS = {1: 1 << 18, 2: 1 << 16, 3: 1 << 16, 4: 1 << 16}
+CHUNK_ROWS = 1 << 16
 
 #: What a description calls the format.
 FORMAT_NAME = "pyvista-vdi"
@@ -45,7 +45,7 @@ DESCRIPTION = "vdi.json"
 COARSE = "coarse.vdi"
 COARSE_STEP = 4
 
-#: The archive's last member, since version 2: bytes and CRC-32 of every chunk, in the order of
+#: The archive's last member: bytes and CRC-32 of every chunk, in the order of
 #: the arrays. A chunk is found, read and checked by itself.
 INDEX = "chunks"
 INDEX_DTYPE = np.dtype([("bytes", "<u4"), ("crc32", "<u4")])
@@ -106,11 +106,11 @@ def layouts(
 
     ``window_size``: W and H. ``n``: supersegments in all lists. ``counts``: type of the lists'
     lengths, as small as they allow. ``filtered``: whether depths are stored as differences.
-    ``version``: of the format. In version 1 front and back were one array. ``precision``: one of
+    ``version``: of the format. ``precision``: one of
     :data:`pyvista_vdi.model.packing.PRECISIONS`; packed since version 3.
     """
     n_lists = window_size[0] * window_size[1]
-    rows = CHUNK_ROWS[version]
+    rows = CHUNK_ROWS
     counts_layout = Layout(counts, (), n_lists, "none", rows)
     if precision == "8-byte":
         u2 = np.dtype("<u2")
@@ -126,11 +126,7 @@ def layouts(
         }
     f4, kind = np.dtype("<f4"), "difference" if filtered else "none"
     depth = np.dtype("<u4") if filtered else f4
-    depths = (
-        {"depth": Layout(depth, (2,), n, kind, rows)}
-        if version == 1
-        else {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")}
-    )
+    depths = {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")}
     return {
         "counts": counts_layout,
         **depths,

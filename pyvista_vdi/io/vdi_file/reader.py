@@ -23,7 +23,6 @@ from pyvista_vdi.io.vdi_file.chunks import (
     CODECS,
     DamagedChunkError,
     PackedArray,
-    chunk_sizes,
     workers,
 )
 from pyvista_vdi.io.vdi_file.description import from_json, number
@@ -36,6 +35,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     FORMAT_VERSION,
     INDEX,
     INDEX_DTYPE,
+    LEAST_VERSION,
     MAX_DESCRIPTION_BYTES,
     Layout,
     layouts,
@@ -59,7 +59,7 @@ _NAME_AT = 30
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
 
 #: What zipfile raises, beside its own error, for archives that are not well formed.
-_ARCHIVE_ERRORS = (
+ARCHIVE_ERRORS = (
     zipfile.BadZipFile,
     EOFError,
     NotImplementedError,
@@ -180,8 +180,7 @@ class _OpenFile:
                 if info.precision == "8-byte":
                     stored = self._decoded_codes(packed, pool, progress)
                     offsets = counts.result()
-                    rows = CHUNK_ROWS[info.format_version]
-                    packing = packed_8(info.depth_step, offsets, stored, rows)
+                    packing = packed_8(info.depth_step, offsets, stored, CHUNK_ROWS)
                     media = packing.media(np.diff(offsets).astype(np.int64))
                 else:
                     media = self._decoded_media(packed, pool, progress)
@@ -217,7 +216,7 @@ class _OpenFile:
             )
         try:
             archive = zipfile.ZipFile(self._stream)
-        except _ARCHIVE_ERRORS as error:
+        except ARCHIVE_ERRORS as error:
             raise VDIFileError(
                 f"{self._path} is truncated: the directory at its end is missing or damaged "
                 f"({error}); {_REMEDY}"
@@ -247,6 +246,11 @@ class _OpenFile:
         version = description.get("version")
         if isinstance(version, bool) or not isinstance(version, int) or version < 1:
             self._refuse(f"its format version is {version!r}")
+        if version < LEAST_VERSION:
+            raise VDIFileError(
+                f"{self._path} is of format version {version}, which is not read any more (from "
+                f"{LEAST_VERSION} on): generate the VDI anew"
+            )
         if version > FORMAT_VERSION:
             raise VDIFileError(
                 f"{self._path} is of format version {version}, written by "
@@ -279,9 +283,8 @@ class _OpenFile:
                 self._refuse(f"its codec {d['codec']!r} is unknown")
             if (d["codec"] == DEFLATE) != (d["version"] >= 4):
                 self._refuse(f"version {d['version']} has no codec {d['codec']!r}")
-            rows = CHUNK_ROWS[d["version"]]
-            if d["chunk_rows"] != rows:
-                self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {rows}")
+            if d["chunk_rows"] != CHUNK_ROWS:
+                self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {CHUNK_ROWS}")
             n_lists = window_size[0] * window_size[1]
             if d.get("precision") == "16-byte":
                 raise VDIFileError(
@@ -368,23 +371,14 @@ class _OpenFile:
         def decode(first: int, last: int) -> None:
             rows = {name: array[first:last] for name, array in media.items()}
             front, back = rows["front"], rows["back"]
-            if self.info.format_version == 1:
-                # Decode (front, back), each bit pattern less the one before
-                depth = packed["depth"]
-                stored = np.empty((len(front), 2), depth.layout.dtype)
-                depth.read(first, stored)
-                if depth.layout.filter == "difference":
-                    np.cumsum(stored, dtype=np.uint32, out=stored.reshape(-1))
-                front[:], back[:] = stored.view(np.float32).T
-            else:
-                packed["front"].read(first, front)
-                packed["back"].read(first, back)
-                if packed["back"].layout.filter == "difference":
-                    # Decode fronts less the back before them, and backs less their own fronts
-                    gap, thickness = front.view(np.uint32), back.view(np.uint32).copy()
-                    gap += thickness
-                    np.cumsum(gap, dtype=np.uint32, out=back.view(np.uint32))
-                    np.subtract(back.view(np.uint32), thickness, out=gap)
+            packed["front"].read(first, front)
+            packed["back"].read(first, back)
+            if packed["back"].layout.filter == "difference":
+                # Decode fronts less the back before them, and backs less their own fronts
+                gap, thickness = front.view(np.uint32), back.view(np.uint32).copy()
+                gap += thickness
+                np.cumsum(gap, dtype=np.uint32, out=back.view(np.uint32))
+                np.subtract(back.view(np.uint32), thickness, out=gap)
             for name in ("color", "optical_depth"):
                 packed[name].read(first, rows[name])
 
@@ -421,17 +415,6 @@ class _OpenFile:
     def _packed(self) -> dict[str, PackedArray]:
         """Return the arrays as the file holds them, their chunks known and possible."""
         info, packed = self.info, {}
-        if info.format_version == 1:
-            # Read and check each member as a whole; the chunks' own headers say how long they are
-            for name, layout in self._layouts.items():
-                data = self._read_member(name, info.file_bytes)
-                try:
-                    sizes = chunk_sizes(data, layout, info.codec)
-                except DamagedChunkError as error:
-                    self._refuse(f"array {name!r}: {error}")
-                cut = partial(lambda view, _, begin, end: view[begin:end], memoryview(data))
-                packed[name] = PackedArray(name, layout, info.codec, sizes, len(data), cut)
-            return packed
         # Read the index; every chunk is read from the file when it is decoded
         n_chunks = sum(layout.n_chunks for layout in self._layouts.values())
         content = self._read_member(INDEX, info.file_bytes)
@@ -483,7 +466,7 @@ class _OpenFile:
         member = self._member(name, limit)
         try:
             data = self._archive.read(member)
-        except _ARCHIVE_ERRORS as error:
+        except ARCHIVE_ERRORS as error:
             self._refuse(f"its member {name!r}: {error}")
         if len(data) != member.file_size:
             self._refuse(f"its member {name!r} ends after {len(data)} bytes")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, smallest, write_chunks
+from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -29,7 +30,6 @@ from pyvista_vdi.io.vdi_file.layout import (
     version_of,
 )
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.list_subsampling import coarser
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
     Packed8,
@@ -100,24 +100,25 @@ def write_to(
     effort = DEFAULT_LEVELS[compression] if level is None else level
     done = Pieces(progress, sum(layout.n_chunks for layout in arrays.values()))
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
-        archive.writestr(_member(DESCRIPTION), description)
+        archive.writestr(stored(DESCRIPTION), description)
         shrinks = min(vdi.window_size) >= COARSE_STEP and int(vdi.counts.max()) <= DEPTH_CODES
         if coarse and compression == DEFLATE and shrinks and deferred is None:
             small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
             few = io.BytesIO()
             write_to(few, small, DEFLATE, effort, coarse=False)
-            archive.writestr(_member(COARSE), few.getvalue())
+            archive.writestr(stored(COARSE), few.getvalue())
         index: list[tuple[int, int]] = []
         for name, layout in arrays.items():
-            with archive.open(_member(name), "w", force_zip64=True) as member:
+            with archive.open(stored(name), "w", force_zip64=True) as member:
                 encoded = _encoder(name, layout, vdi, counts)
                 index += write_chunks(member, layout, compression, effort, encoded, done)
-        archive.writestr(_member(INDEX), np.array(index, INDEX_DTYPE).tobytes())
+        archive.writestr(stored(INDEX), np.array(index, INDEX_DTYPE).tobytes())
 
 
-def _member(name: str) -> zipfile.ZipInfo:
+def stored(name: str) -> zipfile.ZipInfo:
+    """Return how a member is written: the same bytes at any time, on every system."""
     info = zipfile.ZipInfo(name, date_time=_NO_TIME)
-    info.create_system = 3  # the same bytes on every system
+    info.create_system = 3
     info.external_attr = 0o644 << 16
     return info
 
@@ -138,7 +139,7 @@ def _described(
             **entries,
             **packed,
             "codec": codec,
-            "chunk_rows": CHUNK_ROWS[version],
+            "chunk_rows": CHUNK_ROWS,
             "arrays": {name: layout.to_dict() for name, layout in arrays.items()},
             "metadata": metadata,
         }

@@ -34,7 +34,15 @@ class _Slice(NamedTuple):
 
 def dicom(path: Path) -> list[VolumeInFile]:
     """Return the series of a folder, or that of a file of several frames."""
-    series, damaged, refused, found = defaultdict(list), [], [], []
+    import pydicom
+
+    with pydicom.config.disable_value_validation():  # else it warns of each long number
+        return _series(path)
+
+
+def _series(path: Path) -> list[VolumeInFile]:
+    series, damaged, found = defaultdict(list), [], []
+    refused: list[tuple[int, VDIError]] = []
     files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
     for file in files:
         try:
@@ -42,8 +50,6 @@ def dicom(path: Path) -> list[VolumeInFile]:
                 series[one.header.get("SeriesInstanceUID", "")].append(one)
         except UnsupportedError as error:
             refused.append((len(files), error))
-        except ImportError:
-            raise
         except Exception as error:  # damage shows at whatever pydicom comes to first
             damaged.append(f"{file} cannot be read as a DICOM slice: {error}")
     if damaged and series:
@@ -51,23 +57,20 @@ def dicom(path: Path) -> list[VolumeInFile]:
             f"{len(damaged)} of {len(files)} files in the folder {path} are left out, as they "
             f"are damaged; the first: {damaged[0]}"
         )
-    names = [str(those[0].header.get("SeriesDescription", "")) for those in series.values()]
-    for name, (uid, those) in zip(names, series.items(), strict=True):
-        said = f"{name} {uid}".strip() if names.count(name) > 1 else name or uid
+    for uid, those in series.items():
         try:
-            found.append(_volume(path, those, said))
+            name = str(those[0].header.get("SeriesDescription") or uid)
+            found.append(_volume(path, those, name))
         except VDIError as error:
             refused.append((len(those), error))
     if not found and refused:
         raise max(refused, key=lambda each: each[0])[1]
     if not found:
-        none = (
-            f"{path} holds no slices ({len(files)} files, no DICOM image, TIFF or PNG among them)"
-        )
-        raise InvalidVolumeError(damaged[0] if damaged else f"{none}: give the folder that does")
-    for count, error in refused:
+        none = f"{path} holds no slices ({len(files)} files, none is DICOM, TIFF or PNG): give the"
+        raise InvalidVolumeError(damaged[0] if damaged else f"{none} folder that holds them")
+    for count, why in refused:
         if count > 1:
-            warn_external(f"a series of {count} slices is left out: {error}")
+            warn_external(f"a series of {count} slices is left out: {why}")
     return found
 
 
@@ -136,7 +139,7 @@ def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
             f"{what} do not say where they lie or how they are turned: rows are taken to run along "
             f"y, slices along z, {apart:g} apart, in an order that may be the wrong one"
         )
-        array = stack(slices, lambda one: read(one)[::-1])
+        array = stack(slices, lambda one: read(one)[::-1], mixed=True)
         return VolumeInFile(array, "zyx", to_world((columns, rows, apart)), name, "mm")
     if any(
         not np.array_equal(one.spacing, first.spacing)
@@ -163,7 +166,7 @@ def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
     # The step is along the normal, unless a gantry was tilted
     step = (slices[-1].position - slices[0].position) / len(gaps)
     place = to_world(np.column_stack([along * columns, down * rows, step]), slices[0].position)
-    return VolumeInFile(stack(slices, read), "zyx", place, name, "mm")
+    return VolumeInFile(stack(slices, read, mixed=True), "zyx", place, name, "mm")
 
 
 def _decoded(file: Path) -> tuple[Any, NDArray[Any]]:
@@ -196,7 +199,7 @@ def _pixels(decoded: Callable[[Path], tuple[Any, NDArray[Any]]], one: _Slice) ->
         found: NDArray[Any] = pydicom.pixels.apply_modality_lut(values, data)
         return found
     slope, intercept = one.line
-    if one.line == (1, 0):
+    if slope == 1 and intercept == 0:
         return values
     if slope.is_integer() and intercept.is_integer():
         # By what may be stored, so that the slices of a series have one type

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
+from pyvista_vdi.errors import InvalidVolumeError, warn_external
 from pyvista_vdi.io.axes import in_one_unit, one_unit, to_world
 from pyvista_vdi.io.time_steps import natural_key
 from pyvista_vdi.io.volumes.dicom import dicom
-from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of, stack
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of, stack
 from pyvista_vdi.model.host_memory import aligned_empty
 
 #: Units of length in NIfTI, types in MRC, and what OME and ImageJ call a micrometre.
@@ -39,7 +39,7 @@ def nrrd(file: Path) -> list[VolumeInFile]:
     header: Any = {}
     if not re.search(r"(?im)^(data ?file: *(LIST|\S*%)|axis ?m)", head):
         header = nrrd.read_header(str(file))
-    if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space"}:
+    if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space", "???"}:
         array, axes, place = _by_itk(file)
         # ITK turns frames that grow to the right and the front: turn them back
         space = "".join(re.findall(r"(?im)^space: *(\S+)", head)).lower()
@@ -57,8 +57,8 @@ def nrrd(file: Path) -> list[VolumeInFile]:
     place = to_world(np.transpose(steps), header.get("space origin", np.zeros(3)))
     units = [str(unit) for unit in header.get("space units", header.get("units", ("", "", "")))]
     dtype = np.dtype(nrrd.reader._determine_datatype(header)).newbyteorder("=")
-    array = Lazy(header["sizes"][::-1].tolist(), dtype, read)
-    return [VolumeInFile(array, "zyx", place, str(header.get("content", "")), one_unit(units))]
+    lazy = Lazy(header["sizes"][::-1].tolist(), dtype, read)
+    return [VolumeInFile(lazy, "zyx", place, str(header.get("content", "")), one_unit(units))]
 
 
 def _by_itk(file: Path) -> tuple[NDArray[Any], str, NDArray[np.float64]]:
@@ -94,13 +94,14 @@ def nifti(file: Path) -> list[VolumeInFile]:
     head = head_of(file.with_name(re.sub(r"(?i)\.img(?=$|\.)", ".hdr", file.name)))
     order = "<" if head[:4] == b"\x5c\x01\0\0" else ">"
     real, short = (partial(np.frombuffer, head, f"{order}{kind}") for kind in ("f4", "i2"))
-    quaternion, sform = short(2, 252)
-    _require_bytes(file, int(real(1, 108)[0]) + array.size * int(short(1, 72)[0]) // 8)
-    steps = np.abs(real(3, 80).astype(np.float64))
+    n, *counts = short(8, 40).tolist()
+    points, bits = np.prod(counts[:n], dtype=object), int(short(1, 72)[0])
+    _require_bytes(file, int(real(1, 108)[0]) + points * bits // 8)
     slope, shift = real(2, 112)
     if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
         array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled
-    steps[steps == 0], unit = 1.0, _UNITS.get(head[123] & 7, "")
+    steps, (quaternion, sform) = np.abs(real(3, 80).astype(np.float64)), short(2, 252)
+    steps[steps == 0] = 1.0
     if head[344:347] not in (b"n+1", b"ni1"):
         return [VolumeInFile(array, axes, to_world(steps), unit="mm")]
     if sform > 0:
@@ -110,15 +111,14 @@ def nifti(file: Path) -> list[VolumeInFile]:
         place = to_world(turn * steps, real(3, 268))
     else:
         place = to_world(steps)
-    return [VolumeInFile(array, axes, place, unit=unit)]
+    return [VolumeInFile(array, axes, place, unit=_UNITS.get(head[123] & 7, ""))]
 
 
 def _require_bytes(file: Path, count: int) -> None:
-    """Refuse a file of values that is cut off, or changed where gzip has a checksum."""
-    values = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name))
+    """Refuse a file of values that ITK would fill with zeros, or that gzip's checksum refuses."""
+    values, size = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name)), 0
     with values.open("rb") as stream:
         packed = stream.read(2) == b"\x1f\x8b"
-    size = 0
     with gzip.open(values) if packed else values.open("rb") as stream:
         while part := stream.read(1 << 24):
             size += len(part)
@@ -146,14 +146,14 @@ def mrc(file: Path) -> list[VolumeInFile]:
     if not origin.any():  # CCP4's maps have whole voxels in place of an origin
         origin = step * [words[4 + axes.index(a)] for a in "xyz"]
     dtype, begin = np.dtype(f"{order}{_MODES[mode]}"), 1024 + int(words[23])
-    array = np.fromfile(file, dtype, int(np.prod(shape)), offset=begin).reshape(shape)
+    array = np.fromfile(file, dtype, offset=begin)[: np.prod(shape)].reshape(shape)
     return [VolumeInFile(array, axes[::-1], to_world(step, origin), unit="angstrom")]
 
 
 def numpy(file: Path) -> list[VolumeInFile]:
     """Return the array of an .npy file, or those of three axes in an .npz file."""
     if file.suffix.lower() == ".npz":
-        with np.lib.npyio.NpzFile(file) as packed:  # which refuses objects
+        with file.open("rb") as stream, np.lib.npyio.NpzFile(stream) as packed:  # no objects
             return [_array(packed[name], name) for name in packed if packed[name].ndim > 2]
     return [_array(np.lib.format.open_memmap(file, mode="r"))]
 
@@ -165,7 +165,7 @@ def _array(array: NDArray[Any], name: str = "") -> VolumeInFile:
 
 
 def tiff(file: Path) -> list[VolumeInFile]:
-    """Return the series of three axes, with their levels; the top row is the last along y."""
+    """Return the series of three axes; the top row is the last along y."""
     import tifffile
 
     def read(number: int, down: int) -> NDArray[Any]:
@@ -174,16 +174,16 @@ def tiff(file: Path) -> list[VolumeInFile]:
         return values if calibrated is None else (values * slope + shift).astype(calibrated)
 
     found = []
-    with tifffile.TiffFile(file) as stack:
-        calibrated, slope, shift = _calibration(stack)
-        many = len(stack.series) > 1
-        for number, series in enumerate(stack.series):
+    with tifffile.TiffFile(file) as opened:
+        calibrated, slope, shift = _calibration(opened)
+        many = len(opened.series) > 1
+        for number, series in enumerate(opened.series):
             axes = _axes(series)
             if not {*"zyx"} <= {*axes} or series.keyframe.is_reduced:
                 continue
             lazy = partial(read, number, axes.index("y"))
             array = Lazy(series.shape, calibrated or series.dtype, lazy)
-            size, unit, channels = _described(stack, number, series)
+            size, unit, channels = _described(opened, number, series)
             name = series.name if many else ""
             found.append(VolumeInFile(array, axes, to_world(size), name, unit, channels))
     return found
@@ -196,48 +196,49 @@ def _axes(series: Any) -> str:
     return "z".join(axes.rsplit(unnamed, 1)) if unnamed else axes
 
 
-def _calibration(stack: Any) -> tuple[Any, float, float]:
+def _calibration(opened: Any) -> tuple[Any, float, float]:
     """Return what ImageJ's values are of and by which line; it keeps signed ones as unsigned."""
-    said = (stack.imagej_metadata or {}) if stack.is_imagej else {}
+    said = (opened.imagej_metadata or {}) if opened.is_imagej else {}
     shift, slope = float(said.get("c0", 0.0)), float(said.get("c1", 1.0))
     function = said.get("cf", 0 if (slope, shift) != (1, 0) else -1)
     if function not in (-1, 0, 20, 21):  # none, or of an uncalibrated density
         warn_external(
-            f"{stack.filename} calibrates its values by ImageJ's function {function}, which is not "
-            "applied: values are those that are stored; apply it in ImageJ"
+            f"{opened.filename} calibrates its values by ImageJ's function {function}, which is "
+            "not applied: values are those that are stored; apply it in ImageJ"
         )
     if function != 0:
         return None, 1.0, 0.0
-    signed = (slope, shift) == (1, -32768) and stack.series[0].dtype == np.uint16
+    signed = (slope, shift) == (1, -32768) and opened.series[0].dtype == np.uint16
     return np.dtype(np.int16 if signed else np.float32), slope, shift
 
 
-def _described(stack: Any, number: int, series: Any) -> tuple[list[float], str, tuple[str, ...]]:
+def _described(opened: Any, number: int, series: Any) -> tuple[list[float], str, tuple[str, ...]]:
     """Return the spacing along x, y and z, its unit and the channels' names, as the file says."""
-    page, names, size, unit = series.keyframe, [], [1.0, 1.0, 1.0], ""
-    apart, pixels = True, page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
-    pixels = [1 / n if n else 1.0 for n in pixels]
-    if stack.is_ome and stack.ome_metadata:
-        one = ET.fromstring(stack.ome_metadata).findall(".//{*}Pixels")[number]
-        said = {axis: one.get(f"PhysicalSize{axis}") for axis in "XYZ"}
-        units = [one.get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
-        names, apart = [c.get("Name", "") for c in one.findall("{*}Channel")], not said["X"]
-        if said["X"]:
-            pixels, apart = [float(said["X"]), float(said["Y"] or 1)], bool(said["Z"])
-            size, unit = in_one_unit([*pixels, float(said["Z"] or 1)], units)
-    elif stack.is_imagej:
-        entries = stack.imagej_metadata or {}
-        size, unit = [*pixels, float(entries.get("spacing", 1.0)) or 1.0], entries.get("unit", "")
-        unit = "um" if unit in _MICRONS else str(unit).replace("pixel", "")
+    page, names, size, unit, alone = series.keyframe, [], [1.0, 1.0, 1.0], "", ""
+    per = page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
+    described = opened.ome_metadata if opened.is_ome else ""
+    of_ome = ET.fromstring(described).findall(".//{*}Pixels")[number:] if described else []
+    if of_ome:
+        x, y, z = (of_ome[0].get(f"PhysicalSize{axis}") for axis in "XYZ")
+        units = [of_ome[0].get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
+        names = [channel.get("Name", "") for channel in of_ome[0].findall("{*}Channel")]
+        if x:
+            size, unit = in_one_unit([float(x), float(y or 1), float(z or 1)], units)
+            alone = "" if z else f"{x} x {y}"
+    elif opened.is_imagej:
+        entries = opened.imagej_metadata or {}
+        size = [*(1 / n if n else 1.0 for n in per), float(entries.get("spacing", 1.0)) or 1.0]
+        unit = str(entries.get("unit", "")).replace("pixel", "")
+        unit = "um" if unit in _MICRONS else unit
         names = [str(n) for n in entries.get("Labels", ())]
-    elif stack.is_lsm:  # of Zeiss, in metres
-        size, unit = [1e6 * float(stack.lsm_metadata[f"VoxelSize{a}"]) for a in "XYZ"], "um"
-    elif int(page.tags.valueof("ResolutionUnit", 1)) == 3:  # an inch's are most often nobody's
-        apart, pixels = False, [10 * n for n in pixels]
-    if not apart:
+    elif opened.is_lsm:  # of Zeiss, in metres
+        size, unit = [1e6 * float(opened.lsm_metadata[f"VoxelSize{a}"]) for a in "XYZ"], "um"
+    elif int(page.tags.valueof("ResolutionUnit", 1)) == 3 and all(per):
+        alone = f"{10 / per[0]:g} x {10 / per[1]:g} mm"  # an inch's are most often nobody's
+    if alone:
         warn_external(
-            f"{stack.filename} says that pixels are {pixels[0]:g} x {pixels[1]:g}, and not how far "
-            "apart slices are: spacing is taken as 1; give spacing=(x, y, z)"
+            f"{opened.filename} says that pixels are {alone}, and not how far apart slices are: "
+            "spacing is taken as 1; give spacing=(x, y, z)"
         )
     channels = series.shape[axes.index("c")] if "c" in (axes := _axes(series)) else 0
     each = len({*names}) == len(names) == channels and all(names)
@@ -245,9 +246,11 @@ def _described(stack: Any, number: int, series: Any) -> tuple[list[float], str, 
 
 
 def slices_in(folder: Path) -> list[Path]:
-    """Return the pictures of slices in a folder, in natural order."""
+    """Return the pictures of slices in a folder, in natural order; none beside DICOM slices."""
     files = [path for path in folder.iterdir() if path.is_file() and path.name[0] != "."]
     found = [file for file in files if file.suffix.lower() in (*_TIFF, ".png")]
+    if found and any(head_of(file)[128:132] == b"DICM" for file in {*files} - {*found}):
+        return []  # previews of a scan
     return sorted(found, key=lambda file: natural_key(file.name.lower()))
 
 
@@ -257,6 +260,8 @@ def pictures(path: Path) -> list[VolumeInFile]:
     The top row is the last along y, as VTK has pictures.
     """
     files = slices_in(path) if path.is_dir() else [path]
+    if len({file.suffix.lower() == ".png" for file in files}) > 1:
+        raise InvalidVolumeError(f"{path} holds TIFF and PNG files: put those of one volume apart")
     if len(files) < 2:
         raise InvalidVolumeError(
             f"{path} holds one slice, and a volume needs two: give the folder that holds all"
@@ -283,6 +288,8 @@ def _picture(file: Path) -> NDArray[Any]:
 
             with Image.open(file) as picture:
                 found = np.asarray(picture.convert("RGBA") if picture.mode == "P" else picture)
+                if picture.mode == "I":  # of 16 bits, as older versions have them
+                    found = found.astype(np.uint16)
     except Exception as error:  # each format has readers, and exceptions, of its own
         raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
     return found[::-1]
@@ -332,22 +339,3 @@ FORMATS = {
         ),
     )
 }
-
-
-def format_of(file: Path) -> VolumeFormat:
-    """Return the format of a file by its name, or else by its content.
-
-    Raises UnsupportedError with a remedy where there is none, and InvalidVolumeError for a VDI.
-    """
-    name, head = file.name.lower(), head_of(file)
-    if name.endswith((".vdi", ".exr", ".html")):
-        raise InvalidVolumeError(
-            f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
-        )
-    for each in FORMATS.values():
-        if name.endswith(each.suffixes) and not head.startswith(b"CDF"):  # as MINC 1 is
-            return each
-    for each in FORMATS.values():
-        if each.magic and (head.startswith(each.magic) or head[128:].startswith(each.magic)):
-            return each
-    raise UnsupportedError(f"{file} is of no format that is read here: {REMEDY}")

@@ -41,17 +41,20 @@ class Lazy:
         return self._read()[index]
 
 
-def stack(slices: Sequence[Any], read: Callable[[Any], NDArray[Any]]) -> Lazy:
-    """Return slices of one size as an array along z, of a type that holds all of them."""
+def stack(
+    slices: Sequence[Any], read: Callable[[Any], NDArray[Any]], *, mixed: bool = False
+) -> Lazy:
+    """Return slices of one size as an array along z, of one type unless they are ``mixed``."""
     first = read(slices[0])
 
     def read_all() -> NDArray[Any]:
         array = np.empty((len(slices), *first.shape), first.dtype)
         for i, name in enumerate(slices):
-            if (one := read(name)).shape != first.shape:
+            one = read(name)
+            if one.shape != first.shape or (one.dtype != first.dtype and not mixed):
                 raise InvalidVolumeError(
-                    f"{name} has {one.shape} pixels, and {slices[0]} {first.shape}: the slices of "
-                    "a volume have one size"
+                    f"{name} has {one.shape} pixels of type {one.dtype}, and {slices[0]} "
+                    f"{first.shape} of {first.dtype}: the slices of a volume have one size and type"
                 )
             array = array.astype(np.promote_types(array.dtype, one.dtype), copy=False)
             array[i] = one
@@ -77,10 +80,8 @@ class VolumeInFile:
         What it is called, and the unit of lengths; empty where the file does not say.
     channels : tuple of str
         Their names, where they are known.
-    meant : bool
-        Whether the file says that it is the one to show.
-    volume : callable, optional
-        Makes the volume, where the array is not all there is.
+    meant, volume : bool, callable
+        Whether the file says that it is the one to show; what makes it, if not the array.
     """
 
     array: Any
@@ -121,10 +122,7 @@ class VolumeInFile:
 def chosen(
     file: Path, what: str, names: Sequence[Any], asked: Any, how: str, listed: str = ""
 ) -> int:
-    """Return the number of the volume, time or channel that is asked for, or of the only one.
-
-    ``names``: of all, or their numbers; ``listed``: what a message says instead.
-    """
+    """Return the number of what is asked for by a name or a number, or of the only one."""
     if not names:
         raise InvalidVolumeError(f"{file} holds no {what} of three axes")
     count = len(names)
@@ -167,6 +165,8 @@ def volume_of(
     points = np.prod([count[axis] for axis in kept], dtype=object)
     require_free_memory(points * found.dtype.itemsize, f"the volume in {file}", "take less")
     values = found.array[tuple(slice(None) if a in kept else at.get(a, 0) for a in axes)]
+    if isinstance(values, np.memmap):  # a file that shrinks under a map kills the process
+        values = np.array(values)
     values = values.transpose([kept.index(a) for a in "zyxs" if a in kept])
     values = _grey(values, file) if values.ndim == 4 else values
     # Place it by its map from point index to world coordinates

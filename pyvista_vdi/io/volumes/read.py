@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidVolumeError,
     MissingDependencyError,
@@ -19,8 +18,15 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.io.stores import is_store, names_in, open_store
 from pyvista_vdi.io.time_steps import lists_steps
-from pyvista_vdi.io.volumes.formats import FORMATS, VolumeFormat, format_of, slices_in
-from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, chosen, placed, volume_of
+from pyvista_vdi.io.volumes.formats import FORMATS, VolumeFormat, slices_in
+from pyvista_vdi.io.volumes.in_file import (
+    REMEDY,
+    VolumeInFile,
+    chosen,
+    head_of,
+    placed,
+    volume_of,
+)
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.model.whole_file import as_path
 
@@ -72,14 +78,8 @@ def read_volume(
         If it does not hold what is asked for.
     MissingDependencyError
         If the format's library is not installed.
-
-    See Also
-    --------
-    list_volumes : what there is in a file.
     """
     file, asked = Path(as_path(path)), series if array is None else array
-    if file.suffix and (own := registry.reader(file.suffix.lower())) is not None:
-        return placed(own(file), spacing, origin)
     if (volumes_in := (kind := _format(path)).volumes_in) is None:
         store = open_store(
             f"{os.fspath(path)}::{asked}" if isinstance(asked, str) else path,
@@ -130,7 +130,10 @@ def list_volumes(path: str | os.PathLike[str]) -> list[VolumeInFile]:
 
 
 def _format(path: str | os.PathLike[str]) -> VolumeFormat:
-    """Return a file's or a folder's format, HDF5 of any store; refuse what cannot be opened."""
+    """Return the format of a file, by its name or else by its content, or of a folder.
+
+    HDF5 of any store. What cannot be opened, or is of no format, is refused with a remedy.
+    """
     file = Path(path)
     try:
         if is_store(path):
@@ -147,7 +150,18 @@ def _format(path: str | os.PathLike[str]) -> VolumeFormat:
                 f"{file} lists time steps, and one volume is asked for: name the file of one, or "
                 "make a series of all (pyvista-vdi series)"
             )
-        return format_of(file)
+        name, head = file.name.lower(), head_of(file)
+        if name.endswith((".vdi", ".exr", ".html")):
+            raise InvalidVolumeError(
+                f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
+            )
+        for each in FORMATS.values():
+            if name.endswith(each.suffixes) and not head.startswith(b"CDF"):  # as MINC 1 is
+                return each
+        for each in FORMATS.values():
+            if each.magic and (head.startswith(each.magic) or head[128:].startswith(each.magic)):
+                return each
+        raise UnsupportedError(f"{file} is of no format that is read here: {REMEDY}")
     except (OSError, ValueError) as error:
         if isinstance(error, VDIError):
             raise

@@ -14,7 +14,7 @@ from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
 from pyvista_vdi.vtk_pipeline.drawing.shader import VDIShaderProperty, show_image
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, camera_to_come, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
 
@@ -232,7 +232,7 @@ class VDIActorMethods(PlayingMethods):
         return mapper.driver.pick(self, there[0], x, y) if there else None
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
-        """Generate the VDI anew, now; of a series, the step that is shown.
+        """Generate the VDI anew, now.
 
         Parameters
         ----------
@@ -256,14 +256,9 @@ class VDIActorMethods(PlayingMethods):
         """
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
-        if source is None and mapper is not None and mapper.driver.input is not None:
-            vdi = self._regenerated(mapper.driver, camera, window_size)
-            if vdi is not None:
-                mapper.Modified()
-                return vdi  # type: ignore[no-any-return]
         if source is None:
             raise InvalidArgumentError(
-                "this actor shows a VDI without its volume, which cannot be generated anew: add "
+                "this actor shows VDIs without a volume, which cannot be generated anew: add "
                 "the volume, or set another VDI (actor.vdi = another)"
             )
         mapper.driver.retry()
@@ -283,17 +278,6 @@ class VDIActorMethods(PlayingMethods):
     def camera_to_come(self, renderer: Any) -> Any:
         """Return the ``vtkCamera`` of a renderer's next picture."""
         return camera_to_come(renderer)
-
-    def _regenerated(self: Any, driver: Any, camera: Any, window_size: Any) -> VDI | None:
-        """Generate a VDI of several for a view, by default that of the renderer, if it can be."""
-        renderer = driver.renderer()
-        if camera is None and renderer is not None:
-            camera = self.camera_to_come(renderer)
-        if window_size is None and renderer is not None and min(renderer.GetSize()) > 0:
-            window_size = renderer.GetSize()
-        if camera is not None:
-            camera = camera_of(camera, as_array(self.GetMatrix()))
-        return driver.input.regenerated(camera, window_size)  # type: ignore[no-any-return]
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

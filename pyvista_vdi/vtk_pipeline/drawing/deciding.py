@@ -20,7 +20,7 @@ from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality import frame_state as fs
-from pyvista_vdi.quality.decide import busy, decide, growth
+from pyvista_vdi.quality.decide import busy, decide
 from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
@@ -207,10 +207,9 @@ class Deciding:
 
     def _stored(self, source: Input, frame: Frame) -> VDI | None:
         """Return the VDI of a frame that has no volume, and say what it lacks."""
-        settings, window, view = self.state.settings, self.window, frame.view
+        view = frame.view
         assert view is not None
-        moving, watched = window.moving(settings), window.watched_behind(settings)
-        source.look(view.camera, self.device, growth(settings, moving=moving, watched=watched))
+        source.look(view.camera, self.device)
         vdi = self.tell(fs.StoredAsked(source.stamp()), frame)
         if isinstance(vdi, VDI):
             cone = vdi.metadata.get("view_cone")

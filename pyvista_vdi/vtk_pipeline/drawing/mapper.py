@@ -134,9 +134,6 @@ class VDIMapperMethods(ArrayChoiceMethods):
     def SetVDISet(self, vdi_set: VDICollection) -> None:
         """Draw a set: of each frame's view the VDI that is nearest, or a blend of several.
 
-        Where its volume is at hand it grows behind the frames while nobody turns, by views that
-        do not reach its target; ``SetRegenerate("never")`` has it stay as it is.
-
         Raises
         ------
         InvalidArgumentError

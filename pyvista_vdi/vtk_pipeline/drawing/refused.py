@@ -112,7 +112,7 @@ def effects_without(renderer: Any) -> dict[str, str]:
         if each is not None:
             found.add(each.GetClassName())
             pending.append(each.GetDelegatePass() if hasattr(each, "GetDelegatePass") else None)
-            members = each.GetPasses() if hasattr(each, "GetPasses") else None
+            members: Any = each.GetPasses() if hasattr(each, "GetPasses") else None
             count = 0 if members is None else members.GetNumberOfItems()
             pending += [members.GetItemAsObject(i) for i in range(count)]
     if renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes():

@@ -31,7 +31,7 @@ def _as_path(path: str | os.PathLike[str] | None) -> str | None:
 
 
 class VDIReader(Algorithm):
-    """Read a VDI from a ``.vdi`` file or an OpenEXR deep image, or the steps of a ``.vdis`` file.
+    """Read a VDI from a ``.vdi`` file or an OpenEXR deep image, or the steps of a ``.vdis`` series.
 
     Out comes the VDI in its canonical VTK form, see
     :func:`~pyvista_vdi.vtk_pipeline.filters.convert.vdi_to_image`. Of a series the times are
@@ -43,7 +43,7 @@ class VDIReader(Algorithm):
     -----
     Python's ``Update`` raises what went wrong; an update that VTK asks for writes it to VTK's
     output window and gives an empty image. Python's ``Update``, ``UpdateTimeStep`` and
-    ``UpdateInformation`` look whether the file is another by now, as a series is that grows.
+    ``UpdateInformation`` look whether the file is another by now, as a folder's that grows.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class VDIReader(Algorithm):
         return self._path
 
     def GetSeries(self) -> VDICollection:
-        """Return the series of a ``.vdis`` file, with the steps that are finished by now.
+        """Return the series of a ``.vdis`` path, with the steps that are finished by now.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class VDIReader(Algorithm):
                 self._series = read(self._path) if holds(self._path) == "series" else None
         self.picture_size = picture_size(about.window_size, about.metadata) if about else None
         announce(outputs, about.window_size if about else (1, 1))
-        announce_times(outputs, about.times if self._series is not None else ())
+        announce_times(outputs, () if self._series is None else self._series.times or ())
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
@@ -118,7 +118,8 @@ class VDIReader(Algorithm):
         if self._path is None:
             return
         try:
-            found = Path(self._path).stat()
+            path, form = Path(self._path), format_of(self._path)
+            found = (path / form.head if form is not None and path.is_dir() else path).stat()
             seen = (self._path, found.st_ino, found.st_size, found.st_mtime_ns)
         except (OSError, ValueError):
             seen = None
@@ -131,9 +132,8 @@ class VDIWriter(Algorithm):
     """Write the VDI at its input, in its canonical VTK form, to a ``.vdi`` or ``.exr`` file.
 
     To a ``.vdis`` file it writes those of all times that the input announces, one by one, in the
-    8-byte form unless :meth:`SetPrecision` says otherwise: exact ones, which are not written by
-    their differences, take seven times as much. The file appears whole or not at all. Nothing is
-    written before :meth:`Write`.
+    8-byte form unless :meth:`SetPrecision` says otherwise. The file appears whole or not at all.
+    Nothing is written before :meth:`Write`.
     """
 
     def __init__(self) -> None:
@@ -141,7 +141,6 @@ class VDIWriter(Algorithm):
         self._path: str | None = None
         self._precision: str | None = None
         self._compression: str | None = None
-        self._tolerance = 0.0
 
     def SetInputData(self, image: vtkImageData) -> None:
         """Set the VDI's canonical VTK form."""
@@ -175,14 +174,6 @@ class VDIWriter(Algorithm):
         """Return the compression; ``None``: the file's usual one."""
         return self._compression
 
-    def SetTolerance(self, tolerance: float) -> None:
-        """Set the loss that saves bytes of a ``.vdis`` file, as of :class:`SeriesWriter`."""
-        self._change("_tolerance", tolerance)
-
-    def GetTolerance(self) -> float:
-        """Return the tolerance of a ``.vdis`` file."""
-        return self._tolerance
-
     def Write(self) -> None:
         """Write the file.
 
@@ -214,6 +205,5 @@ class VDIWriter(Algorithm):
 
     def _options(self) -> dict[str, Any]:
         """Return the options of the file that were set."""
-        names = ("precision", "compression", "tolerance")
-        given = {name: getattr(self, f"_{name}") for name in names}
+        given = {"precision": self._precision, "compression": self._compression}
         return {name: value for name, value in given.items() if value}

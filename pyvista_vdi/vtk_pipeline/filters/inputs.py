@@ -46,10 +46,7 @@ class Input:
     #: The volume property that classifies values, where they are kept.
     prop: Any = None
     #: What remedies a view that the VDI does not serve, where there is no source.
-    remedy = (
-        "without its volume it cannot be made anew, and plotter.camera = vdi.camera.to_pyvista() "
-        "goes to its own view"
-    )
+    remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
 
@@ -112,12 +109,8 @@ class Input:
     def rest(self) -> None:
         """End what goes on behind the frames, which may begin anew."""
 
-    def look(self, camera: Camera, device: Any, growth: str | None) -> None:
-        """Choose what a view shows, before a frame.
-
-        ``growth`` says whether VDIs that are lacking are made: ``"now"``, ``"behind"`` the frames,
-        or not yet, ``"later"``, because the view turns; ``None``: never.
-        """
+    def look(self, camera: Camera, device: Any) -> None:
+        """Choose what a view shows, before a frame."""
 
     @property
     def busy(self) -> bool:
@@ -138,10 +131,6 @@ class Input:
     def parts(self) -> list[tuple[VDI, float]]:
         """Return the VDIs that a picture is blended of, with weights; none for one."""
         return []
-
-    def regenerated(self, camera: Camera | None, window_size: Any) -> VDI | None:
-        """Generate what is shown for a view, and show that; ``None`` where this cannot be."""
-        return None
 
 
 class SourceInput(Input):
@@ -490,7 +479,7 @@ def input_of(data: Any) -> Input:
         image = ImageInput(data)
         image.vdi()  # refuse a damaged one now
         return image
-    show = registry.made_of("shown", data)
+    show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
     require_this_build(type(data))

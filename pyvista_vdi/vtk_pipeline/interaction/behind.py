@@ -13,7 +13,6 @@ from typing import Any
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.list_subsampling import lists_crossed, subsampled_lists
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.background import BackgroundGeneration
@@ -29,6 +28,7 @@ from pyvista_vdi.quality.view_error import ViewError, ViewErrorEstimator
 from pyvista_vdi.quality.worker import Job, Worker
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.source import Request
+from pyvista_vdi.vtk_pipeline.interaction.fewer_lists import lists_crossed, subsampled_lists
 
 _log = logging.getLogger(__name__)
 

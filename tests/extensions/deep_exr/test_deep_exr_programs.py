@@ -88,7 +88,8 @@ def test_what_is_refused_says_why(name, message):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_what_oiiotool_makes(name, tmp_path, default_runtime):
-    made = make(name, tmp_path, shutil.which("oiiotool") or pytest.skip("oiiotool is not here"))
+    program = shutil.which("oiiotool") or pytest.skip("oiiotool is not installed")
+    made = make(name, tmp_path, program)
     if name in ("cut", "resized", "moved", "flat"):
         with pytest.raises(VDIFileError, match="was cut, resized or moved after|a flat image"):
             pvdi.read(made)

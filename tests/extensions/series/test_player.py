@@ -260,13 +260,3 @@ def test_nobody_looks_and_nothing_goes_on(player, steps, clock):
     assert len(steps.asked) <= 3
     player.close()
     assert not [t for t in threading.enumerate() if t.name == "pyvista-vdi series"]
-
-
-def test_another_vdi_of_the_step(player, steps):
-    other = _vdi(3)
-    player.replace(other)
-    assert player.vdi is other
-    player.step = 4
-    assert player.vdi is steps.vdis[4]
-    player.step = 0
-    assert player.vdi is steps.vdis[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zipfile
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -123,13 +125,15 @@ def test_files_of_one_vdi_have_no_time(path, tmp_path):
 
 
 def test_what_is_wrong_with_a_series_is_said(path):
+    with zipfile.ZipFile(path) as archive:
+        place = archive.getinfo("000001.vdi").header_offset + 100
     content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1  # in the middle step
+    content[place] ^= 1
     path.write_bytes(content)
     reader = reader_of(path)
     assert announced(reader) == (TIMES, (0.5, 4.0))
     reader.UpdateTimeStep(0.5)
-    with pytest.raises(VDIFileError, match="step 1 is not what was written"):
+    with pytest.raises(VDIFileError, match=r"000001\.vdi"):
         reader.UpdateTimeStep(1.0)
     with pytest.raises(InvalidArgumentError, match="finite"):
         reader.UpdateTimeStep(float("nan"))
@@ -322,7 +326,7 @@ def test_the_writer_writes_all_times(vdis, tmp_path):
 
 
 def test_a_series_of_a_source_with_times(vdis):
-    """Each step is read when its turn comes, and again when it is asked for again."""
+    """Each step is read when its turn comes."""
     producer = Moving()
     prop = some_property()
     series = pvdi.generate_series(producer, CAMERA, SIZE, volume_property=prop, precision="exact")
@@ -331,11 +335,6 @@ def test_a_series_of_a_source_with_times(vdis):
     for step in range(3):
         assert series[step].equals(vdis[step])
     assert producer.read == [0, 1, 2]
-    first, last = series.volumes[0], series.volumes[-1]
-    assert producer.read == [0, 1, 2, 0, 2]
-    for volume, step in ((first, 0), (last, 2)):
-        assert volume.origin == ball_at(step).origin
-        np.testing.assert_array_equal(volume.array.ravel(), ball_at(step)["v"])
 
 
 def test_a_series_of_pyvistas_readers(vdis, tmp_path):
@@ -352,7 +351,6 @@ def test_a_series_of_pyvistas_readers(vdis, tmp_path):
     series = pvdi.generate_series(reader, CAMERA, SIZE, **looks, precision="exact")
     assert series.times == TIMES
     assert all(series[step].equals(vdis[step]) for step in range(3))
-    assert series.volumes[1].origin == ball_at(1).origin
 
 
 def test_what_cannot_be_a_series_is_refused():

@@ -1,4 +1,4 @@
-"""Sets of VDIs in scenes: the nearest VDI is drawn, blended with its neighbours, and more made."""
+"""Sets of VDIs in scenes: the nearest VDI is drawn, blended with its neighbours."""
 
 from __future__ import annotations
 
@@ -8,30 +8,22 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from plugin_scenes import CLASSIFICATION, soft_ball
-from watched_windows import MOVING, finish, frame, frames_until, picture_of, threads, turned
+from watched_windows import finish, frame, picture_of, turned
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.extensions.sets import generate
 from pyvista_vdi.extensions.sets import shown as of_sets
-
-GROWTH = "set's growth"
 
 
 @pytest.fixture(scope="module")
 def once(default_runtime):
-    with pytest.MonkeyPatch.context() as fewer:
-        fewer.setattr(generate, "DIRECTIONS", 12)
-        options = {"target_ssim": 0.8, "lists": 1, "max_supersegments": 4, **CLASSIFICATION}
-        return pvdi.generate_set(soft_ball(12), "sphere", (60, 50), **options)
+    return pvdi.generate_set(soft_ball(12), 12, (60, 50), max_supersegments=4, **CLASSIFICATION)
 
 
 @pytest.fixture
 def made(once):
-    """The same set, which may grow, and be blended otherwise, without the others' seeing it."""
-    again = pvdi.VDISet.of(list(once), window_size=once.window_size)
-    again._maker = once._maker
-    return again
+    """The same set, which may be blended otherwise without the others' seeing it."""
+    return pvdi.VDISet.of(list(once), window_size=once.window_size)
 
 
 @pytest.fixture
@@ -129,64 +121,13 @@ def test_with_little_memory_what_is_drawn_stays(plotter, made, decoded, monkeypa
     assert len(gone - {i for i, _ in decoded}) <= 1
 
 
-class Hungry:
-    """What finds every view lacking."""
-
-    def __init__(self, maker):
-        self._maker = maker
-
-    def lacking(self, vdi_set, camera):
-        return self._maker(camera)
-
-
-def test_it_grows_where_the_picture_misses_the_target(plotter, made, once):
-    actor = shown(plotter, made)
-    plotter.camera.position = np.asarray(plotter.camera.focal_point) + 0.4 * np.subtract(
-        plotter.camera.position, plotter.camera.focal_point
-    )
-    frame(plotter, MOVING)
-    finish(GROWTH)
-    made._maker, n = Hungry(once._maker), len(made)
-    frame(plotter, MOVING)
-    assert (threads(GROWTH), len(made)) == ([], n)  # while a hand moves
-    frames_until(plotter, lambda: len(made) > n)
-    assert made.nearest(plotter.camera) == n
-    frame(plotter)
-    assert actor.vdi is made[n]
-    assert len(once) <= n
-
-
-def test_off_screen_it_grows_in_the_picture_that_misses_the_target(plotter, made, once):
-    made._maker, n = Hungry(once._maker), len(made)
-    plotter.add_vdi(made, show_scalar_bar=False)
-    plotter.show(auto_close=False)
-    assert (len(made), threads(GROWTH)) == (n + 1, [])
-    assert made.nearest(plotter.camera) == n
-    plotter.render()
-    assert len(made) == n + 1  # once for a view
-
-
-def test_it_does_not_grow_where_the_target_is_reached_or_nothing_is_to_be_made(plotter, made, once):
-    view, n = made.cameras[0], len(made)
-    assert made.lacking(view) is None or made._maker.maker.ssim([(made[0], 1.0)], view) < 0.8
-    made._maker = Hungry(once._maker)
-    shown(plotter, made, regenerate="never")
+def test_a_set_makes_no_vdi_at_rest(plotter, made):
+    actor, n = shown(plotter, made), len(made)
     for _ in range(3):
         frame(plotter)
-        finish(GROWTH)
-    assert len(made) == n
-
-
-def test_regenerate_adds_the_view_that_is_shown(plotter, made):
-    actor = shown(plotter, made, regenerate="never")
-    plotter.camera.Elevation(33)
-    vdi = actor.regenerate()
-    assert made[-1] is vdi
-    frame(plotter)
-    assert actor.vdi is vdi
-    actor.vdi_set = pvdi.VDISet.of(list(made))
-    frame(plotter)
-    with pytest.raises(InvalidArgumentError, match="not at hand"):
+        finish("set")
+    assert (len(made), actor.status.stand_in) == (n, False)
+    with pytest.raises(InvalidArgumentError, match="without a volume"):
         actor.regenerate()
 
 

@@ -10,7 +10,7 @@ from browsers import WITHOUT_WORKERS, assert_decoded, file_of, in_base64
 from rewriting import described, rewritten
 from strategies import random_vdi
 
-from pyvista_vdi.model.list_subsampling import coarser
+from pyvista_vdi.io.vdi_file.coarse import coarser
 
 SCRIPT = """
 import { decodeVDI } from "./decode.js";

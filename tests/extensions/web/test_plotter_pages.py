@@ -11,7 +11,7 @@ from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning
-from pyvista_vdi.extensions.sets.sphere import orbit, spread
+from pyvista_vdi.extensions.sets.generate import orbit, spread
 from pyvista_vdi.model.standard_cases import filling_camera
 
 pytestmark = pytest.mark.gl
@@ -62,7 +62,7 @@ def series(default_runtime):
 @pytest.fixture(scope="module")
 def vdi_set(default_runtime):
     volume = soft_ball(16)
-    views = orbit(filling_camera(volume.bounds, SIZE), volume.bounds, spread(6))
+    views = orbit(filling_camera(volume.bounds, SIZE), volume.bounds, spread(6, (0, 0, 1), 180))
     return pvdi.VDISet.of([pvdi.generate(volume, view, SIZE, **LOOKS) for view in views])
 
 

@@ -16,9 +16,9 @@ from real_data import require_data
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.list_subsampling import lists_crossed
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.vtk_pipeline.interaction.fewer_lists import lists_crossed, subsampled_lists
 
 #: See above.
 TOLERANCE = 2e-4
@@ -145,7 +145,7 @@ def shells(size, **options):
 @pytest.mark.every(3)
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_every_second_list_is_drawn_as_a_vdi_of_those(precision, raycaster):
-    """The shader's thinning against the oracle's picture of ``vdi.thinned``; odd windows, too."""
+    """The shader's thinning against the oracle's picture of those; odd windows, too."""
     drawn, picture = 0, (28, 21)
     for tilt, steps, size in ((20, (2, 1), (70, 45)), (0, (1, 2), (64, 41)), (0, (2, 2), (51, 37))):
         view, vdi = shells(size, max_supersegments=6)
@@ -159,7 +159,12 @@ def test_every_second_list_is_drawn_as_a_vdi_of_those(precision, raycaster):
             image = raycaster.draw(camera, picture, few=True)
             name = f"steps {steps}, {angle} degrees, {precision}"
             result = explain(
-                vdi.thinned(*steps), camera, picture, image, name=name, tolerance=TOLERANCE
+                subsampled_lists(vdi, *steps),
+                camera,
+                picture,
+                image,
+                name=name,
+                tolerance=TOLERANCE,
             )
             assert not result.failures, "\n".join(result.failures)
             drawn += result.drawn

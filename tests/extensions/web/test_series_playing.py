@@ -1,9 +1,10 @@
 """Series in a page: every step drawn as Python draws it, sought, played, skipped where damaged."""
 
+import zipfile
+
 import numpy as np
 import pytest
 from browsers import WITHOUT_WORKERS, file_of, in_base64
-from stored_frames import frames_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
@@ -15,11 +16,11 @@ N = 9
 
 @pytest.fixture(scope="module")
 def path(default_runtime, tmp_path_factory):
-    """A ball that moves, and stands still between the fifth step and the seventh."""
+    """The file of a ball that moves."""
     z, y, x = np.meshgrid(*(np.linspace(-1, 1, 20),) * 3, indexing="ij")
 
     def ball(i):
-        centre = 0.1 * (i if i < 5 else max(4, i - 2)) - 0.4
+        centre = 0.1 * i - 0.4
         return pvdi.Volume((1 - np.sqrt((x - centre) ** 2 + y**2 + z**2)).clip(0).astype("f4"))
 
     camera = filling_camera(ball(0).bounds, SIZE)
@@ -39,18 +40,23 @@ def data(path):
     return path.read_bytes()
 
 
-@pytest.fixture(scope="module")
-def frames(data):
-    return frames_of(data)
+def end_of(path, step):
+    """Where in a file what shows a step ends."""
+    with zipfile.ZipFile(path) as archive:
+        member = archive.getinfo(f"{step:06}.vdi")
+    return member.header_offset + 30 + len(member.filename) + member.file_size
 
 
 @pytest.fixture
-def playing(data, open_page):
-    """A page that shows the series."""
+def playing(data, path, open_page):
+    """A page that shows the series: its file, or its folder."""
 
-    def playing(content=data, attributes="", ready=True, **options):
-        attributes = f'src="ball.vdis" {attributes}'
+    def playing(content=data, attributes="", ready=True, folder=False, **options):
         files = {"ball.vdis": content}
+        if folder:
+            with zipfile.ZipFile(path) as archive:
+                files = {f"ball.vdis/{name}": archive.read(name) for name in archive.namelist()}
+        attributes = f'src="ball.vdis{"/" * folder}" {attributes}'
         page = open_page(SIZE, attributes=attributes, files=files, **options)
         if ready:
             page.ready()
@@ -163,16 +169,14 @@ def test_the_slider_the_button_and_keys(playing):
     assert slider.input_value() == str(page.evaluate("viewer.series.nearest(viewer.time)"))
 
 
-def test_a_damaged_step_is_named_and_skipped(series, data, frames, playing):
-    """One that no other step is written by."""
-    needed = {header.by for _, header in frames}
-    k = next(i for i in range(1, N - 1) if i not in needed)
+def test_a_damaged_step_is_named_and_skipped(series, data, path, playing):
+    k = 3
     changed = bytearray(data)
-    changed[frames[k][0] + 30] ^= 1
+    changed[(end_of(path, k - 1) + end_of(path, k)) // 2] ^= 1
     page = playing(bytes(changed))
     seek(page, series.times[k])
     why = page.evaluate("viewer.ready.catch(({ message }) => message)")
-    assert f"step {k} of the series" in why
+    assert f"step {k} cannot be shown" in why
     assert "checksum" in why
     alert = page.page.locator("vdi-viewer p")
     assert alert.is_visible()
@@ -186,11 +190,8 @@ def test_a_damaged_step_is_named_and_skipped(series, data, frames, playing):
 
 
 @pytest.mark.slow
-def test_a_file_that_is_cut_off_plays_to_its_last_step(series, data, frames, playing):
-    place, header = frames[4]
-    page = playing(data[: place + header.n_bytes + 9], in_parts=["ball.vdis"])
-    # Without an index it is read as a whole, by one more request
-    assert [part is None for name, part in page.asked if name == "ball.vdis"][-1]
+def test_a_file_that_is_cut_off_plays_to_its_last_step(series, data, path, playing):
+    page = playing(data[: end_of(path, 4) + 9])
     page.wait_for("viewer.series.complete")
     assert page.evaluate("viewer.series.times") == list(series.times[:5])
     play_to_the_end(page, 30)
@@ -200,39 +201,28 @@ def test_a_file_that_is_cut_off_plays_to_its_last_step(series, data, frames, pla
 def test_files_that_are_no_series_are_a_sentence(data, open_page):
     page = open_page(SIZE)
     for content, why in (
-        (data[:8] + b"\7" + data[9:], "format version 7"),
-        (data[:60] + b"#" + data[61:], "head is not what was written"),
-        (data[:400], "no finished step"),
-        (data[:5], "no finished step"),
+        (data.replace(b'"version": 1', b'"version": 7', 1), "checksum"),
+        (data[:400], "no whole VDI"),
+        (data[:5], "is truncated"),
     ):
         with pytest.raises(Exception, match=why):
             page.load(content)
         assert page.evaluate("viewer.status.state") == "error"
 
 
-def test_steps_are_fetched_when_they_are_asked_for(series, frames, playing):
-    """Where the server gives parts; the first of them is longer than most of this small file."""
-    script = """import { Series } from "./series.js";
-    const of = Series.ofParts;
-    Series.ofParts = (parts) => of({ ...parts, first: parts.first.subarray(0, 700) });"""
-    page = playing(in_parts=["ball.vdis"], script=script)
+def test_steps_of_a_folder_are_fetched_when_they_are_asked_for(series, playing):
+    page = playing(folder=True)
     page.asked.clear()
     seek(page, 4)
     page.ready()
-    wanted, step = [], 8
-    while step >= 0:
-        place, header = frames[step]
-        wanted.append((place, place + header.n_bytes - 1))
-        step = header.by
-    asked = {part for name, part in page.asked if name == "ball.vdis"}
-    assert wanted[0] in asked
-    assert asked <= {*wanted}
+    assert {*page.asked} == {"ball.vdis/000008.vdi"}
     page.assert_shows(series[8], SIZE, series.camera)
+    play_to_the_end(page, 20)
+    assert shown(page)[-1] == N - 1
 
 
-def test_the_first_step_is_shown_while_the_rest_comes(series, data, frames, open_page):
+def test_the_first_step_is_shown_while_the_rest_comes(series, data, path, open_page):
     page = open_page(SIZE)
-    place, header = frames[1]
     page.evaluate(
         """([text, cut]) => {
           const bytes = bytesOf(text), rest = Promise.withResolvers();
@@ -244,7 +234,7 @@ def test_the_first_step_is_shown_while_the_rest_comes(series, data, frames, open
           window.goOn = rest.resolve;
           window.loaded = viewer.load(pieces()).then(() => true);
         }""",
-        [in_base64(data), place + header.n_bytes + 5],
+        [in_base64(data), end_of(path, 1) + 5],
     )
     page.wait_for("heard.some(([name]) => name === 'vditime')")
     assert page.evaluate("[viewer.series.times.length, viewer.series.complete]") == [2, False]
@@ -350,8 +340,8 @@ def test_pages_are_read_and_converted_as_files_are(series, tmp_path, capsys):
     text = page.read_bytes()
     assert text.count(b'<script type="application/vdi+base64">') == 2
     page.write_bytes(text[: text.rindex(b"</script>") - 3000])
-    short = pvdi.read(page)  # cut off: it ends with its last finished step
-    assert 0 < len(short) < len(series)
+    with pytest.raises(pvdi.errors.VDIFileError, match="truncated"):
+        pvdi.read(page)
     page.write_bytes(b"<p>nothing</p>")
     with pytest.raises(pvdi.errors.VDIFileError, match="not a page"):
         pvdi.read(page)

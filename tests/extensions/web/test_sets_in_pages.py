@@ -1,19 +1,20 @@
 """Sets in a page: each view is drawn by the VDI nearest to it, which is fetched when it is near."""
 
 import json
+import zipfile
 
 import numpy as np
 import pytest
-from browsers import in_base64
-from stored_frames import frames_of
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.series import layout
-from pyvista_vdi.extensions.sets import files
-from pyvista_vdi.extensions.sets.sphere import orbit, spiral, spread
+from pyvista_vdi.extensions.sets.generate import orbit, spread
 from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (97, 55)
+
+
+def directions(n):
+    return spread(n, (0, 0, 1), 180)
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +24,11 @@ def path(default_runtime, tmp_path_factory):
     volume = pvdi.Volume(((1 + lumps) * (x**2 + y**2 + z**2 < 0.8)).astype("f4"))
     around = filling_camera(volume.bounds, SIZE)
     looks = {"cmap": "viridis", "opacity": "linear", "clim": (0, 2), "precision": "8-byte"}
-    made = pvdi.VDISet.of(
-        [
-            pvdi.generate(volume, view, SIZE, max_supersegments=6, **looks)
-            for view in orbit(around, volume.bounds, spread(14))
-        ]
-    )
-    made.about["camera"] = around.to_dict()
+    vdis = [
+        pvdi.generate(volume, view, SIZE, max_supersegments=6, **looks)
+        for view in orbit(around, volume.bounds, directions(14))
+    ]
+    made = pvdi.VDISet(vdis, camera=around, window_size=SIZE)
     return made.save(tmp_path_factory.mktemp("sets") / "lumps.vdiset")
 
 
@@ -45,14 +44,22 @@ def data(path):
     return path.read_bytes()
 
 
+@pytest.fixture(scope="module")
+def folder(path):
+    """The files of the set's folder."""
+    with zipfile.ZipFile(path) as archive:
+        return {f"lumps.vdiset/{name}": archive.read(name) for name in archive.namelist()}
+
+
 @pytest.fixture
 def turning(data, open_page):
     """A page that shows the set."""
 
-    def turning(content=data, **options):
-        return open_page(
-            SIZE, attributes='src="lumps.vdiset"', files={"lumps.vdiset": content}, **options
-        )
+    def turning(files=None, **options):
+        files = files or {"lumps.vdiset": data}
+        source = min(files).partition("/")
+        attributes = f'src="{source[0]}{source[1]}"'
+        return open_page(SIZE, attributes=attributes, files=files, **options)
 
     return turning
 
@@ -64,7 +71,7 @@ def test_each_view_is_drawn_by_the_vdi_nearest_to_it(vdis, turning):
     assert page.evaluate("viewer.set") == {"length": 14, "nearest": vdis.nearest(vdis.camera)}
     assert page.evaluate("[viewer.series, viewer.time, viewer.playing]") == [None, None, False]
     seen = set()
-    for view in [vdis.camera, *orbit(vdis.camera, vdis.bounds, spiral(7))]:
+    for view in [vdis.camera, *orbit(vdis.camera, vdis.bounds, directions(7))]:
         page.assert_shows(vdis, SIZE, view)
         seen.add(vdis.nearest(view))
         assert page.evaluate("viewer.set.nearest") == vdis.nearest(view)
@@ -94,14 +101,13 @@ def test_a_page_from_disk_has_the_set_in_it(vdis, path, open_page, tmp_path):
 
 
 @pytest.mark.slow
-def test_views_are_fetched_as_it_turns(vdis, data, turning):
-    page = turning(in_parts=("lumps.vdiset",))
+def test_views_are_fetched_as_it_turns(vdis, folder, turning):
+    page = turning(folder)
     page.ready()
-    places = [place for place, _ in frames_of(data)]
 
     def fetched():
-        begun = {part[0] for name, part in page.asked if name == "lumps.vdiset" and part}
-        return {i for i, place in enumerate(places) if place in begun}
+        names = {name.rpartition("/")[2] for name in page.asked}
+        return {int(name[:6]) for name in names if name[:6].isdigit()}
 
     # The nearest, and those that a view which does not move heads for: not all
     page.wait_for("viewer.set.nearest >= 0")
@@ -127,29 +133,22 @@ def test_views_are_fetched_as_it_turns(vdis, data, turning):
 
 
 @pytest.mark.slow
-def test_a_damaged_view_is_named_and_others_are_shown(vdis, data, turning):
+def test_a_damaged_view_is_named_and_others_are_shown(vdis, folder, turning):
     nearest = vdis.nearest(vdis.camera)
-    place, header = frames_of(data)[nearest]
-    broken = bytearray(data)
-    broken[place + header.n_bytes // 2] ^= 0x55
-    page = turning(bytes(broken), expected="damaged")
+    page = turning(folder | {f"lumps.vdiset/{nearest:06}.vdi": b"broken" * 9}, expected="no VDI")
     page.wait_for('heard.some(([name]) => name === "error")')
     message = next(detail["message"] for name, detail in page.evaluate("heard") if name == "error")
-    assert f"step {nearest} of the" in message
+    assert f"view {nearest} cannot be shown" in message
     other = next(i for i in range(14) if i != nearest)
-    view = orbit(vdis.camera, vdis.bounds, spread(14))[other]
+    view = orbit(vdis.camera, vdis.bounds, directions(14))[other]
     page.evaluate("(camera) => { viewer.camera = camera; }", view.to_dict())
     page.wait_for('viewer.status.state === "full"')
 
 
-def test_heads_that_are_wrong_are_said(data, open_page):
-    begin = 20 + int.from_bytes(data[12:16], "little")
-    page = open_page(SIZE)
-    for change in ({"views": []}, {"bounds": [1, 2]}, {"views": [{"position": [0, 0, 0]}]}):
-        head = {**json.loads(data[20:begin]), **change}
-        content = layout.head_bytes(head, files.MAGIC) + data[begin:]
-        said = page.evaluate(
-            "(text) => viewer.load(bytesOf(text)).then(() => '', (error) => error.message)",
-            in_base64(content[: begin + 5000]),
-        )
-        assert "does not say from where" in said
+@pytest.mark.parametrize("change", [{"views": []}, {"bounds": [1, 2]}, {"camera": {}}])
+def test_what_the_json_says_wrongly_is_said(change, folder, turning):
+    head = json.loads(folder["lumps.vdiset/set.json"]) | change
+    page = turning({"lumps.vdiset/set.json": json.dumps(head).encode()}, expected="damaged")
+    page.wait_for('heard.some(([name]) => name === "error")')
+    message = next(detail["message"] for name, detail in page.evaluate("heard") if name == "error")
+    assert "set.json says what cannot be" in message

@@ -12,5 +12,5 @@ def require_one_process(controller: Any) -> None:
         raise ImportError(
             f"this server has {count} ranks, and the VDI plugin works with one: start pvserver or "
             "pvbatch without mpirun, or let the ranks of a simulation make the VDI, by "
-            "pyvista_vdi.insitu.InSitu, and open its file"
+            "pyvista_vdi.extensions.insitu.InSitu, and open its file"
         )

@@ -446,7 +446,7 @@ class VDIReader(vtk_pipeline.VDIReader):
     + TIMES_XML
 )
 class VDISeriesReader(vtk_pipeline.VDIReader):
-    """The steps of a series, from one file: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
+    """The steps of a series: :class:`pyvista_vdi.vtk_pipeline.VDIReader`."""
 
 
 @smproxy.writer(
@@ -467,8 +467,8 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
            <String value="usual" /><String value="exact" />
            <String value="8-byte" />
          </StringListDomain>
-         <Documentation>What a supersegment takes. usual: 8 bytes in a .vdis, a seventh of the exact
-         file at an SSIM of .9999; exact, 24 bytes, in a .vdi. An .exr has float32.</Documentation>
+         <Documentation>What a supersegment takes. usual: 8 bytes in a .vdis; exact, 24 bytes, in a
+         .vdi. An .exr has float32.</Documentation>
        </StringVectorProperty>
        <StringVectorProperty name="Compression" command="SetCompressionName" number_of_elements="1"
                              default_values="usual" panel_visibility="advanced">
@@ -478,13 +478,7 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
          </StringListDomain>
          <Documentation>usual: zstd of .vdis, lz4 of .vdi (zstd is smaller); an .exr has no
          other.</Documentation>
-       </StringVectorProperty>
-       <DoubleVectorProperty name="Tolerance" command="SetTolerance" number_of_elements="1"
-                             default_values="0" panel_visibility="advanced">
-         <DoubleRangeDomain name="range" min="0" max="1" />
-         <Documentation>Of a .vdis: what opacities, and colours times opacity, may differ by where
-         that saves bytes.</Documentation>
-       </DoubleVectorProperty>"""
+       </StringVectorProperty>"""
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)

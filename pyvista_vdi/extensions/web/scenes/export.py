@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import warn_external
-from pyvista_vdi.extensions.web.page import View, assembled, check_controls, in_parts
-from pyvista_vdi.extensions.web.placing import encoded_many, several_of
+from pyvista_vdi.extensions.web.page import View, assembled, check_controls, in_parts, several
+from pyvista_vdi.extensions.web.placing import several_of
 from pyvista_vdi.extensions.web.scenes.scene import scene_of
 from pyvista_vdi.extensions.web.still import part_of
 from pyvista_vdi.model.whole_file import whole_file
@@ -77,7 +77,7 @@ def not_played(renderer: Any, actors: Sequence[Any]) -> list[str]:
 def _series_of(actor: Any) -> list[bytes]:
     """Return the series or the set that an actor shows as a page holds it; none of one VDI."""
     shown = several_of(actor)
-    return [] if shown is None else in_parts(*encoded_many(shown))
+    return [] if shown is None else in_parts(*several(shown, compression="deflate"))
 
 
 def drawn(plotter: Any) -> Any:

@@ -111,9 +111,11 @@ async function decodedFile(bytes, level) {
 
 // -- archive and description ---------------------------------------------------------------------
 
-// Members in the order in which they lie, by their local headers alone, as a stream brings them.
-// Of the beginning of a file those that are whole.
-function* membersOf(bytes, beginning) {
+/**
+ * Members in the order in which they lie, by their local headers alone, as a stream brings them: of
+ * the beginning of a file those that are whole.
+ */
+export function* membersOf(bytes, beginning) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const name = new TextDecoder();
   let at = 0;
@@ -147,7 +149,8 @@ function* membersOf(bytes, beginning) {
   );
 }
 
-function checkedMember({ name, crc, bytes }) {
+/** A member's bytes, if they are those that were written. */
+export function checkedMember({ name, crc, bytes }) {
   if (crc32(bytes) !== crc) damaged(`the checksum of its member ${name} differs`);
   return bytes;
 }
@@ -232,7 +235,8 @@ function requireAll(d, good) {
   }
 }
 
-function isCamera(c) {
+/** Whether JSON describes a camera. */
+export function isCamera(c) {
   return c !== null && typeof c === "object" &&
     ["position", "focal_point", "view_up"].every((name) => areNumbers(c[name], 3)) &&
     c.position.some((x, k) => x !== c.focal_point[k]) &&

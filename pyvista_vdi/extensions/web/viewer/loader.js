@@ -1,24 +1,21 @@
 // A file from wherever it is to prepared levels: read piece by piece, decoded in a worker.
-import { beginsAsSeries } from "./frames.js";
 import { askPort, borrowPort, returnPort } from "./port.js";
-import { Series } from "./series.js";
-import { VDIFileError } from "./unpack.js";
-
-const FIRST_BYTES = 1 << 16; // of a series that is read by ranges
+import { BEGIN, Series, beginsAsSeries } from "./series.js";
+import { GrowingBytes, VDIFileError } from "./unpack.js";
 
 /**
  * Load a VDI: first its coarse level, where the file has one, then the whole. Or a series or a set.
  *
  * @param {string|URL|Uint8Array|ArrayBuffer|Blob|ReadableStream|AsyncIterable} source A .vdi, .vdis
  *   or .vdiset file: where it is, its bytes, or its pieces, which may be base64 text as
- *   {@link embedded} gives it.
+ *   {@link embedded} gives it. Or where the folder of a series is.
  * @param {object} options
  * @param {(prepared: object) => void} options.onLevel Called with each level as prepare.js makes
  *   it; its `level` is "coarse" or "full".
  * @param {(vdi: object) => void} [options.onBegin] Called before a coarse level with its camera,
  *   windowSize, bounds and depthOrigin.
  * @param {(series: Series) => void} [options.onSeries] Called with a series when it has a step. Of
- *   an address whose server gives parts of files, steps are read when they are asked for.
+ *   a folder, steps are read when they are asked for.
  * @param {(fraction: number) => void} [options.onProgress] Called with the share that was read,
  *   0 to 1, where the length is known.
  * @param {AbortSignal} [options.signal] Ends it; the promise is then rejected by its reason.
@@ -39,21 +36,22 @@ export async function load(
   let pieces = null;
   try {
     if (isSeriesAddress(source) && Series && onSeries) {
-      const parts = await rangesOf(source, signal);
-      const series = parts.read && await Series.ofParts(parts);
-      signal?.throwIfAborted();
-      if (series) {
+      const { folder, response } = await folderAt(source, signal);
+      if (folder) {
+        const name = /\.vdis\/$/i.test(folder.pathname) ? "series.json" : "set.json";
+        const series = await Series.ofFolder(name, async (file) =>
+          new Uint8Array(await (await fetched(new URL(file, folder))).arrayBuffer()));
+        signal?.throwIfAborted();
         onSeries(series);
         onProgress(1);
         return;
       }
-      source = parts.response ?? source;
+      source = response;
     }
     pieces = piecesOf(source, onProgress, signal);
-    const first = await unlessAborted(pieces.next());
-    const rest = following(first, pieces);
-    if (Series && onSeries && !first.done && beginsAsSeries(first.value)) {
-      await unlessAborted(Series.ofPieces(rest, (series) => {
+    const rest = await unlessAborted(begun(pieces));
+    if (Series && onSeries && rest.first && beginsAsSeries(rest.first)) {
+      await unlessAborted(Series.ofPieces(rest.pieces, (series) => {
         if (!signal?.aborted) onSeries(series);
       }));
       return;
@@ -64,7 +62,7 @@ export async function load(
       if (!signal?.aborted) begun ? onBegin(begun) : onLevel(prepared);
     };
     const ask = (message) => unlessAborted(askPort(port, message, hear));
-    for (let next; !(next = await unlessAborted(rest.next())).done;) await ask({ piece: next.value });
+    for (let next; !(next = await unlessAborted(rest.pieces.next())).done;) await ask({ piece: next.value });
     await ask({ end: true });
     working = false;
   } finally {
@@ -73,9 +71,22 @@ export async function load(
   }
 }
 
+// The first bytes, or the first text, of pieces, and all of them.
+async function begun(pieces) {
+  let { value: first, done } = await pieces.next();
+  while (!done && typeof first !== "string" && first.length < BEGIN) {
+    const next = await pieces.next();
+    if ((done = next.done)) break;
+    const [before, piece] = [new GrowingBytes(), next.value];
+    [first, piece].forEach((each) => before.push(each));
+    first = before.whole;
+  }
+  return { first, pieces: following(first, pieces) };
+}
+
 async function* following(first, pieces) {
-  if (first.done) return;
-  yield first.value;
+  if (first === undefined) return;
+  yield first;
   yield* pieces;
 }
 
@@ -151,33 +162,25 @@ async function* piecesOf(source, onProgress, signal) {
 function isSeriesAddress(source) {
   if (typeof source !== "string" && !(source instanceof URL)) return false;
   return URL.canParse(source, document.baseURI) &&
-    /\.vdis(et)?$/i.test(new URL(source, document.baseURI).pathname);
+    /\.vdis(et)?\/?$/i.test(new URL(source, document.baseURI).pathname);
 }
 
-// A file whose server gives parts of it: its size, its first bytes and what reads others. Otherwise
-// the response with all of it, or nothing where the size is not said.
-async function rangesOf(url, signal) {
-  const ask = (begin, end, by) => fetched(url, by, { Range: `bytes=${begin}-${end - 1}` });
-  const response = await ask(0, FIRST_BYTES, signal);
-  if (response.status !== 206) return { response };
-  const size = Number(/\/(\d+)$/.exec(response.headers.get("Content-Range") ?? "")?.[1] ?? 0);
-  const first = new Uint8Array(await response.arrayBuffer());
-  if (!size || first.length !== Math.min(size, FIRST_BYTES)) return {};
-  const read = async (begin, end) => {
-    const part = await ask(begin, end);
-    const bytes = part.status === 206 ? new Uint8Array(await part.arrayBuffer()) : [];
-    if (bytes.length !== end - begin) {
-      throw new VDIFileError(`${url} breaks off, or is another file by now: load it again`);
-    }
-    return bytes;
-  };
-  return { read, size, first };
+// Whether an address is that of a folder: it ends in a slash, by itself or as servers say. Otherwise
+// the response with the file.
+async function folderAt(source, signal) {
+  const url = new URL(source, document.baseURI);
+  if (url.pathname.endsWith("/")) return { folder: url };
+  const response = await fetched(url, signal);
+  const found = response.url ? new URL(response.url) : url;
+  if (!found.pathname.endsWith("/")) return { response };
+  response.body?.cancel();
+  return { folder: found };
 }
 
-async function fetched(url, signal, headers = {}) {
+async function fetched(url, signal) {
   let response;
   try {
-    response = await fetch(url, { signal, headers });
+    response = await fetch(url, { signal });
   } catch (error) {
     if (signal?.aborted) throw error;
     throw new VDIFileError(

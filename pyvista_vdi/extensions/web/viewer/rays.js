@@ -205,7 +205,7 @@ export function frameForms(frame, space, windowSize, rays, parallel, clippingPla
 }
 
 /**
- * The list space of every second list, which stands for its neighbour, too (VDI.thinned).
+ * The list space of every second list, which stands for its neighbour, too.
  *
  * @param {object} space Of {@link listSpace}.
  * @param {number[]} windowSize Lists.

@@ -1,65 +1,67 @@
-// A .vdis or .vdiset file in a page: its steps, or views, when they are asked for, by a worker.
-import {
-  TRAILER_BYTES, findFrames, headBytes, headOf, indexPlace, indexedFrames,
-} from "./frames.js";
+// A series or a set in a page: a JSON and numbered .vdi files, in a ZIP or a folder (docs/series.md).
+import { checkedMember, isCamera, membersOf } from "./decode.js";
 import { askPort, decodingPort } from "./port.js";
 import { GrowingBytes, REMEDY, VDIFileError } from "./unpack.js";
 
-/** Bytes of frames that were fetched and are kept. */
-const MOST_FETCHED = 1 << 28;
+/** The JSON's name, and its entry that has one item for each VDI. */
+const LISTED = { "series.json": "times", "set.json": "views" };
+/** Where a ZIP has its first member's name. */
+const NAME_AT = 30;
+/** Bytes that tell what a file is. */
+export const BEGIN = 64;
 
-/** The VDIs of one scene at several times. */
+const nameOf = (i) => `${String(i).padStart(6, "0")}.vdi`;
+
+/** Whether bytes, or base64 text, are the beginning of a series' ZIP, or of a set's. */
+export function beginsAsSeries(piece) {
+  const text = typeof piece === "string" ? atob(piece.trimStart().slice(0, BEGIN)) :
+    String.fromCharCode(...piece.subarray(0, BEGIN));
+  return Object.keys(LISTED).some((name) => text.startsWith(name, NAME_AT));
+}
+
+/** The VDIs of one scene at several times, or from several views. */
 export class Series {
-  #frames = [];
-  #read; // async (place, size) -> the bytes of a frame's content
-  #codec;
+  #read; // async (i) -> the bytes of a VDI's file, which may be handed over
+  #times;
+  #of; // what one is called
   #port = null; // a promise
   #last = Promise.resolve(); // of what was asked for
   #closing = () => {}; // rejects what is being decoded
   #era = 0; // how often it was closed
 
-  /** Whether all of the file's steps are known. */
+  /** How many VDIs there are, by now. */
+  length = 0;
+  /** Whether all that there will be are there. */
   complete = false;
-  /** Called when there are more steps. */
+  /** Called when there are more. */
   changed = () => {};
 
-  /** Of a set the V_Os' cameras by the numbers of its VDIs; else null, as the two that follow. */
+  /** Of a set the V_Os' cameras; else null, as the two that follow. */
   views = null;
   bounds = null;
   camera = null;
 
-  constructor({ codec, set }, read) {
-    this.#codec = codec;
+  constructor(name, text, read) {
+    const head = headOf(name, text);
     this.#read = read;
-    Object.assign(this, set);
-  }
-
-  /** The number that a step has in the file: others before it may be lost. */
-  numberOf(i) {
-    return this.#frames[i].number;
-  }
-
-  /** How many steps there are. */
-  get length() {
-    return this.#frames.length;
+    this.#of = head.views ? "view" : "step";
+    this.#times = head.times ?? head.views.map((_, i) => i);
+    if (head.views) ({ views: this.views, bounds: this.bounds, camera: this.camera } = head);
   }
 
   /** The steps' times, ascending. */
   get times() {
-    return this.#frames.map(({ time }) => time);
+    return this.#times.slice(0, this.length);
   }
 
   /** The index of the step nearest in time; of two, the earlier. */
   nearest(time) {
-    let best = 0;
-    this.#frames.forEach((frame, i) => {
-      if (Math.abs(frame.time - time) < Math.abs(this.#frames[best].time - time)) best = i;
-    });
-    return best;
+    const far = this.times.map((at) => Math.abs(at - time));
+    return far.indexOf(Math.min(...far));
   }
 
   /**
-   * A step as prepare.js makes it; one is decoded after the other.
+   * A VDI as prepare.js makes it; one is decoded after the other.
    *
    * @param {number} i Its index.
    * @returns {Promise<object>}
@@ -75,7 +77,7 @@ export class Series {
     return found;
   }
 
-  /** End the worker; the next step that is asked for starts another. */
+  /** End the worker; the next VDI that is asked for starts another. */
   close() {
     this.#port?.then((port) => port.terminate());
     this.#port = null;
@@ -87,125 +89,96 @@ export class Series {
     const closed = new Promise((_, reject) => (this.#closing = reject));
     closed.catch(() => {});
     const unlessClosed = (promise) => Promise.race([promise, closed]);
-    const needed = new Set(this.#frames.map(({ by }) => by));
-    const chain = [];
-    for (let frame = this.#frames[i]; frame;) {
-      chain.push(frame);
-      const { by } = frame;
-      frame = by < 0 ? null : this.#frames.find(({ number }) => number === by);
-      if (frame === undefined) {
-        throw new VDIFileError(`the series is damaged: step ${this.#frames[i].number} is written ` +
-          `by step ${by}, which cannot be found; ${REMEDY}`);
-      }
+    try {
+      const file = await unlessClosed(this.#read(i));
+      const port = await unlessClosed(this.#port ??= decodingPort());
+      let prepared;
+      await unlessClosed(askPort(port, { file }, (data) => ({ prepared } = data), [file.buffer]));
+      return prepared;
+    } catch (error) {
+      if (!(error instanceof VDIFileError)) throw error;
+      throw new VDIFileError(`${this.#of} ${i} cannot be shown: ${error.message}`);
     }
-    const read = chain.map(async ({ number, kind, checksum, place, size }) => {
-      const content = (await this.#read(place, size)).slice(); // without the rest of its buffer
-      return { number, kind, checksum, content, needed: needed.has(number) };
-    });
-    const frames = await unlessClosed(Promise.all(read));
-    const port = await unlessClosed(this.#port ??= decodingPort());
-    let prepared;
-    const handed = frames.map(({ content }) => content.buffer);
-    await unlessClosed(askPort(port, { codec: this.#codec, frames }, (data) => {
-      ({ prepared } = data);
-    }, handed));
-    return prepared;
   }
 
-  #take(frames) {
-    if (this.views && frames.some(({ number }) => number >= this.views.length)) {
-      throw new VDIFileError(`the set is damaged: it has more VDIs than views; ${REMEDY}`);
-    }
-    this.#frames = frames;
+  #take(length, complete = false) {
+    [this.length, this.complete] = [Math.min(length, this.#times.length), complete];
     this.changed();
   }
 
   /**
-   * Read a series from pieces that come one behind the other.
+   * Read a ZIP from pieces that come one behind the other.
    *
    * @param {AsyncIterable} pieces Uint8Array or base64 text.
-   * @param {(series: Series) => void} onSeries Called when its first step is there.
+   * @param {(series: Series) => void} onSeries Called when its first VDI is there.
    * @returns {Promise<void>} When all has been read.
-   * @throws {VDIFileError} If there is no step.
+   * @throws {VDIFileError} If there is no VDI.
    */
   static async ofPieces(pieces, onSeries) {
     const bytes = new GrowingBytes();
-    const found = [];
-    let series = null, head = null, at = 0;
-    const give = (frames) => {
-      if (!frames.length || frames.length === series?.length) return;
-      const begun = series !== null;
-      series ??= new Series(head, async (place, size) =>
-        bytes.whole.subarray(place, place + size));
-      series.#take([...frames]);
-      if (!begun) onSeries(series);
-    };
-    const look = (whole) => {
-      head ??= headOf(bytes.whole);
-      if (!head) return;
-      at = findFrames(bytes.whole, found, Math.max(at, head.begin), whole);
-      give(found);
+    const places = []; // where each VDI begins and ends
+    let series = null, at = 0;
+    const look = () => {
+      const known = places.length;
+      for (const member of membersOf(bytes.whole.subarray(at), true)) {
+        const begin = member.bytes.byteOffset, end = begin + member.bytes.length;
+        if (!series) {
+          series = new Series(member.name, checkedMember(member),
+            async (i) => bytes.whole.slice(...places[i]));
+        } else if (member.name === nameOf(places.length)) places.push([begin, end]);
+        at = end;
+      }
+      if (places.length === known) return;
+      series.#take(places.length);
+      if (!known) onSeries(series);
     };
     for await (const piece of pieces) {
       bytes.push(piece);
-      look(false);
+      look();
     }
-    const place = indexPlace(bytes.whole.subarray(-TRAILER_BYTES), bytes.whole.length);
-    const indexed = head && place >= 0 &&
-      indexedFrames(bytes.whole.subarray(place), head.begin, place);
-    if (indexed) give(indexed);
-    else look(true);
-    if (!series) throw noStep();
-    series.complete = true;
-    series.changed();
+    if (!places.length) {
+      throw new VDIFileError("the series has no whole VDI: it was cut off, or none is written yet");
+    }
+    series.#take(places.length, true);
   }
 
   /**
-   * The series in a file that is read by parts.
+   * The series or set in a folder, of which each VDI is read when it is asked for.
    *
-   * @param {object} file size; first: Uint8Array, its first bytes; read(begin, end): a promise of
-   *   other ones.
-   * @returns {Promise<Series|null>} null where it has no index, and must be read as a whole.
+   * @param {string} name Of the JSON: "series.json" or "set.json".
+   * @param {(name: string) => Promise<Uint8Array>} read Returns the bytes of one of the files.
+   * @returns {Promise<Series>}
    */
-  static async ofParts({ read, size, first }) {
-    const whole = headBytes(first); // of a set of many views it is long
-    const head = headOf(whole <= first.length || whole > size ? first : await read(0, whole));
-    if (!head) return null;
-    const tailAt = Math.max(0, size - first.length);
-    let tail = tailAt === 0 ? first : await read(tailAt, size);
-    const place = indexPlace(tail, size);
-    if (place < 0) return null;
-    tail = place < tailAt ? await read(place, size) : tail.subarray(place - tailAt);
-    const frames = indexedFrames(tail, head.begin, place);
-    if (!frames) return null;
-    if (!frames.length) throw noStep();
-    const kept = new Map(); // place -> promise of bytes; what was used last is last
-    let bytes = 0;
-    const series = new Series(head, (at, n) => {
-      const known = kept.get(at) ?? read(at, at + n);
-      bytes += kept.delete(at) ? 0 : n;
-      kept.set(at, known);
-      known.catch(() => { // it may be there when it is asked for again
-        if (kept.delete(at)) bytes -= n;
-      });
-      for (const old of kept.keys()) {
-        if (bytes <= MOST_FETCHED || old === at) break;
-        kept.delete(old);
-        bytes -= frames.find((frame) => frame.place === old).size;
-      }
-      return known;
-    });
-    series.#take(frames);
-    series.complete = true;
+  static async ofFolder(name, read) {
+    const series = new Series(name, await read(name), (i) => read(nameOf(i)));
+    if (!series.#times.length) throw new VDIFileError("the series has no step yet");
+    series.#take(Infinity, true);
     return series;
   }
 }
 
-function closedError() {
-  return new DOMException("The series is closed.", "AbortError");
+// What the JSON says, checked.
+function headOf(name, text) {
+  let head = null;
+  try {
+    head = JSON.parse(new TextDecoder().decode(text));
+  } catch { /* said below */ }
+  const format = `pyvista-vdi-${name.replace(".json", "")}`;
+  const listed = head?.[LISTED[name]];
+  if (head?.format !== format || !Array.isArray(listed)) {
+    throw new VDIFileError(`this is no series of VDIs: its ${name} is not that of one; ${REMEDY}`);
+  }
+  if (head.version !== 1) {
+    throw new VDIFileError(
+      `the series is of version ${head.version}, and this viewer reads version 1`);
+  }
+  const finite = (list) => list.every(Number.isFinite);
+  const good = head.views ? [...listed, head.camera].every(isCamera) && listed.length > 0 &&
+    Array.isArray(head.bounds) && head.bounds.length === 6 && finite(head.bounds) : finite(listed);
+  if (!good) throw new VDIFileError(`the series is damaged: its ${name} says what cannot be; ${REMEDY}`);
+  return head;
 }
 
-function noStep() {
-  return new VDIFileError(
-    "the series has no finished step: it was cut off, or none is written yet");
+function closedError() {
+  return new DOMException("The series is closed.", "AbortError");
 }

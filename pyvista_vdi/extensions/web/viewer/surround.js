@@ -33,7 +33,7 @@ export class Surround {
   #places; // of the views
   #here = null;
   #before = null;
-  #nearest = -1; // index among the set's frames
+  #nearest = -1; // index
   #shown = -1;
   #ready = new Map(); // index -> what prepare.js made; what was used last is last
   #broken = new Set();
@@ -109,7 +109,7 @@ export class Surround {
   // The set's VDIs, the nearest to a place first.
   #order(place) {
     const far = Array.from({ length: this.#set.length }, (_, i) =>
-      apart(place, this.#places[this.#set.numberOf(i)]));
+      apart(place, this.#places[i]));
     return [...far.keys()].sort((i, k) => far[i] - far[k]);
   }
 

@@ -1,13 +1,12 @@
 // What runs in the worker: bytes come, prepared levels go. A page that may start none runs it, too.
-import { LevelDecoder } from "./decode.js";
+import { LevelDecoder, decodeVDI } from "./decode.js";
 import { prepare, transferables } from "./prepare.js";
-import { StepDecoder } from "./steps.js";
 
 /**
  * Decode files whose pieces come as messages, one file after the other.
  *
  * Messages to it are `{ piece }` (Uint8Array, or base64 text) and `{ end: true }`; or
- * `{ codec, frames }`, for a step of a series as {@link StepDecoder} takes it. It sends
+ * `{ file }`, for a whole .vdi file, as of a step. It sends
  * `{ ready: true }` when it listens, `{ begun }` and `{ prepared }` for each level, and answers a
  * message by `{ done: true }`, or by `{ error }`, a sentence. After an error it takes no more pieces.
  *
@@ -21,10 +20,9 @@ export function serve(scope) {
   };
   const begin = (begun) => scope.postMessage({ begun });
   let decoder = new LevelDecoder(give, begin);
-  let steps = null;
-  scope.onmessage = async ({ data: { piece, end, codec, frames } }) => {
+  scope.onmessage = async ({ data: { piece, end, file } }) => {
     try {
-      if (frames) give(await (steps ??= new StepDecoder()).decode(codec, frames));
+      if (file) give(await decodeVDI(file));
       else await (end ? decoder.end() : decoder.push(piece));
       if (end) decoder = new LevelDecoder(give, begin);
       scope.postMessage({ done: true });

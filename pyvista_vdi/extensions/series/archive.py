@@ -1,0 +1,218 @@
+"""How series and sets are stored: a folder, or one ZIP, of numbered .vdi files and one JSON."""
+
+from __future__ import annotations
+
+import io
+import os
+import weakref
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import IO, Any, NoReturn
+
+from pyvista_vdi._version import __version__
+from pyvista_vdi.errors import VDIFileError
+from pyvista_vdi.io.files import opened
+from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file import reader, writer
+from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
+from pyvista_vdi.io.vdi_file.description import from_json, to_json
+from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
+
+#: Version of the JSON.
+VERSION = 1
+#: VDIs that are kept of those that were read: the last ones.
+_KEPT = 6
+#: What the files of an earlier format begin with: steps by differences, and sets of them.
+_EARLIER = (b"\x89VDIS\r\n\x1a", b"\x89VDIV\r\n\x1a")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What distinguishes a stored series from a stored set."""
+
+    name: str
+    suffix: str
+    listed: str  # the JSON's entry that has one item for each VDI
+
+    @property
+    def head(self) -> str:
+        """Name of the JSON."""
+        return f"{self.name}.json"
+
+
+SERIES = Kind("series", ".vdis", "times")
+SET = Kind("set", ".vdiset", "views")
+
+
+def encoded(
+    vdi: VDI | DeferredVDI,
+    *,
+    precision: str = "8-byte",
+    compression: str = "zstd",
+    level: int | None = None,
+) -> bytes:
+    """Return a VDI's file; its options are those of :meth:`VDI.save`."""
+    one_of(compression, "compression", (*CODECS, "none"))
+    check_level(level)
+    vdi = vdi.with_precision(precision)
+    lists, about = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
+    stream = io.BytesIO()
+    writer.write_to(stream, lists, compression, level, coarse=False, deferred=about)
+    return stream.getvalue()
+
+
+class Archive(Sequence[Any]):
+    """The VDIs of a folder, a ZIP or a page: each is read when it is asked for, from any thread.
+
+    It is pickled as its path and kind. ``about`` is what the JSON says.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], kind: Kind) -> None:
+        self.path, self._kind = as_path(path).absolute(), kind
+        self._root: Any = self.path if self.path.is_dir() else zipfile.Path(self._opened())
+        self._read = lru_cache(_KEPT)(self._read_now)
+        content = self._content(kind.head)
+        try:
+            self.about: dict[str, Any] = from_json(content)
+            form, version = self.about["format"], self.about["version"]
+            self._length = len(self.about[kind.listed])
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
+            self.refuse(f"its {kind.head} is incomplete ({error!r})")
+        if (form, version) != (f"pyvista-vdi-{kind.name}", VERSION):
+            raise VDIFileError(
+                f"{path} is of the format {form!r}, version {version!r}; this is pyvista-vdi "
+                f"{__version__}, which reads 'pyvista-vdi-{kind.name}', version {VERSION}: upgrade "
+                "by pip install -U pyvista-vdi"
+            )
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.path, self._kind)
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._read(range(len(self))[index])
+
+    def info(self) -> FileInfo:
+        """Return what is known of the first VDI without its arrays, and the bytes of all."""
+        first = reader.read_info(self.path / name_of(0), stream=self._stream(0))
+        files = self.path.iterdir() if self.path.is_dir() else [self.path]
+        n_bytes = sum(file.stat().st_size for file in files)
+        return replace(first, path=self.path, file_bytes=n_bytes)
+
+    def refuse(self, why: str) -> NoReturn:
+        """Raise the error of what is damaged."""
+        raise VDIFileError(
+            f"{self.path} is damaged: {why}; copy it from its source again, or make it anew"
+        )
+
+    def _opened(self) -> zipfile.ZipFile:
+        """Return the file as an archive, or say what it is instead of one."""
+        try:
+            stream = opened(self.path)
+            weakref.finalize(self, stream.close)
+            begin = stream.read(8)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
+        if begin in _EARLIER:
+            raise VDIFileError(_earlier(self.path))
+        if not begin.startswith(b"PK"):
+            name = self._kind.name
+            raise VDIFileError(f"{self.path} is not a {name} of VDIs: it begins with {begin!r}")
+        try:
+            archive = zipfile.ZipFile(stream)
+        except reader.ARCHIVE_ERRORS as error:
+            self.refuse(f"it is truncated, or no whole ZIP ({error})")
+        # The directory at the end of a file that was cut off is that of a .vdi file within
+        if not archive.infolist() or archive.infolist()[0].header_offset:
+            self.refuse("it is truncated")
+        if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
+            self.refuse("its files are compressed once more: zip them by zip -0")
+        return archive
+
+    def _content(self, name: str) -> bytes:
+        """Return the bytes of one of the files."""
+        try:
+            return (self._root / name).read_bytes()  # type: ignore[no-any-return]
+        except (KeyError, FileNotFoundError):
+            self.refuse(f"it has no {name}")
+        except reader.ARCHIVE_ERRORS as error:
+            self.refuse(f"its {name} cannot be read ({error})")
+
+    def _stream(self, i: int) -> Any:
+        return io.BytesIO(self._content(name_of(i)))
+
+    def _read_now(self, i: int) -> Any:
+        return reader.read(self.path / name_of(i), stream=self._stream(i))
+
+
+def _earlier(path: Path) -> str:
+    """Return what is said of a file of the earlier format."""
+    return (
+        f"{path} is of an earlier format (VDIs by their differences), which is not read any more: "
+        "make it anew, or have the version that wrote it write .vdi files (pyvista-vdi convert), "
+        "and join these by 'pyvista-vdi series'"
+    )
+
+
+def name_of(i: int) -> str:
+    """Return the name of a VDI's file by its number."""
+    return f"{i:06}.vdi"
+
+
+def head_bytes(kind: Kind, about: Mapping[str, Any]) -> bytes:
+    """Return the JSON."""
+    head = {"format": f"pyvista-vdi-{kind.name}", "version": VERSION}
+    return to_json({**head, "written_by": f"pyvista-vdi {__version__}", **about}).encode()
+
+
+def write(
+    path: str | os.PathLike[str],
+    kind: Kind,
+    about: Mapping[str, Any],
+    vdis: Sequence[Any],
+    *,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Path:
+    """Write one file, which appears whole or not at all; it replaces what was there."""
+    target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.name}"))
+    if target.exists():
+        with target.open("rb") as stream:
+            if stream.read(8) in _EARLIER:
+                raise VDIFileError(f"{_earlier(target)}; choose another name for this one")
+    with whole_file(target) as out:
+        write_to(out, kind, about, vdis, progress=progress, **options)
+    return target
+
+
+def write_to(
+    stream: IO[bytes],
+    kind: Kind,
+    about: Mapping[str, Any],
+    vdis: Sequence[Any],
+    *,
+    progress: Progress | None = None,
+    **options: Any,
+) -> int:
+    """Write one file to a stream; return how many bytes hold the JSON and the first VDI.
+
+    ``options``: those of :func:`encoded`.
+    """
+    done, first = Pieces(progress, len(vdis)), 0
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr(writer.stored(kind.head), head_bytes(kind, about))
+        for i in range(len(vdis)):
+            archive.writestr(writer.stored(name_of(i)), encoded(vdis[i], **options))
+            first = first or stream.tell()
+            done()
+    return first
