@@ -247,8 +247,9 @@ def added_blocks(
 
 def _own(first: Any, several: VDICollection | None) -> Any:
     """Return what has a view to open from; ``None`` for volumes, and sets that tell of none."""
-    if several is not None and several.times is None:
-        return several if "camera" in getattr(several, "about", {}) else None
+    sets: Any = several
+    if several is not None and several.times is None and sets.camera == sets.cameras[0]:
+        return None
     if several is not None:
         return several
     return first if isinstance(first, VDI | DeferredVDI) else None

@@ -48,7 +48,7 @@ def test_it_opens_from_its_own_view(kind):
     if kind == "series":
         thing = pvdi.VDISeries.of([vdi])
     if kind == "set":
-        thing = pvdi.VDISet([vdi], [OWN], about={"camera": OWN.to_dict()})
+        thing = pvdi.VDISet([vdi, vdi], [OWN.azimuth(90), OWN], camera=OWN)
     _, actor = picture(lambda plotter: plotter.add_vdi(thing))
     assert (actor.status.angle, actor.status.coverage) == (pytest.approx(0, abs=1e-6), 1)
 
@@ -240,14 +240,13 @@ def test_a_closed_plotter_that_is_kept_holds_nothing_on_the_device(default_runti
 
 
 @pytest.mark.extension("sets")
-def test_a_set_that_has_grown_is_blended_anew(plotter):
-    eyes = [(0, -6, 1), (6, 0, 1)]
+def test_another_blend_of_a_set_is_drawn(plotter):
     looks = {"cmap": "bone", "opacity_unit_distance": 0.2}
-    views = [pvdi.Camera(eye, (0, 0, 0), (0, 0, 1)) for eye in (*eyes, (4.5, -4, 1))]
-    *first, another = (pvdi.generate(soft_ball(), view, WINDOW, **looks) for view in views)
-    vdis = pvdi.VDISet.of(first)
+    eyes = [(0, -6, 1), (6, 0, 1)]
+    views = [pvdi.Camera(eye, (0, 0, 0), (0, 0, 1)) for eye in eyes]
+    vdis = pvdi.VDISet.of([pvdi.generate(soft_ball(), view, WINDOW, **looks) for view in views])
     plotter.add_vdi(vdis, show_scalar_bar=False, regenerate="never")
-    plotter.camera_position = [(4, -4.1, 1), (0, 0, 0), (0, 0, 1)]
+    plotter.camera_position = [(4.3, -4.2, 1), (0, 0, 0), (0, 0, 1)]
     before = shown(plotter)
-    vdis.add(another)
+    vdis.blend = 60
     assert np.abs(shown(plotter) - before).max() > 0
