@@ -55,13 +55,14 @@ def coverage(session: nox.Session) -> None:
 
 @nox.session
 def lint(session: nox.Session) -> None:
-    """Check style, formatting and spelling, as pre-commit does."""
+    """Check style, formatting and spelling, as pre-commit does, and ceilings of size."""
     session.install("ruff>=0.15", "codespell[toml]>=2.3", CLANG_FORMAT)
     session.run("ruff", "check", "--no-cache", ".")
     session.run("ruff", "format", "--no-cache", "--check", ".")
     session.run("codespell")
     kernels = map(str, sorted(Path("opencl").rglob("*.cl")))
     session.run("clang-format", "--dry-run", "--Werror", *kernels)
+    session.run("python", "tools/size.py")
 
 
 @nox.session
@@ -122,13 +123,12 @@ def bench(session: nox.Session) -> None:
 
 @nox.session
 def mutants(session: nox.Session) -> None:
-    """Try which mistakes the tests notice; arguments go to tools/mutants.py."""
+    """Try which of a sample of mistakes the tests notice; arguments go to tools/mutants.py."""
     session.install("-e", ".[test]")
     session.run("python", "tools/mutants.py", *session.posargs)
 
 
 @nox.session
 def figures(session: nox.Session) -> None:
-    """Name the published figures that are older than the code they measured."""
-    session.install("-e", ".")
+    """Name the published figures whose code has changed since they were measured."""
     session.run("python", "tools/figures.py", *session.posargs, success_codes=[0, 1])

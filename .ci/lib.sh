@@ -105,18 +105,24 @@ prepare() {
     (cd "$checkout" && git ls-files --cached --others --exclude-standard -z |
         while IFS= read -r -d '' file; do [[ ! -f $file ]] || printf '%s\0' "$file"; done |
         tar --null --files-from=- -cf - | tar -xf - -C "$work/source")
+    # The tests must see the installed package: they lie away from the sources, with what they read
+    mkdir "$work/tests-only"
+    cp -r "$work/source/"{tests,examples,docs,benchmarks,pyproject.toml} "$work/tests-only/"
     log "$(uname -srm), $(nproc) cores, $("$python" --version)"
     log "volumes that are not shipped: ${PYVISTA_VDI_DATA:-none (PYVISTA_VDI_DATA is not set)}"
 }
 
-# Install what a bare Debian lacks; a browser among the arguments.
+# Packages beyond those that README names
+beyond_readme=(pocl-opencl-icd xvfb libgl1 openmpi-bin)
+
+# install_packages PACKAGE...: what README has a bare Debian install, and these.
 install_packages() {
     if ! command -v apt-get >/dev/null; then
         log "not a Debian: taking the system as it is"
         return 0
     fi
     local package missing=() as_root=()
-    for package in git pocl-opencl-icd libegl1 libgl1-mesa-dri xvfb libgl1 "$@"; do
+    for package in git libegl1 libgl1-mesa-dri "$@"; do
         dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
             missing+=("$package")
     done
@@ -140,11 +146,8 @@ environment() {
         "pyvista-vdi$extras @ file://$(compgen -G "$work/dist/*.whl")" "$@"
 }
 
-# The tests must see the installed package, and two OpenCL implementations: they lie away from the
-# sources, with what they read.
+# The tests must see the installed package, and two OpenCL implementations.
 check_environment() {
-    mkdir -p "$work/tests-only"
-    cp -r "$work/source/"{tests,examples,docs,benchmarks,pyproject.toml} "$work/tests-only/"
     cd "$work/tests-only"
     "$work/venv/bin/pyvista-vdi" devices
     PYVISTA_VDI_MIN_PLATFORMS=${PYVISTA_VDI_MIN_PLATFORMS:-2} "$work/venv/bin/python" - <<'PYTHON'
@@ -233,7 +236,61 @@ readme_command() {
     log "$command"
     bash -euo pipefail -c "$command"
     if [[ $1 == main ]]; then
+        .venv/bin/pyvista-vdi devices
         ls -l out
         [[ -n $(find out -type f -size +0) ]]
     fi
+}
+
+# The OpenCL drivers and the programs that are seen here, and that README's machine does not have
+not_of_readme() {
+    local file
+    for file in /etc/OpenCL/vendors/*.icd $(type -aP mpirun mpiexec node npm Xvfb exrinfo oiiotool \
+        pvpython clang chromium{,-browser,-headless-shell} google-chrome firefox{,-esr}); do
+        [[ ! -f $file || ($file != *.icd && ! -x $file) ]] || readlink -f "$file"
+    done | sort -u
+}
+
+# as_readme COMMAND...: run it where those are hidden, and nothing is set that README does not set.
+as_readme() {
+    local hidden namespace=()
+    mapfile -t hidden < <(not_of_readme)
+    if ((${#hidden[@]})); then
+        namespace=(unshare --mount)
+        ((EUID == 0)) || namespace+=(--map-root-user)
+        "${namespace[@]}" true || {
+            log "README's commands are to run without ${hidden[*]}, and 'unshare --mount' cannot hide" \
+                "them here: take a machine without them, or let root make namespaces (CAP_SYS_ADMIN)"
+            return 1
+        }
+    fi
+    unset "${!PYVISTA@}" VTK_DEFAULT_OPENGL_WINDOW
+    export work
+    export -f log not_of_readme readme_command
+    "${namespace[@]}" bash -euo pipefail -c '
+        while [[ $1 != -- ]]; do mount --bind /dev/null "$1"; shift; done
+        shift
+        seen=$(not_of_readme)
+        log "drivers and programs that are not of README: ${seen:-none}"
+        [[ -z $seen ]]
+        "$@"' bash "${hidden[@]}" -- "$@"
+}
+
+# README's test command, and a list of what it skips: a test, " - Skipped: " and the reason in a line
+readme_tests() {
+    PYTEST_ADDOPTS=--no-fold-skipped as_readme readme_command test | tee "$work/readme-test.log"
+}
+
+# Compare why tests were skipped with .ci/skipped; CI_ACCEPT_SKIPPED writes that.
+compare_skipped() {
+    sed -n 's/^SKIPPED //p' "$work/readme-test.log" >"$work/skipped"
+    sed 's/.* - Skipped: //' "$work/skipped" | sort -u >"$work/reasons"
+    [[ -z ${CI_ACCEPT_SKIPPED:-} ]] || cp "$work/reasons" "$checkout/.ci/skipped"
+    diff "$checkout/.ci/skipped" "$work/reasons"
+}
+
+# Those tests, by what README's machine does not have
+skipped_tests() {
+    sed 's/ - Skipped: .*//' "$work/skipped" >"$work/skipped-tests"
+    tests_of "$work/venv" "@$work/skipped-tests"
 }

@@ -9,7 +9,7 @@ from pathlib import Path
 import tomllib
 
 #: Extras whose lower bounds the test-suite exercises.
-TESTED_EXTRAS = ("cpu", "dask", "exr", "hdf5", "notebook", "plot", "test", "web", "zarr")
+TESTED_EXTRAS = ("cpu", "dask", "exr", "files", "notebook", "plot", "test", "web")
 
 
 def lower_bounds(pyproject: Path) -> list[str]:

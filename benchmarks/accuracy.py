@@ -12,12 +12,11 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from baselines.criteria import CRITERIA, RECORDED, cut
-from shared import benches, execute, mean_of, parser_of  # beside this file
+from baselines import CRITERIA, RECORDED, cut
+from shared import Case, Results, benches, execute, mean_of, parser_of, table  # beside this file
 
 from pyvista_vdi import generate
-from pyvista_vdi.measure.harness import Case, accuracy
-from pyvista_vdi.measure.results import Results, number, table
+from pyvista_vdi.measure.bench import accuracy
 from pyvista_vdi.model.metrics import list_edges, list_places
 from pyvista_vdi.model.options import QUALITIES, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -78,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with benches(options) as bench_of:
 
         def measure(case: Case) -> dict[str, Any]:
-            interpolation = case.chosen.get("interpolation", "nearest")
+            interpolation = dict(case.options).get("interpolation", "nearest")
             bench = bench_of(case.volume, case.look, interpolation)
             if case.what in SETTINGS:
                 return of_setting(bench, SETTINGS[case.what], estimated=case.what == "default")
@@ -117,8 +116,7 @@ def of_setting(bench: Any, setting: Mapping[str, Any], *, estimated: bool) -> di
     estimator = ViewErrorEstimator(bench.volume, bench.table, device=bench.runtime)
     for name, camera in views.items():
         truth, picture = bench.reference(camera), bench.draw(vdi, camera)
-        brightness = float(picture[..., :3].mean() / truth[..., :3].mean())
-        near[name] = {**accuracy(picture, truth), "brightness": brightness}
+        near[name] = accuracy(picture, truth)
         if estimated:
             guesses[name] = estimator.estimate(vdi, camera, bench.size).ssim
     sizes = {
@@ -157,12 +155,7 @@ def of_preset(bench: Any, quality: str) -> dict[str, Any]:
 
 def report(results: Results, every: list[Case]) -> Iterator[str]:
     """Yield SSIM by setting and angle, by volume; estimates; presets."""
-
-    def mean(figure: Any, **having: Any) -> str:
-        found = mean_of(results, every, figure, **having)
-        return "-" if found is None else f"{found.mean:.3g} ± {found.error:.1g}"
-
-    measured = [row for row in results.rows() if "refused" not in row]
+    measured = list(results.rows())
     yield "1 - SSIM to volume rendering in thousandths: means over volumes and looks, and their"
     yield "standard errors."
     yield ""
@@ -171,7 +164,10 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     rows = [
         [
             setting + (f", {interpolation}" if interpolation else ""),
-            *(mean(of, what=setting, interpolation=interpolation) for of in loss.values()),
+            *(
+                mean_of(results, every, of, what=setting, interpolation=interpolation)
+                for of in loss.values()
+            ),
         ]
         for setting, interpolation in kinds
     ]
@@ -182,7 +178,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
         [
             *(row["case"][key] for key in ("volume", "look")),
             row["case"].get("interpolation", "nearest"),
-            *(number(row["near"][view]["ssim"], ".4f") for view in views),
+            *(f"{row['near'][view]['ssim']:.4f}" for view in views),
             f"{row['near']['30']['brightness']:.4f}",
             f"{row['sizes']['bytes'] / 2**20:.1f}",
         ]

@@ -1,205 +1,243 @@
-"""Rays in the world beside ours: time by N_S, lists, angle and emptiness; SSIM and memory.
+"""The paper's rivals: rays in the world, and cuts at equal shares: time by N_S and angle, SSIM.
 
-They (``baselines/``) draw the same VDI as ours; frames end on the host, raycast alone. Tests hold
-their pictures to the oracle. docs/decisions/baselines.md has the paper's other baselines as well.
+Rays of Lochmann et al. 2016 (``world_rays.cl``) draw the same VDI as ours, or one cut by their own
+criterion; frames end on the host, raycast alone. Cuts after Brady et al. 1997 (lengths), Lochmann
+(transmittance) and by optical depths are also taken by ``accuracy.py``. Tests hold the pictures to
+the oracle; docs/decisions/baselines.md has what was found.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
+import statistics
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
-from unittest import mock
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from baselines.criteria import CRITERIA, RECORDED, cut
-from baselines.world_rays import WorldRays
-from scaling import fitted
-from shared import execute, load, parser_of  # beside this file
+from numpy.typing import NDArray
 
-from pyvista_vdi.measure.clock import take_turns
-from pyvista_vdi.measure.harness import Bench, Case, Latest, accuracy
-from pyvista_vdi.measure.results import Results, mebibytes, milliseconds, section, table
-from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+sys.path.append(str(Path(__file__).parents[1] / "tests"))  # where the reference is
 
-#: Who draws, by the keys of the results, and what tables call them.
-WAYS: Mapping[str, str] = {
-    "f": "ours, f",
-    "f_e": "ours, f_e",
-    "rays": "ours, f, ray by ray",
-    "world": "world rays, halving",
-    "linear": "world rays, linear",
+from reference.generate import vdi_of_lists
+from reference.raycast import Lists, near_limit
+from shared import Case, Latest, Results, benches, execute, milliseconds, parser_of, table
+
+from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, Runtime
+from pyvista_vdi.device.constants import GROUP, block_items
+from pyvista_vdi.measure.bench import accuracy, take_turns
+from pyvista_vdi.model import ray_forms as rays
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.compositing import Segment, merge, opacity, split
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.vdi import VDI
+
+Runs = Sequence[Segment]
+
+KERNEL = KernelDeclaration(
+    Path(__file__).with_name("world_rays.cl"),
+    "world_rays",
+    offsets="int*",
+    faces="float2*",
+    media="float4*",
+    lists_wide="int",
+    lists_high="int",
+    forms="float*",
+    planes="int",
+    width="int",
+    height="int",
+    cutoff="float",
+    image="float4*",
+)
+
+#: Supersegments of a list from which cuts are made: more than a ray through most data has.
+RECORDED = 512
+
+ANGLES, LIMITS = (0.0, 5.0, 15.0, 30.0, 90.0), (4, 8, 15, 30, 60)
+
+
+def equal_lengths(runs: Runs, limit: int) -> NDArray[np.float64]:
+    """Return depths of cuts at equal depths from the first face to the last."""
+    return np.linspace(runs[0].front, runs[-1].back, limit + 1)[1:-1]
+
+
+def equal_transmittance(runs: Runs, limit: int) -> NDArray[np.float64]:
+    """Return where the light that reaches the eye has fallen by equal steps."""
+    lost = opacity(sum(run.optical_depth for run in runs)) * np.arange(1, limit) / limit
+    return _depths_of(runs, -np.log1p(-lost))
+
+
+def equal_optical_depths(runs: Runs, limit: int) -> NDArray[np.float64]:
+    """Return where equal steps of optical depth are passed."""
+    whole = sum(run.optical_depth for run in runs)
+    return _depths_of(runs, whole * np.arange(1, limit) / limit)
+
+
+#: What returns the depths at which runs are cut, which ascend, by the criterion's name.
+CRITERIA: Mapping[str, Callable[[Runs, int], NDArray[np.float64]]] = {
+    "length": equal_lengths,
+    "transmittance": equal_transmittance,
+    "optical-depth": equal_optical_depths,
 }
 
-#: What is changed of N_S 15, as many lists as pixels, 30 degrees, nothing transparent by a
-#: threshold (a share of the scalars' range); for a sample the ends alone.
-BASE = {"max_supersegments": 15, "lists": 4, "pixels": 4, "angle": 30.0, "threshold": 0.0}
-AXES: Mapping[str, tuple[tuple[str, ...], Sequence[Any]]] = {
-    "N_S": (("max_supersegments",), (4, 15, 60, 8, 30)),
-    "lists": (("lists",), (1, 4, 2, 3)),
-    "lists and pixels": (("lists", "pixels"), (1, 4, 2, 3)),
-    "angle": (("angle",), (0.0, 5.0, 90.0, 15.0, 30.0)),
-    "threshold": (("threshold",), (0.9, 0.7, 0.8)),
-}
-#: Points of an axis that a sample has; axes over which time is fitted by a power.
-SAMPLED, POWERS = 3, ("N_S", "lists", "lists and pixels")
 
-#: Each system's own criterion for cutting lists.
-OWN = {"f": "least-error", "world": "transmittance"}
+def _depths_of(runs: Runs, optical_depths: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where on the ray so much optical depth has been passed."""
+    passed = np.concatenate([[0.0], np.cumsum([run.optical_depth for run in runs])])
+    k = np.searchsorted(passed[:-1], optical_depths, side="right") - 1
+    front, back, tau = np.array([(r.front, r.back, r.optical_depth) for r in runs]).T
+    return np.asarray(front[k] + (optical_depths - passed[k]) / tau[k] * (back[k] - front[k]))
+
+
+def cut_runs(runs: Runs, criterion: str, limit: int) -> list[Segment]:
+    """Merge what lies between the same two cuts; split what spans them. Nothing is dropped."""
+    ends = [*CRITERIA[criterion](runs, limit), math.inf] if runs else []
+    cuts: list[Segment] = []
+    cut, begun = 0, False
+    for run in runs:
+        rest: Segment | None = run
+        while rest is not None:
+            while ends[cut] <= rest.front:
+                cut, begun = cut + 1, False
+            spans = rest.front < ends[cut] < rest.back
+            part, rest = split(rest, ends[cut]) if spans else (rest, None)
+            if begun:
+                cuts[-1] = merge(cuts[-1], part)
+            else:
+                cuts.append(part)
+            begun = True
+    return cuts
+
+
+def cut(vdi: VDI, criterion: str, limit: int) -> VDI:
+    """Return a VDI whose lists, of up to ``RECORDED`` supersegments, are cut by a criterion."""
+    origin = vdi.depth_origin
+    columns = (vdi.front, vdi.back, vdi.color, vdi.optical_depth)
+    rows = zip(*(column.astype(np.float64) for column in columns), strict=True)
+    runs = [Segment(front + origin, back + origin, color, tau) for front, back, color, tau in rows]
+    ends = itertools.pairwise(vdi.offsets.tolist())
+    lists = [cut_runs(runs[begin:end], criterion, limit) for begin, end in ends]
+    return vdi_of_lists(lists, vdi.camera, vdi.window_size, vdi.bounds, origin, criterion)
+
+
+class WorldRays:
+    """A VDI drawn by rays of the new view, every supersegment intersected as a pyramid's part.
+
+    ``binary``: whether a list's first supersegment is found by halving, not by looking from its
+    beginning. The lists lie on the device one after the other, as view depths of faces less the
+    depth origin, nothing behind V_O's eye, and as straight RGB and extinction per model length.
+    """
+
+    def __init__(self, runtime: Runtime, vdi: VDI, *, binary: bool = True) -> None:
+        self._runtime, self._vdi = runtime, vdi
+        self._wide, self._high = vdi.window_size
+        self._parallel = vdi.camera.parallel_projection
+        self._nearest = -np.inf if self._parallel else near_limit(vdi) - vdi.depth_origin
+        in_float64 = Lists(vdi)
+        faces = np.maximum(np.stack([vdi.front, vdi.back], axis=1), np.float32(self._nearest))
+        with np.errstate(divide="ignore", over="ignore"):
+            extinction = (in_float64.optical_depth / in_float64.length).astype(np.float32)
+        extinction = np.minimum(extinction, np.finfo(np.float32).max)
+        media = np.concatenate([vdi.color, extinction[:, None]], axis=1)
+        # Model frame to (U d, V d, Z less the depth origin, d), where list (i, j) is
+        # i <= U < i + 1, j <= V < j + 1, and d is Z, or 1 in parallel projection
+        half = np.array([[self._wide / 2], [self._high / 2]])
+        matrix = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
+        self._to_lists = np.concatenate([half * (matrix[:2] + matrix[3]), matrix[2:]])
+        self._to_lists[2, 3] -= vdi.depth_origin
+        offsets = vdi.offsets.astype(np.int32)
+        offsets, faces, media = map(self._upload, (offsets, faces, media))
+        defines = {"BINARY_SEARCH": 1} if binary else {}
+        self._draw = runtime.bind(KERNEL, defines, offsets=offsets, faces=faces, media=media)
+        self._draw.set(lists_wide=self._wide, lists_high=self._high, cutoff=TRANSMITTANCE_CUTOFF)
+
+    def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.float32]:
+        """Draw a frame; premultiplied RGBA (H, W, 4)."""
+        runtime, (forms, planes) = self._runtime, self._rays(camera, size)
+        with (
+            runtime.upload(forms, "rays") as on_device,
+            runtime.result((*size[::-1], 4), name="image") as image,
+        ):
+            width, height = size
+            of_frame = {"forms": on_device, "planes": planes, "image": image}
+            self._draw(block_items(*size), GROUP, width=width, height=height, **of_frame)
+            return runtime.download(image)
+
+    def _rays(self, camera: Camera, size: tuple[int, int]) -> tuple[NDArray[np.float32], int]:
+        """Return a window's rays: coordinates, model direction, planes to clip to; and how many."""
+        vdi = self._vdi
+        pixel_rays = rays.pixel_rays(camera, size, vdi.bounds)
+        u, v, depth, d = (pixel_rays.form(row[:3], row[3]) for row in self._to_lists)
+        planes = [
+            *rays.box_planes(pixel_rays, vdi.bounds),
+            *(u, v, self._wide * d - u, self._high * d - v),
+            *rays.eye_plane(camera, pixel_rays),
+        ]
+        if not self._parallel:
+            planes.append(depth - self._nearest * np.eye(6)[0])
+        direction = rays.direction_forms(pixel_rays, size)
+        return rays.packed([u, v, depth, d, *direction, *planes]), len(planes)
+
+    def _upload(self, array: NDArray[Any]) -> DeviceBuffer:
+        """Bring an array to the device; one without elements as one that has some."""
+        values = np.ascontiguousarray(array)
+        return self._runtime.upload(values if values.size else np.zeros(4, values.dtype), "a list")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, and write what was found."""
-    parser = parser_of(__doc__, volumes=None, repeats=3)
-    parser.add_argument("--volume", default="brain", metavar="NAME")
-    options = parser.parse_args(arguments)
+    options = parser_of(__doc__, volumes=("brain",), repeats=3).parse_args(arguments)
+    with benches(options) as bench_of:
 
-    def bench_of(threshold: float) -> Bench:
-        volume = load(options.volume)
-        ramp = np.clip((np.linspace(0, 1, 65) - threshold) / (1.01 - threshold), 0, 1)
-        looks = {"cmap": "bone", "opacity": ramp.tolist()}
-        table = Classification.composited(looks, "a benchmark").transfer_function_of(volume)
-        return Bench(volume, table, tuple(options.size), device=options.device, vtk=False)
+        def vdi_of(volume: str, limit: int) -> tuple[VDI, VDI]:
+            bench = bench_of(volume, "soft")
+            recorded = bench.generate(max_supersegments=RECORDED)
+            return bench.generate(max_supersegments=limit), cut(recorded, "transmittance", limit)
 
-    benches = Latest(bench_of)
+        vdis = Latest(vdi_of)
 
-    def vdi_of(threshold: float, lists: int, limit: int, criterion: str) -> Any:
-        size, bench = scaled(options.size, lists), benches(threshold)
-        if criterion in CRITERIA:
-            return cut(bench.generate(size, max_supersegments=RECORDED), criterion, limit)
-        return bench.generate(size, max_supersegments=limit, criterion=criterion)
+        def measure(case: Case) -> dict[str, Any]:
+            bench = bench_of(case.volume, "soft")
+            camera, size = bench.view.azimuth(case.angle), bench.size
+            vdi, by_theirs = vdis(case.volume, dict(case.options)["N_S"])
+            work = {
+                "ours, f": partial(bench.draw, vdi, camera, skip_empty=False),
+                "ours, f_e": partial(bench.draw, vdi, camera),
+                "halving": partial(WorldRays(bench.runtime, vdi).image, camera, size),
+                "linear": partial(WorldRays(bench.runtime, vdi, binary=False).image, camera, size),
+            }
+            taken = take_turns(work, options.repeats)
+            theirs = WorldRays(bench.runtime, by_theirs).image(camera, size)
+            near = {"ours": bench.draw(vdi, camera), "by their own criterion": theirs}
+            truth = bench.reference(camera)
+            return {
+                "seconds": {name: statistics.median(times) for name, times in taken.items()},
+                "ssim": {name: accuracy(image, truth)["ssim"] for name, image in near.items()},
+            }
 
-    vdis = Latest(vdi_of)
-
-    def measure(case: Case) -> dict[str, Any]:
-        at = {**BASE, **case.chosen}
-        at["angle"] = at["angle"] if case.angle is None else case.angle
-        bench = benches(at["threshold"])
-        camera = bench.view.azimuth(at["angle"])
-        key = at["threshold"], at["lists"], at["max_supersegments"]
-        size = scaled(options.size, at["pixels"])
-        if case.what == "ssim":
-            truth, found = bench.reference(camera), {}
-            for way, criterion in OWN.items():
-                drawn = ways_of(bench, vdis(*key, criterion), size, (way,))
-                found[way] = accuracy(drawn[way].draw(camera), truth)["ssim"]
-            return {"ssim": found}
-        vdi = vdis(*key, "least-error")
-        ways = ways_of(bench, vdi, size, tuple(WAYS))
-        steps = {name: partial(way.draw, camera) for name, way in ways.items()}
-        taken = take_turns(steps, options.repeats)
-        return {
-            "supersegments": vdi.n_supersegments,
-            "seconds": {name: min(times["clock"]) for name, times in taken.items()},
-            "prepare": {name: way.seconds for name, way in ways.items()},
-            "bytes": {name: way.nbytes for name, way in ways.items()},
-        }
-
-    drawn = list(cases_of(options, SAMPLED))
-    execute("baselines", options, cases_of(options), measure, report, drawn=drawn)
+        at = [(limit, 30.0) for limit in LIMITS] + [(15, a) for a in ANGLES if a != 30.0]
+        cases = [
+            Case(name, "soft", tuple(options.size), angle, (("N_S", limit),))
+            for name in options.volumes
+            for limit, angle in at
+        ]
+        execute("baselines", options, cases, measure, report, count=4)
     return 0
 
 
-def cases_of(options: Any, points: int | None = None) -> Iterator[Case]:
-    """Yield the points of every axis, or so many of them, and SSIM by angle."""
-    size = tuple(options.size)
-    for axis, (names, values) in AXES.items():
-        for value in values[:points]:
-            if axis == "angle":
-                yield Case(options.volume, None, size, value, what=axis)
-                continue
-            changed = tuple((name, value) for name in names)
-            yield Case(options.volume, None, size, options=changed, what=axis)
-    for angle in sorted(AXES["angle"][1]):
-        yield Case(options.volume, None, size, angle, what="ssim")
-
-
-def scaled(size: tuple[int, int], quarters: int) -> tuple[int, int]:
-    """Return a window of so many quarters of the edges."""
-    return size[0] * quarters // 4, size[1] * quarters // 4
-
-
-class Way(NamedTuple):
-    """Who draws, what preparing it took and what it keeps."""
-
-    draw: Callable[[Any], Any]
-    seconds: float
-    nbytes: int
-
-
-def ways_of(bench: Bench, vdi: Any, size: tuple[int, int], wanted: Sequence[str]) -> dict[str, Way]:
-    """Return who draws a VDI."""
-    runtime, found = bench.runtime, {}
-
-    def one_by_one(camera: Any) -> Any:
-        with mock.patch.object(runtime, "is_cpu", False):
-            return bench.draw(vdi, camera, size, skip_empty=False)
-
-    begin = time.perf_counter()
-    prepared = PreparedVDI(runtime, vdi)
-    own = time.perf_counter() - begin, prepared.list_bytes
-    found["f"] = Way(lambda camera: bench.draw(vdi, camera, size, skip_empty=False), *own)
-    with_masks = own[1] + prepared.occupancy.masks.nbytes
-    found["f_e"] = Way(lambda camera: bench.draw(vdi, camera, size), own[0], with_masks)
-    found["rays"] = Way(one_by_one, *own)
-    del prepared
-    makers: dict[str, Callable[[], Any]] = {
-        "world": lambda: WorldRays(runtime, vdi),
-        "linear": lambda: WorldRays(runtime, vdi, binary=False),
-    }
-    for name in [name for name in makers if name in wanted]:
-        begin = time.perf_counter()
-        made = makers[name]()
-        seconds = time.perf_counter() - begin
-        found[name] = Way(partial(made.image, size=size), seconds, made.nbytes)
-    return found
-
-
 def report(results: Results, every: list[Case]) -> Iterator[str]:
-    """Yield exponents, milliseconds by axis, memory, SSIM and differences."""
-    base = BASE["max_supersegments"]
-    rows = {axis: [row for row in results.rows(what=axis) if "seconds" in row] for axis in AXES}
-    at_base = [row for row in rows["N_S"] if row["case"]["max_supersegments"] == base]
-    there = [way for way in WAYS if any(way in row["seconds"] for row in at_base)]
-    titles = [WAYS[way] for way in there]
-
-    def value(axis: str, row: Mapping[str, Any]) -> Any:
-        return row["case"][AXES[axis][0][0]]
-
-    yield f"N_S {base}, {BASE['angle']:g} degrees, unless changed; least of the turns."
-    yield ""
-    yield from section("Exponents", "Of time, with 95 % confidence intervals.")
-    found = []
-    for axis in POWERS:
-        x = [value(axis, row) for row in rows[axis]]
-        fits = [fitted(x, [row["seconds"][way] for row in rows[axis]]) for way in there]
-        found.append([axis, *(f"{fit.exponent:.2f} ± {fit.margin:.2f}" for fit in fits)])
-    yield from table(("grows with", *titles), found)
-    for axis, points in rows.items():
-        yield from ("", f"## Milliseconds by {axis}", "")
-        shown = [
-            [
-                f"{value(axis, row):g}",
-                row["supersegments"],
-                *(milliseconds(row["seconds"].get(way)) for way in there),
-            ]
-            for row in sorted(points, key=partial(value, axis))
-        ]
-        yield from table((axis, "supersegments", *titles), shown)
-    for row in at_base:
-        yield from ("", "## Memory and preparation", "")
-        lines = [
-            ["MiB", *(mebibytes(row["bytes"][way]) for way in there)],
-            ["ms before the first frame", *(milliseconds(row["prepare"][way]) for way in there)],
-        ]
-        yield from table(("", *titles), lines)
-    yield from ("", "## SSIM to the volume, each with lists by its own criterion", "")
-    found = [row for row in results.rows(what="ssim") if "ssim" in row]
-    by_way = [[WAYS[way], *(f"{row['ssim'][way]:.4f}" for row in found)] for way in OWN]
-    yield from table(("", *(f"{row['case']['angle']:g} degrees" for row in found)), by_way)
+    """Yield milliseconds and SSIM by N_S and angle."""
+    rows, heads = [], []
+    for row in results.rows():
+        case = row["case"]
+        heads = [*(f"{name}, ms" for name in row["seconds"]), *(f"SSIM {n}" for n in row["ssim"])]
+        cells = [case["volume"], case["N_S"], f"{case['angle']:g}"]
+        cells += [milliseconds(seconds) for seconds in row["seconds"].values()]
+        rows.append([*cells, *(f"{ssim:.4f}" for ssim in row["ssim"].values())])
+    yield from table(["volume", "N_S", "degrees", *heads], rows)
 
 
 if __name__ == "__main__":

@@ -17,13 +17,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from shared import at_hand, execute, load, marked, parser_of  # beside this file
-from shared.sampling import sample
+from shared import Case, Latest, Results, execute, load, marked, parser_of, table
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import examples
-from pyvista_vdi.measure.harness import Bench, Case, Latest, accuracy
-from pyvista_vdi.measure.results import Results, table
+from pyvista_vdi.measure.bench import Bench, accuracy
 
 #: Volumes that are not handed: made from seeds, and by formulas below.
 MADE = ("kingsnake_like@8", "richtmyer_meshkov_like@8", "phantom", "marschner_lobb")
@@ -65,13 +63,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def measure(case: Case) -> dict[str, Any]:
         vdi, found = deferred(case.volume)
-        table = found[str(case.look)]
-        bench = Bench(volumes(case.volume), table, size, device=options.device, vtk=False)
+        own = found[str(case.look)]
+        bench = Bench(volumes(case.volume), own, size, device=options.device, vtk=False)
         return measured(bench, vdi, with_bytes=case.look == "ramp")
 
     rooms = ("generation", "raycasting", "volume")
-    drawn = sample(at_hand(every), 20)
-    execute("deferred", options, every, measure, report, drawn=drawn, rooms=rooms)
+    execute("deferred", options, every, measure, report, count=20, rooms=rooms)
     return 0
 
 
@@ -153,7 +150,7 @@ def measured(bench: Bench, deferred: pvdi.DeferredVDI, *, with_bytes: bool) -> d
         truth = bench.reference(view)
         pictures = {name: bench.draw(vdi, view) for name, vdi in kinds.items()}
         if angle == 0:
-            pictures["finer steps"] = bench.raycast(view, sample_distance=bench.step / 8)
+            pictures["finer steps"] = bench.raycast(view, bench.step / 8)
         figures[f"{angle:g}"] = {
             "light": float(truth[..., :3].mean()),
             **{name: compared(picture, truth) for name, picture in pictures.items()},
@@ -176,7 +173,7 @@ def compared(picture: Image, truth: Image) -> dict[str, float | None]:
 
 def report(results: Results, every: list[Case]) -> Iterator[str]:
     """Yield the tables: by group, look and volume, and bytes."""
-    rows = [row for row in results.rows() if "refused" not in row]
+    rows = list(results.rows())
     yield f"{LISTS['max_supersegments']} supersegments of 8 bytes, everything in the range kept,"
     yield "between points. SSIM to volume rendering at V_O, in brackets that of volume rendering"
     yield "with steps an eighth as long; turned, less the baked VDI's. Brightness: |ratio - 1| of"

@@ -22,15 +22,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shared import benches, execute, load, marked, mean_of, parser_of, table_of  # beside this file
+from shared import (  # beside this file
+    Case,
+    Results,
+    benches,
+    execute,
+    load,
+    marked,
+    mean_of,
+    parser_of,
+    table,
+    table_of,
+)
 
 from pyvista_vdi import Volume, compare_images, generate, render
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.io import read
-from pyvista_vdi.measure.clock import take_turns
-from pyvista_vdi.measure.harness import Bench, Case
-from pyvista_vdi.measure.results import Results, mebibytes, table
-from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.measure.bench import Bench, take_turns
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -41,6 +49,10 @@ DENSE_BYTES = 24
 #: Ways to compress, the default first; a VDI's arrays.
 COMPRESSIONS = ("lz4", "zstd", "none")
 ARRAYS = ("offsets", "front", "back", "color", "optical_depth")
+
+PRECISIONS = ("exact", "8-byte")
+
+MIB = 2**20
 
 #: Degrees from V_O of pictures of packed VDIs, and the largest loss of SSIM that is allowed.
 ANGLES, MOST_LOSS = (0.0, 5.0, 30.0), 0.001
@@ -94,7 +106,7 @@ def files(_: Bench, vdi: VDI, options: argparse.Namespace) -> dict[str, Any]:
             "dense_bytes": width * height * options.max_supersegments * DENSE_BYTES,
             "file_bytes": {kind: file.stat().st_size for kind, file in paths.items()},
             "identical": all(read(file).equals(vdi) for file in paths.values()),
-            "seconds": {way: statistics.median(times["clock"]) for way, times in taken.items()},
+            "seconds": {way: statistics.median(times) for way, times in taken.items()},
         }
 
 
@@ -124,10 +136,8 @@ def packed(bench: Bench, vdi: VDI, options: argparse.Namespace) -> dict[str, Any
             losses[name] = {"ssim": 1 - compared.ssim, "worst_pixel": compared.worst_pixel}
         found["losses"][f"{angle:g}"] = losses
         ways = {name: partial(bench.draw, form, camera) for name, form in forms.items()}
-        taken = take_turns(ways, options.repeats, runtime=bench.runtime)
-        found["seconds"][f"{angle:g}"] = {
-            name: statistics.median(times["device"]) for name, times in taken.items()
-        }
+        taken = take_turns(ways, options.repeats)
+        found["seconds"][f"{angle:g}"] = {n: statistics.median(t) for n, t in taken.items()}
     return found
 
 
@@ -195,15 +205,17 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     yield ""
     rows = []
     for row in results.rows(what="files"):
-        if "refused" not in row:
-            seconds = row["seconds"]
-            cells = [row["case"]["volume"], f"{row['empty_lists']:.0%}"]
-            cells.append(mebibytes(row["array_bytes"]))
-            for kind in COMPRESSIONS:
-                cells.append(f"{row['dense_bytes'] / row['file_bytes'][kind]:.1f}")
-                for way in ("save", "load"):
-                    cells.append(f"{seconds[f'{kind} {way}'] / seconds[f'numpy {way}']:.1f}")
-            rows.append([*cells, marked("the same", row["identical"])])
+        seconds = row["seconds"]
+        cells = [
+            row["case"]["volume"],
+            f"{row['empty_lists']:.0%}",
+            f"{row['array_bytes'] / MIB:.2f}",
+        ]
+        for kind in COMPRESSIONS:
+            cells.append(f"{row['dense_bytes'] / row['file_bytes'][kind]:.1f}")
+            for way in ("save", "load"):
+                cells.append(f"{seconds[f'{kind} {way}'] / seconds[f'numpy {way}']:.1f}")
+        rows.append([*cells, marked("the same", row["identical"])])
     heads = [head for kind in COMPRESSIONS for head in (f"dense / size, {kind}", "save", "load")]
     yield from table(("volume", "empty lists", "arrays, MiB", *heads, "bits"), rows)
     of = lambda row: row["dense_bytes"] / row["file_bytes"]["lz4"]  # noqa: E731
@@ -211,7 +223,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     yield from ("", "Packed over exact; losses of SSIM in millionths, the worst of all angles:", "")
     rows = []
     for row in results.rows(what="packed"):
-        for form in PRECISIONS[1:] if "refused" not in row else ():
+        for form in PRECISIONS[1:]:
             losses = [loss[form] for loss in row["losses"].values()]
             ssim = max(loss["ssim"] for loss in losses)
             cells = [row["case"]["volume"], form, marked(f"{1e6 * ssim:.0f}", ssim <= MOST_LOSS)]
@@ -225,9 +237,9 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     yield from ("", "Peak of memory over volume and VDI:", "")
     rows = []
     for row in results.rows(what="memory"):
-        for form in ("exact", "8-byte") if "refused" not in row else ():
+        for form in ("exact", "8-byte"):
             of = row[form]
-            cells = [mebibytes(of[what]) for what in ("volume", "vdi", "device")]
+            cells = [f"{of[what] / MIB:.2f}" for what in ("volume", "vdi", "device")]
             shares = [f"{of[k] / (of['volume'] + of['vdi']):.2f}" for k in ("generate", "render")]
             rows.append([row["case"]["volume"], form, *cells, *shares])
     heads = ["volume, MiB", "VDI, MiB", "device, MiB", "while generated", "while drawn"]

@@ -18,11 +18,20 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from shared import benches, execute, load, mean_of, parser_of  # beside this file
+from shared import (  # beside this file
+    ROOMS,
+    Case,
+    Latest,
+    Results,
+    benches,
+    execute,
+    load,
+    mean_of,
+    parser_of,
+    table,
+)
 
-from pyvista_vdi.measure.clock import ratios, take_turns
-from pyvista_vdi.measure.harness import ROOMS, Case, Latest
-from pyvista_vdi.measure.results import Results, table
+from pyvista_vdi.measure.bench import ratio, take_turns
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import ANGLES, TRANSFER_FUNCTIONS, filling_camera
@@ -58,13 +67,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             bench = bench_of(case.volume, case.look)
             vdi, seconds = bench.generate(), {}
             for angle in ANGLES:
-                steps = bench.frames(bench.view.azimuth(angle), vdi)
-                wanted = {"vdi": "vdi_skipping"} | {
-                    f"vtk_{name}": f"vtk_{name}" for name in MAPPERS
-                }
-                work = {name: steps[step] for name, step in wanted.items()}
+                work = bench.frames(bench.view.azimuth(angle), vdi)
+                del work["volume"]
                 for name, times in take_turns(work, options.repeats).items():
-                    seconds.setdefault(name, {})[f"{angle:g}"] = times["clock"]
+                    seconds.setdefault(name, {})[f"{angle:g}"] = times
             return {"seconds": seconds}
 
         cases = [
@@ -88,7 +94,7 @@ def whole_frames(volume: Any, case: Case, repeats: int, device: Any) -> dict[str
     ours = {"draw": "vdi", "regenerate": "never", "target_fps": None, "device": device}
     with ExitStack() as stack:
         plotters: dict[str, pv.Plotter] = {}
-        for name in ("empty", "vdi", *(f"vtk_{mapper}" for mapper in MAPPERS)):
+        for name in ("empty", "vdi", *MAPPERS):
             plotter = pv.Plotter(off_screen=True, window_size=case.window_size)
             plotters[name] = plotter
             stack.callback(plotter.close)
@@ -97,7 +103,7 @@ def whole_frames(volume: Any, case: Case, repeats: int, device: Any) -> dict[str
             if name == "vdi":
                 plotter.add_vdi(grid, **ours, **look)
             elif name != "empty":
-                plotter.add_volume(grid, mapper=name.removeprefix("vtk_"), **look)
+                plotter.add_volume(grid, mapper=name, **look)
             aim(plotter.camera, view)
             plotter.camera_set = True
             plotter.show(auto_close=False)  # makes the VDI, of V_O
@@ -113,7 +119,7 @@ def whole_frames(volume: Any, case: Case, repeats: int, device: Any) -> dict[str
                         seconds[name][f"{angle:g}"].append(taken)
         alike = {}
         for angle in ANGLES:
-            pictures = [shown(plotters[name], view.azimuth(angle)) for name in ("vdi", "vtk_gpu")]
+            pictures = [shown(plotters[name], view.azimuth(angle)) for name in ("vdi", "gpu")]
             alike[f"{angle:g}"] = compare_images(*pictures).ssim
     return {"seconds": seconds, "ssim": alike}
 
@@ -136,9 +142,9 @@ def frame(plotter: pv.Plotter, camera: Camera) -> float:
 
 def times_as_fast(row: dict[str, Any], angle: str) -> float:
     """Return the median, over turns, of the faster VTK mapper's time over the VDI's."""
-    theirs = [row["seconds"][f"vtk_{name}"][angle] for name in MAPPERS]
+    theirs = [row["seconds"][name][angle] for name in MAPPERS]
     peer = min(theirs, key=statistics.median)
-    return statistics.median(ratios(peer, row["seconds"]["vdi"][angle]))
+    return ratio(peer, row["seconds"]["vdi"][angle])
 
 
 def report(results: Results, every: list[Case]) -> Iterator[str]:
@@ -147,12 +153,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     for what in PARTS:
         rows = []
         for row in results.rows(what=what):
-            if "refused" in row:
-                continue
-            named = {
-                name: row["seconds"].get(name) for name in ("vdi", "vtk_gpu", "vtk_fixed_point")
-            }
-            named["empty"] = row["seconds"].get("empty")
+            named = {name: row["seconds"].get(name) for name in ("vdi", *MAPPERS, "empty")}
             times = [
                 "-" if taken is None else f"{1e3 * statistics.median(taken['0']):.3g}"
                 for taken in named.values()

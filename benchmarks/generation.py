@@ -11,12 +11,10 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from shared import benches, execute, mean_of, parser_of  # beside this file
+from shared import Case, Results, benches, execute, mean_of, parser_of, table  # beside this file
 
 from pyvista_vdi import render_volume
-from pyvista_vdi.measure.clock import ratios, take_turns
-from pyvista_vdi.measure.harness import Case
-from pyvista_vdi.measure.results import Results, number, table
+from pyvista_vdi.measure.bench import ratio, take_turns
 
 #: Degrees from V_O at which VTK's mappers and ours draw the volume.
 ANGLE = 5.0
@@ -45,28 +43,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 early_termination=False,
                 device=bench.runtime,
             )
-            volume, *vtk = (
-                (name, step)
-                for name, step in bench.frames(bench.view.azimuth(ANGLE)).items()
-                if name != "volume"
-            )
             work = {
                 "generation": partial(bench.generate, max_supersegments=options.max_supersegments),
                 "march": march,
-                **dict([volume, *vtk]),
+                **bench.frames(bench.view.azimuth(ANGLE)),
             }
-            taken = take_turns(work, options.repeats, runtime=bench.runtime)
-            seconds = {name: statistics.median(times["clock"]) for name, times in taken.items()}
-
-            def over(ours: str, theirs: str) -> float:
-                pairs = ratios(taken[ours]["clock"], taken[theirs]["clock"])
-                return statistics.median(pairs)
-
-            found = {"march": over("generation", "march")}
-            if vtk:
-                faster = min((name for name, _ in vtk), key=lambda name: seconds[name])
-                found["vtk"] = over("volume_skipping", faster)
-            return {"seconds": seconds, "ratios": found}
+            taken = take_turns(work, options.repeats)
+            seconds = {name: statistics.median(times) for name, times in taken.items()}
+            faster = min(bench.vtk, key=seconds.__getitem__)
+            over = {"march": ratio(taken["generation"], taken["march"])}
+            over["vtk"] = ratio(taken["volume"], taken[faster])
+            return {"seconds": seconds, "ratios": over}
 
         cases = [Case(name, "soft", tuple(options.size)) for name in options.volumes]
         execute("generation", options, cases, measure, report, count=5)
@@ -79,9 +66,8 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     yield f"the end; `render_volume` and VTK at steps of a voxel, {ANGLE:g} degrees from V_O."
     yield ""
     rows = [
-        [row["case"]["volume"], *(number(row["ratios"].get(name), ".2f") for name in RATIOS)]
+        [row["case"]["volume"], *(f"{row['ratios'][name]:.2f}" for name in RATIOS)]
         for row in results.rows()
-        if "refused" not in row
     ]
     means = [mean_of(results, every, lambda row, n=n: row["ratios"].get(n)) for n in RATIOS]
     yield from table(("volume", *RATIOS.values()), [*rows, ["mean of all", *map(str, means)]])

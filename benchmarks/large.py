@@ -15,13 +15,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from shared import benches, execute, load, marked, parser_of  # beside this file
+from shared import Case, Results, benches, execute, load, marked, parser_of, table
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.extensions.large.generate import generate_chunked
 from pyvista_vdi.extensions.large.on_dask import generate_on_dask
-from pyvista_vdi.measure.harness import Case, accuracy
-from pyvista_vdi.measure.results import Results, table
+from pyvista_vdi.measure.bench import accuracy, ratio
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -65,7 +64,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         def measure(case: Case) -> dict[str, Any]:
             if case.what == "cluster":
                 return on_cluster(options)
-            return in_blocks(bench_of(case.volume, case.look, "linear"), case.chosen["blocks"])
+            return in_blocks(
+                bench_of(case.volume, case.look, "linear"), dict(case.options)["blocks"]
+            )
 
         rooms = ("generation", "raycasting", "volume", "extensions/large")
         key = lambda case: case.what  # noqa: E731
@@ -108,7 +109,6 @@ def on_cluster(options: Any) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         name = options.large or LARGE[options.whole]
         volume = stored(options.store or Path(folder) / "large.zarr", name)
-        volume.chunks.found_ranges()
         camera = filling_camera(volume.bounds, options.size)
         function = Classification.composited(LOOKS, "a benchmark").transfer_function_of(volume)
         given = {"n_workers": 2, "threads_per_worker": 1, "memory_limit": WORKER_BYTES}
@@ -143,27 +143,24 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     """Yield the tables."""
     rows = []
     for row in results.rows(what="blocks"):
-        if "refused" not in row:
-            near = row["near"]
-            cells = [row["case"][key] for key in ("volume", "look", "blocks")]
-            cells += [f"{row['supersegments']:.4f}", f"{near['0']['worst_pixel']:.3f}"]
-            for angle, least in LEAST_SSIM.items():
-                ssim = near[angle]["ssim"]
-                cells.append(marked(f"{ssim:.5f}", ssim >= least))
-            rows.append(cells)
+        near = row["near"]
+        cells = [row["case"][key] for key in ("volume", "look", "blocks")]
+        cells += [f"{row['supersegments']:.4f}", f"{near['0']['worst_pixel']:.3f}"]
+        for angle, least in LEAST_SSIM.items():
+            ssim = near[angle]["ssim"]
+            cells.append(marked(f"{ssim:.5f}", ssim >= least))
+        rows.append(cells)
     heads = [f"SSIM, {angle} degrees" for angle in LEAST_SSIM]
     first = ["volume", "look", "blocks", "supersegments", "worst pixel at V_O, /255"]
     yield "Of blocks over one piece, linear sampling."
     yield ""
     yield from table([*first, *heads], rows)
     for row in results.rows(what="cluster"):
-        if "refused" not in row:
-            ratios = [a / b for a, b in zip(*row["seconds"].values(), strict=True)]
-            peaks = ", ".join(f"{found / 1e6:.0f}" for found in row["worker_peaks"])
-            yield ""
-            yield f"{row['points']:.2g} points in chunks of {CHUNK}³, two workers of"
-            yield f"{WORKER_BYTES / 1e6:.0f} MB: peaks of {peaks} MB, restarts {row['restarts']};"
-            yield f"time of one worker over that of two {sorted(ratios)[len(ratios) // 2]:.2f}."
+        peaks = ", ".join(f"{found / 1e6:.0f}" for found in row["worker_peaks"])
+        yield ""
+        yield f"{row['points']:.2g} points in chunks of {CHUNK}³, two workers of"
+        yield f"{WORKER_BYTES / 1e6:.0f} MB: peaks of {peaks} MB, restarts {row['restarts']};"
+        yield f"time of one worker over that of two {ratio(*row['seconds'].values()):.2f}."
 
 
 if __name__ == "__main__":

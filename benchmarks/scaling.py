@@ -14,12 +14,10 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from shared import execute, load, parser_of, table_of  # beside this file
+from shared import Case, Latest, Results, execute, load, parser_of, table, table_of
+from shared.volumes import KINDS
 
-from pyvista_vdi.measure.clock import take_turns
-from pyvista_vdi.measure.harness import Bench, Case, Latest
-from pyvista_vdi.measure.paper.datasets import PROCEDURAL
-from pyvista_vdi.measure.results import Results, table
+from pyvista_vdi.measure.bench import Bench, take_turns
 
 #: What is timed, and on which axes.
 QUANTITIES = ("VDI frame", "render_volume", "generation")
@@ -49,7 +47,7 @@ def cases_of(options: Any, whole: bool) -> Iterator[tuple[Case, float]]:
     for limit in (5, 10, 20, 40) if whole else (5, 10, 20):
         yield case("N_S", limit=limit), float(limit)
     for factor in (32, 16, 8, 4) if whole else (32, 16, 8):
-        points = PROCEDURAL[options.procedural].reduced(factor)
+        points = [-(-n // factor) for n in KINDS[options.procedural][0]]
         name = f"{options.procedural}@{factor}"
         yield case("voxels along an edge", volume=name), float(np.prod(points)) ** (1 / 3)
     for angle in (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0) if whole else (0.0, 5.0, 10.0, 20.0):
@@ -99,20 +97,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         def measure(case: Case) -> dict[str, Any]:
             bench = kept(case.volume, case.window_size)
-            camera = case.camera(bench.view)
-            vdi = bench.generate(**case.chosen)
-            frames = bench.frames(camera, vdi)
+            chosen = dict(case.options)
+            frames = bench.frames(bench.view.azimuth(case.angle), bench.generate(**chosen))
             steps = {
-                "VDI frame": frames["vdi_skipping"],
-                "render_volume": frames["volume_skipping"],
-                "generation": partial(bench.generate, **case.chosen),
+                "VDI frame": frames["vdi"],
+                "render_volume": frames["volume"],
+                "generation": partial(bench.generate, **chosen),
             }
             wanted = {name: steps[name] for name in AXES[str(case.what)]}
             taken = take_turns(wanted, options.repeats)
-            seconds = {name: statistics.median(times["clock"]) for name, times in taken.items()}
+            seconds = {name: statistics.median(times) for name, times in taken.items()}
             return {"value": points[case], "seconds": seconds}
 
-        execute("scaling", options, points, measure, report, drawn=drawn)
+        cases = points if options.whole else drawn
+        execute("scaling", options, cases, measure, report, count=len(points))
     return 0
 
 
@@ -137,7 +135,6 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
             *(f"{1e3 * s:.3g}" if (s := row["seconds"].get(q)) else "-" for q in QUANTITIES),
         ]
         for row in results.rows()
-        if "refused" not in row
     ]
     yield from table(("axis", "value", *QUANTITIES), rows)
 

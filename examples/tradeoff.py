@@ -1,9 +1,9 @@
 """Choosing the settings of a VDI by measuring: a few of them on one volume, drawn as a curve.
 
-What one should see: three panels, each with SSIM upwards. Filled marks on a grey staircase are
+What one should see: four panels, each with SSIM upwards. Filled marks on a grey staircase are
 settings that nothing beats in that panel, with their names; hollow ones are not worth their price.
 Previews lie at the lower left of the first panel (fast and blurred), twice as many lists along each
-edge at the upper right of all three; in the middle panel 8-byte supersegments lie left of the
+edge at the upper right of all; in the panels of bytes 8-byte supersegments lie left of the
 default, at the same height.
 
 With a file name as argument the picture is written there, else to tradeoff.png. It takes about ten

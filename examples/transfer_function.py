@@ -1,9 +1,9 @@
-"""Choose a volume's opacities and colours over its picture, by mouse and keys.
+"""Choose a volume's opacities and colours over its picture, by the mouse.
 
 What one should see: a brain, and in the upper right corner its values' histogram, with the opacity
-curve over it. Drag its points; click on the curve to add one, right-click a point to delete it;
-drag beside them, to the right and left to move the window, up and down to widen it. With the mouse
-over the editor, ``c`` and ``p`` take the next colour map and the next preset, ``z`` takes back.
+curve over it. Drag its points; click to add one, right-click a point to delete it; drag with the
+right button, to the right and left to move the window, up and down to widen it. With the mouse over
+the editor, ``c`` takes the next colour map.
 
 Off-screen (with a file name as argument, or PYVISTA_OFF_SCREEN=true) the same is done by program,
 and a picture is written: white matter, bright, within a translucent brain.
@@ -34,7 +34,7 @@ def main() -> None:
     editor.apply_cmap("inferno")
     plotter.show(auto_close=False)
     plotter.screenshot(target)
-    print(f"window {editor.window:g}, level {editor.level:g}\n{brain.vdi}\nwritten: {target}")
+    print(f"range {editor.clim}\n{brain.vdi}\nwritten: {target}")
     plotter.close()
 
 

@@ -27,7 +27,7 @@ actor = plotter.add_vdi(volume, cmap="bone", opacity="linear", scalar_bar_args={
 actor.mapper.AddClippingPlane(cut)
 slice_ = volume.slice("x", origin=cut.GetOrigin()).threshold(20)
 plotter.add_mesh(slice_, cmap="bone", clim=(0, 133), lighting=False, show_scalar_bar=False)
-plotter.add_mesh(pv.Sphere(radius=18, center=(x + 20, y + 40, z)), color="tomato", specular=0.5)
+plotter.add_mesh(pv.Sphere(radius=18, center=(x + 20, y + 40, z)), color="tomato")
 plotter.add_mesh(volume.outline(), color="gray", line_width=2)
 plotter.add_text("A brain, cut open", position="upper_left", font_size=10)
 plotter.set_background("white", top="lightsteelblue")

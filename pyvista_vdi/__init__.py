@@ -61,20 +61,12 @@ registry.core = registry.Extension(
             compressions=("lz4", "zstd", "deflate", "none"),
             values=True,
         ),
-        registry.FileFormat(
-            ".vti",
-            "pyvista_vdi.vtk_pipeline.filters.vti",
-            compressions=("lz4", "zlib", "lzma", "none"),
-            shared=True,
-            reports_progress=False,
-            needs="VTK",
-            install='pip install "pyvista-vdi[plot]"',
-        ),
     ),
     readers={
         "": "pyvista_vdi.plotting.imports:volumes_in",
     },
     methods={
+        "Camera.to_pyvista": "pyvista_vdi.plotting.imports:camera_to_pyvista",
         "DeferredVDI.classified": "pyvista_vdi.api.deferred:classified",
         "VDICollection.classified": "pyvista_vdi.api.deferred:classified_each",
         "TransferFunction.from_arguments": (

@@ -123,7 +123,6 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 #: Files, by rooms, that take long together: ``-m fast`` runs one case of each of their tests.
-#: `tools/README.md` says which mutants of the kernels that lets live.
 LENGTHY = {
     "api": "api engine_errors",
     "cli": "cli wrong_values",
@@ -153,7 +152,7 @@ LENGTHIEST = {
     "faults": "disk_faults interrupts threads_and_forks",
     "fuzz": "fuzz",
     "large": "dask",
-    "measure": "benchmark compare front lighting_against_vtk real_volumes runs tradeoff",
+    "measure": "compare lighting_against_vtk real_volumes tradeoff",
     "packaging": "distributions documentation",
     "plotting": "example_scripts in_browser on_screen scenes",
     "quality": "background dial",

@@ -18,14 +18,14 @@
 // Lane p * PACKET_BUNDLES + n has place p in the n-th bundle: vectors of bundles become vectors of
 // lanes within each 128 bits
 #define PACKET_BUNDLES 4
-#define BUNDLE_WIDE (PACKED == 8 ? 4 : BUNDLE)
-#define BUNDLE_HIGH (PACKED == 8 ? 1 : BUNDLE)
+#define BUNDLE_WIDE (PACKED ? 4 : BUNDLE)
+#define BUNDLE_HIGH (PACKED ? 1 : BUNDLE)
 #define PACKET_WIDE (LANES / BUNDLE_HIGH) // pixels
 // Each lane's pixel, from the packet's first; and the same of one lane
 #define LANE_X                                                                                     \
-    (PACKED == 8 ? (Int)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)                     \
+    (PACKED ? (Int)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)                     \
                  : (Int)(0, 2, 4, 6, 1, 3, 5, 7, 0, 2, 4, 6, 1, 3, 5, 7))
-#define LANE_Y (PACKED == 8 ? (Int)(0) : (Int)(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1))
+#define LANE_Y (PACKED ? (Int)(0) : (Int)(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1))
 #define X_OF(lane) ((lane) % PACKET_BUNDLES * BUNDLE_WIDE + (lane) / PACKET_BUNDLES % BUNDLE_WIDE)
 #define Y_OF(lane) ((lane) / PACKET_BUNDLES / BUNDLE_WIDE)
 
@@ -117,7 +117,7 @@ inline PacketLists lists_in_row(const Lists *in, int i, int j)
 
 inline PacketLists packet_at(const Lists *in, int i, int j)
 {
-    if (PACKED == 8)
+    if (PACKED)
         return lists_in_row(in, i, j);
     return bundles_at(in, i, j);
 }
@@ -132,7 +132,7 @@ inline void fetch_lines(__global const ulong *words, OFFSET_T first, OFFSET_T en
 // Bring the first `depth` supersegments of all lists close.
 inline void fetch(const Lists *in, const PacketLists *lists, int depth)
 {
-    if (PACKED == 8) {
+    if (PACKED) {
         int firsts[LANES], ends[LANES];
         vstore16(lists->first, 0, firsts);
         vstore16(lists->first + min(lists->count, depth), 0, ends);
@@ -143,12 +143,8 @@ inline void fetch(const Lists *in, const PacketLists *lists, int depth)
     for (int n = 0; n < PACKET_BUNDLES; ++n) {
         const OFFSET_T first = lists->firsts[n];
         const OFFSET_T end = first + min(depth, lists->counts[n]) * LISTS_PER_BUNDLE;
-        if (PACKED == 16) {
-            fetch_lines(in->faces, 2 * first, 2 * end);
-        } else {
-            fetch_lines(in->faces, first, end);
-            fetch_lines(in->media, 2 * first, 2 * end);
-        }
+        fetch_lines(in->faces, first, end);
+        fetch_lines(in->media, 2 * first, 2 * end);
     }
 }
 
@@ -176,13 +172,7 @@ inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k
                                 float depth_origin)
 {
     PacketFaces at;
-    if (PACKED == 16) {
-        const Real4 numbers = numbers_at(in->faces, lists, k);
-        at.front = numbers.x;
-        at.back = numbers.y;
-        at.words[0] = AS_UINT(numbers.z);
-        at.words[1] = AS_UINT(numbers.w);
-    } else if (PACKED == 8) {
+    if (PACKED) {
         int at_lane[LANES];
         vstore16(lists->first + select((Int)(0), (Int)(k), k < lists->count), 0, at_lane);
         __global const ulong *const from = in->faces + lists->begin;
@@ -211,7 +201,7 @@ inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k
 // Their media.
 inline Real4 packet_media(const Lists *in, const PacketLists *lists, int k, PacketFaces at)
 {
-    if (PACKED == 0)
+    if (!PACKED)
         return numbers_at(in->media, lists, k);
     return media_of_words(at.words[0], at.words[1], lists->per_code);
 }

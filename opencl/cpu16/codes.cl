@@ -13,14 +13,9 @@ inline Real depths_of_codes(const Lists *lists, Int origin, Int stride, Uint cod
     return depth_coordinate(before, depth_origin);
 }
 
-// Media of supersegments of 16 bytes by the words behind their faces, or of 8 bytes by theirs, in
-// lists of these scales.
+// Media of supersegments by their words, in lists of these scales.
 inline Real4 media_of_words(Uint low, Uint high, Real per_code)
 {
-    if (PACKED == 16)
-        return REAL4(TO_REAL(high & 2047) * (1.0f / 2047.0f),
-                     TO_REAL(high >> 11 & 2047) * (1.0f / 2047.0f),
-                     TO_REAL(high >> 22) * (1.0f / 1023.0f), AS_REAL(low));
     const Uint tau = low >> 28 | (high & 255) << 4;
     const Uint thickness = (low >> 14 & DEPTH_CODES) - (low & DEPTH_CODES);
     const Real optical_depth = select((Real)(0.0f), AS_REAL((tau + TAU_BASE - 1) << 16), tau > 0);

@@ -60,7 +60,7 @@ inline Words words_at(__global const ulong *words, Int places)
 // A list of each ray.
 typedef struct {
     Int first, count;
-    Int origin, stride; // if PACKED is 8
+    Int origin, stride; // if PACKED
 } ListOfEach;
 
 inline ListOfEach lists_at(const Lists *lists, Int i, Int j, Int asks)
@@ -68,7 +68,7 @@ inline ListOfEach lists_at(const Lists *lists, Int i, Int j, Int asks)
     const Int bundle = select((Int)(0), BUNDLE_OF_LIST(i, j, lists->wide), asks);
     ListOfEach list;
     list.origin = list.stride = 0;
-#if PACKED == 8
+#if PACKED
     // Where it begins and ends, two numbers side by side
     const Places in_memory = {bundle};
     const volatile int *at = in_memory.each;
@@ -105,9 +105,9 @@ inline FacesOfEach faces_met(const Lists *lists, const ListOfEach *list, Int n, 
                              float depth_origin)
 {
     const Int entry = entry_met(list, n, asks, away);
-    const Words face = words_at(lists->faces, PACKED == 16 ? 2 * entry : entry);
+    const Words face = words_at(lists->faces, entry);
     Real front = AS_REAL(face.low), back = AS_REAL(face.high);
-    if (PACKED == 8) {
+    if (PACKED) {
         front = depths_of_codes(lists, list->origin, list->stride, face.low, depth_origin);
         back = depths_of_codes(lists, list->origin, list->stride, face.low >> 14, depth_origin);
     }
@@ -122,10 +122,9 @@ inline Real4 medium_met(const Lists *lists, const ListOfEach *list, Int n, Int a
 {
     const Int entry = entry_met(list, n, asks, away);
     if (PACKED) {
-        const Words words = words_at(lists->faces, PACKED == 16 ? 2 * entry + 1 : entry);
-        Real per_code = 0.0f;
-        if (PACKED == 8)
-            per_code = AS_REAL(words_at(lists->faces, select((Int)(0), list->first - 1, asks)).low);
+        const Words words = words_at(lists->faces, entry);
+        const Real per_code =
+            AS_REAL(words_at(lists->faces, select((Int)(0), list->first - 1, asks)).low);
         return media_of_words(words.low, words.high, per_code);
     }
     const Places in_memory = {entry};

@@ -1,7 +1,6 @@
 // A VDI's arrays to what the raycaster reads: faces in list space and extinction in place of
 // optical depth, by bundles of lists (raycasting/supersegments.cl, whose -D names hold here).
-//
-// -D PACKED=0, 16   lists of 8 bytes are brought into their form by prepare_packed.cl
+// Those of 8 bytes are brought into their form by prepare_packed.cl.
 #include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -35,15 +34,15 @@ __kernel void prepare_lists(
     __global const HEADER_T *headers, // of the bundles of lists
     __global const float *fronts,     // view depth less depth_origin
     __global const float *backs,
-    __global const ulong *colors, // if packed, words of 11, 11 and 10 bits; straight RGB, 3 floats
+    __global const float *colors, // straight RGB
     __global const float *optical_depths,
     float depth_origin, // world units
     float nearest,      // least view depth that is in front of the eye, world units
     int width, int height,
     __global const float
         *centre_ray, // 9: model-frame direction of the ray of pixel offsets (a, b), rows 1, a, b
-    __global ulong *faces, // if packed, (front, back, extinction, colour)
-    __global ulong *media) // straight RGB, extinction per model length; none if packed
+    __global float2 *faces, // (front, back)
+    __global float4 *media) // straight RGB, extinction per model length
 {
     const size_t place = get_global_id(0);
     if (place >= (size_t)width * (size_t)height)
@@ -59,21 +58,12 @@ __kernel void prepare_lists(
         float2 face = NO_FACE; // of what the list is filled up with
         float3 color = (float3)(0.0f);
         float extinction = 0.0f;
-        uint packed_color = 0;
         if (n < count) {
             face = prepared_face(fronts[k], backs[k], depth_origin, nearest);
             extinction = prepared_extinction(fronts[k], backs[k], optical_depths[k], per_depth);
-            if (PACKED)
-                packed_color = ((__global const uint *)colors)[k];
-            else
-                color = vload3(k, (__global const float *)colors);
+            color = vload3(k, colors);
         }
-        if (PACKED) {
-            ((__global uint4 *)faces)[entry] =
-                (uint4)(as_uint2(face), as_uint(extinction), packed_color);
-        } else {
-            ((__global float2 *)faces)[entry] = face;
-            ((__global float4 *)media)[entry] = (float4)(color, extinction);
-        }
+        faces[entry] = face;
+        media[entry] = (float4)(color, extinction);
     }
 }

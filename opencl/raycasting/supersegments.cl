@@ -9,18 +9,18 @@
 // (origin, stride), in steps of depth, and (1 over the model length of a code of depth, unused).
 //
 // -D OFFSET_T=int, long   type of an offset into the supersegments
-// -D PACKED=0, 16, 8      supersegments of 24 bytes, in two arrays; or of so many, in one
+// -D PACKED=0, 1          supersegments of 24 bytes, in two arrays; or of 8, in one
 //                         (docs/conventions.md, "Packed supersegments", has the bits)
 #include "lib/list_space.cl"
 #include "raycasting/frame.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#if PACKED == 8
+#if PACKED
 #define HEADER_T OFFSET_T // where the list begins; the next one's is where it ends
 #else
 #define HEADER_T ulong // FIRST_BITS say where the entries begin, the others how many of each list
 #endif
-#define LIST_SHIFT (PACKED == 8 ? 0 : BUNDLE_SHIFT)
+#define LIST_SHIFT (PACKED ? 0 : BUNDLE_SHIFT)
 #define LISTS_PER_BUNDLE (1 << 2 * LIST_SHIFT)
 #define NO_FACE (float2)(INFINITY, INFINITY) // beyond every ray, from whichever side
 #define WORDS_PER_LINE 8                     // of 8 bytes, in a line of the cache
@@ -47,7 +47,7 @@ typedef struct {
 typedef struct {
     OFFSET_T first;     // entry of its first supersegment
     int count;          // of its supersegments, with what it is filled up with
-    int origin, stride; // if PACKED is 8, and:
+    int origin, stride; // if PACKED, and:
     float per_code;     // 1 over a code's model length
 } List;
 
@@ -80,7 +80,7 @@ inline List list_at(const Lists *lists, int i, int j)
     List list;
     list.origin = list.stride = 0;
     list.per_code = 0.0f;
-    if (PACKED == 8) {
+    if (PACKED) {
         const OFFSET_T begin = (OFFSET_T)lists->headers[bundle];
         list.first = begin + LIST_HEADER;
         list.count = (int)((OFFSET_T)lists->headers[bundle + 1] - list.first);
@@ -114,8 +114,8 @@ inline float depth_of_code(const Lists *lists, List list, uint code, Depths dept
 inline float2 face_of(const Lists *lists, List list, int k, Depths depths)
 {
     const OFFSET_T entry = entry_of(list, k);
-    const ulong word = lists->faces[PACKED == 16 ? 2 * entry : entry];
-    if (PACKED == 8)
+    const ulong word = lists->faces[entry];
+    if (PACKED)
         return (float2)(depth_of_code(lists, list, (uint)word, depths),
                         depth_of_code(lists, list, (uint)word >> 14, depths));
     const float2 face = two_floats(word);
@@ -130,15 +130,11 @@ inline float2 face_of(const Lists *lists, List list, int k, Depths depths)
 inline float4 medium_of(const Lists *lists, List list, int k)
 {
     const OFFSET_T entry = entry_of(list, k);
-    if (PACKED == 0)
+    if (!PACKED)
         return (float4)(two_floats(lists->media[2 * entry]),
                         two_floats(lists->media[2 * entry + 1]));
-    const ulong word = lists->faces[PACKED == 16 ? 2 * entry + 1 : entry];
+    const ulong word = lists->faces[entry];
     const uint low = (uint)word, high = (uint)(word >> 32);
-    if (PACKED == 16) // extinction, colour
-        return (float4)((float)(high & 2047) * (1.0f / 2047.0f),
-                        (float)(high >> 11 & 2047) * (1.0f / 2047.0f),
-                        (float)(high >> 22) * (1.0f / 1023.0f), as_float(low));
     const uint tau = low >> 28 | (high & 255) << 4;
     const uint thickness = (low >> 14 & DEPTH_CODES) - (low & DEPTH_CODES);
     const float optical_depth = tau > 0 ? as_float((tau + TAU_BASE - 1) << 16) : 0.0f;
@@ -168,14 +164,13 @@ inline void prefetch_list(const Lists *lists, int i, int j)
 {
     const int bundle = BUNDLE_OF_LIST(i, j, lists->wide);
     const ulong header = (ulong)lists->headers[bundle];
-    if (PACKED == 8) {
+    if (PACKED) {
         prefetch_share(lists->faces, (OFFSET_T)header,
                        (int)((OFFSET_T)lists->headers[bundle + 1] - (OFFSET_T)header), 1, 0);
         return;
     }
     const OFFSET_T first = first_of_header(header);
     const int count = count_of_header(header), share = PLACE_IN_BUNDLE(i, j);
-    prefetch_share(lists->faces, first, count, PACKED == 16 ? 2 : 1, share);
-    if (PACKED == 0)
-        prefetch_share(lists->media, first, count, 2, share);
+    prefetch_share(lists->faces, first, count, 1, share);
+    prefetch_share(lists->media, first, count, 2, share);
 }

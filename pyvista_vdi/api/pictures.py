@@ -72,7 +72,7 @@ def render(
         A :class:`DeferredVDI`, or a set of such, takes the words of
         :meth:`DeferredVDI.classified` (``cmap``, ``opacity``, ``clim`` ...) as well; of several,
         those that keep values take them.
-    camera : pyvista.Camera or vtkCamera or Camera
+    camera : pyvista.Camera or vtkCamera or Camera, or (position, focal point, view up)
         The new view V_N. Its model transform places the VDI's model frame in the world.
     window_size : (int, int), optional
         Width and height of the image in pixels; by default those the VDI was made for,

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from numpy.typing import ArrayLike
 
+from pyvista_vdi.errors import warn_external
 from pyvista_vdi.model.classification import Classification, refuse_keywords
 from pyvista_vdi.model.inputs import as_volume
+from pyvista_vdi.model.levels import nearest_depth
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest, QualityTarget
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
@@ -85,7 +87,7 @@ def generate(
     volume : pyvista.ImageData or vtkImageData or Volume
         Scalars on a uniform grid; spacing, origin and direction matrix are honoured, cell data
         are converted as ``Plotter.add_volume`` does.
-    camera : pyvista.Camera or vtkCamera or Camera
+    camera : pyvista.Camera or vtkCamera or Camera, or (position, focal point, view up)
         The generating view V_O.
     window_size : (int, int)
         Width and height in pixels: lists along each edge of the viewport.
@@ -103,7 +105,7 @@ def generate(
     view_cone : float
         Half angle of the cone of new views that must be served, degrees: the wider, the more of
         the budget goes to what V_O cannot see.
-    precision : {"exact", "16-byte", "8-byte"}
+    precision : {"exact", "8-byte"}
         What a supersegment takes on devices and in files, see :meth:`VDI.with_precision`.
     quality : {"reference", "high", "balanced", "fast"}, optional
         Choose the settings by how good pictures are to be: an SSIM of 0.98, 0.96 or 0.93 against
@@ -119,7 +121,7 @@ def generate(
     target_fps : float, optional
         Least full frames per second, predicted for this device. Goes before quality.
     max_bytes : int, optional
-        Most bytes of the VDI on the device; files are smaller. Goes before all others. Limits
+        Most bytes of the VDI on the device, not of files. Goes before all others. Limits
         without a quality give the best that is within them.
     target_angle : float
         Degrees by which the view is turned from V_O for which the SSIM is predicted.
@@ -188,7 +190,7 @@ def generate(
     Warns
     -----
     VDIWarning
-        If a target cannot be reached; the nearest is made.
+        If a target cannot be reached (the nearest is made), or the camera sees no volume.
 
     Examples
     --------
@@ -231,20 +233,19 @@ def generate(
         progress=progress,
         metadata={"classification": look.describe(), "scalars": read.name},
     )
+    from pyvista_vdi.quality.dial import warn_missed
     from pyvista_vdi.quality.probe import generate_anywhere
 
+    vdi: Any
     if deferral.deferred:
-        kept = generate_deferred(
-            request, deferral, lambda asked: generate_anywhere(asked, target, client)
-        )
-        warn_of_range(kept, read)
-        return kept  # type: ignore[no-any-return]
-    vdi = generate_anywhere(request, target, client)
-    if target:
-        from pyvista_vdi.quality.dial import warn_missed
-
-        warn_missed(vdi)
-    return vdi
+        vdi = generate_deferred(request, deferral, lambda it: generate_anywhere(it, target, client))
+        warn_of_range(vdi, read)
+    else:
+        vdi = generate_anywhere(request, target, client)
+    warn_missed(vdi)
+    if not vdi.n_supersegments and nearest_depth(read, request.camera, request.window_size) is None:
+        warn_external(f"the VDI is empty: the camera sees nothing of the bounds {read.bounds}")
+    return vdi  # type: ignore[no-any-return]
 
 
 def estimate(
@@ -337,28 +338,26 @@ def estimate(
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> Any:
-    """Read a VDI from a file that :meth:`VDI.save` or VTK wrote, or any deep OpenEXR image.
+    """Read a VDI from a file that :meth:`VDI.save` wrote, or any deep OpenEXR image.
 
     Or a series or a set of them.
 
     Parameters
     ----------
     path : path-like
-        A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a VDI's VTK form
-        in one of VTK's image files, ``.vti``, or a page with a VDI in it, ``.html``. Or the series
-        in a ``.vdis`` file, or the set in a ``.vdiset`` file, whose VDIs are read when they are
-        asked for.
+        A ``.vdi`` file, an OpenEXR deep image, whose name ends in ``.exr``, or a page with a VDI in
+        it, ``.html``. Or the series in a ``.vdis`` file, or the set in a ``.vdiset`` file, whose
+        VDIs are read when they are asked for.
     **options
         For ``.exr`` files of other programs: ``camera``, the view that the image shows, where
         the file does not say it; ``thickness``, world units, given to samples that have none
-        (surfaces); ``linear``, whether the colours are linear light. For all files ``progress``,
-        called with the finished fraction, 0 to 1.
+        (surfaces). For all files ``progress``, called with the finished fraction, 0 to 1.
 
     Returns
     -------
     VDI or DeferredVDI or VDISeries or VDISet
-        The same to the last bit if this package wrote the file; what is lost with other programs'
-        files is said in the documentation of files.
+        The same to the last bit if this package wrote the file, of ``.exr`` within float32's
+        rounding (docs/files.md).
 
     Raises
     ------

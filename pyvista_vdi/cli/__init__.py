@@ -54,6 +54,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever reads our output has seen enough; what Python would flush at exit goes nowhere
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except OSError as error:  # a full disk, or an encoder of films that has ended
+        if debug:
+            raise
+        return _complain(str(error), 1)
 
 
 @contextlib.contextmanager

@@ -36,15 +36,11 @@ _DECLARED = declared(
 #: What the step along a ray is where none is given.
 _HALF = " (default: half the smallest spacing)"
 
-VDI_FILE = (
-    "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, a VDI as .vti, or a page, "
-    ".html"
-)
+VDI_FILE = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
 
 VOLUME_FILE = (
-    "a file of medicine, microscopy, simulation or astronomy (.nii.gz, .nrrd, .mha, .tif, .mrc, "
-    ".nc, .h5, .fits, .vti, .npy, ...), a raw file named like x_1024x1024x795_uint8.raw, a folder "
-    "of slices (DICOM, TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+    "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
+    "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 
 
@@ -213,17 +209,14 @@ def vdi_file(options: Options) -> None:
     option(options, "file", VDI_FILE, "FILE")
 
 
-def output(options: Options, text: str = ".vdi, .exr, .vti or .html to write") -> None:
+def output(options: Options, text: str = ".vdi, .exr or .html to write") -> None:
     """Add the file to write."""
     options.add_argument("-o", "--output", metavar="FILE", required=True, help=text)
 
 
-def volume(options: Options, *instead: tuple[str, str]) -> None:
-    """Add the volume: a file's name, or one that is known; and where its voxels lie.
-
-    ``instead`` are switches that do without one, with what they say.
-    """
-    _file_or_example(options, "file", VOLUME_FILE, "VOLUME", instead=instead)
+def volume(options: Options) -> None:
+    """Add the volume: a file's name, or one that is known; and where its voxels lie."""
+    _file_or_example(options, "file", VOLUME_FILE, "VOLUME")
 
 
 def volumes(options: Options) -> None:
@@ -246,12 +239,9 @@ def _file_or_example(
     text: str,
     metavar: str,
     nargs: str = "?",
-    instead: tuple[tuple[str, str], ...] = (),
     **more: Any,
 ) -> None:
     source = options.add_mutually_exclusive_group(required=True)
-    for flag, what in instead:
-        switch(source, flag, what)
     option(source, name, text, metavar, nargs=nargs, **more)
     option(
         source,
@@ -434,7 +424,7 @@ def target(parser: argparse.ArgumentParser) -> None:
     known(group, "quality", more=named, choices=tuple(QUALITIES))
     known(group, "target_ssim", "S", parse_number)
     known(group, "target_fps", "RATE", parse_number)
-    known(group, "max_bytes", "SIZE", parse_bytes, ", like 20MB; files are smaller")
+    known(group, "max_bytes", "SIZE", parse_bytes, ", like 20MB")
     known(group, "target_angle", "DEGREES", parse_number, default=...)
 
 
@@ -444,9 +434,8 @@ def file_format(parser: argparse.ArgumentParser) -> None:
     option(
         group,
         "--compression",
-        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .exr: zips (default) or "
-        "none; of .vti: lz4 (default), zlib, lzma or none; of .html: deflate",
-        choices=("lz4", "zstd", "deflate", "zips", "zlib", "lzma", "none"),
+        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .html: deflate",
+        choices=("lz4", "zstd", "deflate", "none"),
     )
     level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
     option(group, "--compression-level", level, "N", parse_whole)
@@ -454,13 +443,10 @@ def file_format(parser: argparse.ArgumentParser) -> None:
         group,
         "--precision",
         "of .vdi: exact (24 bytes per supersegment before they are compressed; default of "
-        "generate), 16-byte or 8-byte; convert keeps what the file has; of .html: 8-byte by "
+        "generate) or 8-byte; convert keeps what the file has; of .html: 8-byte by "
         "default",
         choices=PRECISIONS,
     )
-    standard = "leave out of an .exr what makes it exact: tau, and corrections"
-    switch(group, "--standard-channels", standard)
-    switch(group, "--linear", "write an .exr's colours as linear light, for compositing")
 
 
 def scheduler(options: Options) -> None:

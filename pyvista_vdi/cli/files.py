@@ -55,6 +55,7 @@ def convert(options: argparse.Namespace) -> int:
         given_camera,
         measuring,
         part,
+        require_vdi,
         say_vdi,
         with_look,
     )
@@ -64,13 +65,10 @@ def convert(options: argparse.Namespace) -> int:
 
     if (own := _own_verbs(options.file)) is not None:
         return int(own.convert(options))
+    require_vdi(options.file, "convert")
     target = checked_target(options.output)
     file_arguments = file_options(options)
-    foreign = {
-        "camera": given_camera(options),
-        "thickness": options.thickness,
-        "linear": options.from_linear or None,
-    }
+    foreign = {"camera": given_camera(options), "thickness": options.thickness}
     given = {name: value for name, value in foreign.items() if value is not None}
     with measuring("converting") as bar:
         vdi = read(options.file, progress=part(bar, 0.0, 0.5, "reading"), **given)
@@ -94,16 +92,16 @@ def _own_verbs(file: str | None) -> Any:
 
 def _of_volume(volume: Volume) -> dict[str, Any]:
     # What all chunks hold is not read for this: there may be terabytes
-    known = volume.chunks is None or volume.chunks.ranges() is not None
     rows = {
         "dimensions": volume.dimensions,
         "scalars": volume.name,
         "type": f"{volume.array.dtype}{', RGBA' if volume.rgba else ''}",
-        "range": volume.finite_range() if known else None,
+        "range": None if volume.chunked else volume.finite_range(),
         "spacing": volume.spacing,
         "origin": volume.origin,
         "direction": volume.direction.tolist(),
         "bounds": volume.bounds,
+        "unit": volume.unit,
         "memory_bytes": volume.array.nbytes,
     }
     return {**rows, "store": _of_store(volume)} if isinstance(volume, StoredVolume) else rows
@@ -113,7 +111,6 @@ def _of_store(volume: StoredVolume) -> dict[str, Any]:
     store, array = volume.store, volume.chunks
     return {
         "kind": store.kind,
-        "unit": store.unit,
         "axes": dict(zip(store.axes, store.levels[0].array.shape, strict=True)),
         "channels": store.channels,
         "chunks": array.chunks[::-1] if array else (),
@@ -125,7 +122,7 @@ def _of_store(volume: StoredVolume) -> dict[str, Any]:
 
 
 def _volume_text(source: str, about: dict[str, Any]) -> str:
-    """Return what is known of a volume; lengths are model units, those of its file."""
+    """Return what is known of a volume."""
     turned = about["direction"] != [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     axes = zip(*about["direction"], strict=True)
     return table(
@@ -138,7 +135,7 @@ def _volume_text(source: str, about: dict[str, Any]) -> str:
             "origin": vector(about["origin"]),
             **({"axes": ", ".join(vector(axis) for axis in axes)} if turned else {}),
             "bounds": vector(about["bounds"]),
-            **(LENGTHS if about.get("store", {}).get("unit") is None else {}),
+            **({"lengths": f"in {about['unit']}"} if about["unit"] else LENGTHS),
             "in memory": mebibytes(about["memory_bytes"]),
             **(_store_rows(about["store"]) if "store" in about else {}),
         }
@@ -147,14 +144,13 @@ def _volume_text(source: str, about: dict[str, Any]) -> str:
 
 def _store_rows(store: dict[str, Any]) -> dict[str, str]:
     axes = ", ".join(f"{count} along {axis}" for axis, count in store["axes"].items())
-    unit = f"; lengths in {store['unit']}" if store["unit"] else ""
     levels = {
         f"level {k}": f"{' x '.join(str(n) for n in level['dimensions'])} points, spacing "
         f"{vector(level['spacing'])}"
         for k, level in enumerate(store["levels"])
     }
     return {
-        "store": f"{store['kind']}: {axes}{unit}",
+        "store": f"{store['kind']}: {axes}",
         "chunks": " x ".join(str(n) for n in store["chunks"]),
         **({"channels": ", ".join(store["channels"])} if store["channels"] else {}),
         **levels,

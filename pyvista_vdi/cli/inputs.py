@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -145,6 +146,18 @@ def is_volume(options: argparse.Namespace) -> bool:
     return False
 
 
+def require_vdi(file: str, verb: str) -> None:
+    """Refuse a volume where a VDI is wanted, and say how the command makes one."""
+    named = printable(file)
+    if not (is_vdi_file(file) or is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long
+        raise VDIFileError(f"{named} does not exist: check the file's name")
+    if not is_vdi_file(file) and holds(file) not in ("series", "set"):
+        raise UnsupportedError(
+            f"{named} is no VDI, which is what {verb} takes; of a volume, 'pyvista-vdi generate "
+            f"{named} -o FILE.vdi' makes one"
+        )
+
+
 def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:
     """Refuse options that were given and would mean nothing: they are for something else."""
     for name in names:
@@ -230,10 +243,6 @@ def _refuse_with_values(options: argparse.Namespace) -> None:
             f"{target}: settings are chosen by a look, which --classification deferred does not "
             "have: give --max-supersegments"
         )
-    if options.precision == "16-byte":
-        raise UnsupportedError(
-            "--precision 16-byte is none of VDIs that keep values: choose exact or 8-byte"
-        )
 
 
 def as_option(name: str) -> str:
@@ -272,17 +281,9 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
         raise
 
 
-def require_new(path: Path, options: argparse.Namespace) -> None:
-    """Refuse to replace results that ``--resume`` could go on with."""
-    if path.exists() and not options.resume:
-        raise InvalidArgumentError(
-            f"{path} is there already: --resume goes on with it, or choose another --out"
-        )
-
-
 @contextmanager
-def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
-    """Show a bar that is alive; after Ctrl-C say what ``--resume`` can go on with."""
+def measuring(label: str) -> Iterator[DelayedBar]:
+    """Show a bar that is alive."""
     bar, finished = DelayedBar(label=label), Event()
 
     def pulse() -> None:
@@ -293,12 +294,6 @@ def measuring(label: str, results: Path | None = None) -> Iterator[DelayedBar]:
     try:
         pulsing.start()
         yield bar
-    except KeyboardInterrupt:
-        if results is not None and results.exists():
-            print(
-                f"\nWhat was measured is in {printable(results)}: --resume goes on", file=sys.stderr
-            )
-        raise
     finally:
         finished.set()
         bar.close()
@@ -350,16 +345,13 @@ _FILE_ARGUMENTS = {
     "compression": "compression",
     "compression_level": "level",
     "precision": "precision",
-    "standard_channels": "exact",
-    "linear": "linear",
 }
 
 
 def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of a file that were given."""
     given = {argument: getattr(options, name, None) for name, argument in _FILE_ARGUMENTS.items()}
-    given = {argument: v for argument, v in given.items() if v is not None and v is not False}
-    return given | {"exact": False} if "exact" in given else given
+    return {argument: value for argument, value in given.items() if value is not None}
 
 
 def file_options(options: argparse.Namespace) -> dict[str, Any]:

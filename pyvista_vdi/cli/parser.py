@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import re
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from pyvista_vdi import registry
 from pyvista_vdi._version import __version__
@@ -37,12 +38,22 @@ pyvista-vdi devices says on what it runs.
 _LISTED = 16
 
 
+#: Verbs that went, and what does their work.
+_GONE = {
+    "benchmark": "the paper's tables are measured by a script of a checkout, benchmarks/paper.py"
+}
+
+
 class UsageError(Exception):
     """A mistake in the arguments; the message says which and what is right."""
 
 
 class _Parser(argparse.ArgumentParser):
     """An argument parser that raises instead of leaving the process, and says one line."""
+
+    def _parse_optional(self, arg_string: str) -> Any:
+        # A value is -1.8e-15, too, and -1,0: argparse's own rule knows numbers like -1.5
+        return None if re.match(r"-\.?\d", arg_string) else super()._parse_optional(arg_string)
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message}; see {self.prog} --help")
@@ -57,6 +68,8 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
     if not arguments:
         print(_LESSON, end="")
         return None
+    if arguments[0] in _GONE:
+        raise UsageError(f"there is no verb {arguments[0]!r}: {_GONE[arguments[0]]}")
     if not arguments[0].startswith("-") and arguments[0] not in verbs:
         raise UsageError(
             f"there is no verb {arguments[0]!r}: {_suggestion(arguments[0], list(verbs))}"

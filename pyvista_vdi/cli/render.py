@@ -21,6 +21,7 @@ from pyvista_vdi.cli.inputs import (
     part,
     read_volume,
     refuse,
+    require_vdi,
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -29,7 +30,7 @@ from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
@@ -46,6 +47,7 @@ def render(options: argparse.Namespace) -> int:
     vdis, share = [], 0.5 / len(options.files)
     with measuring("rendering") as bar:
         for k, file in enumerate(options.files):
+            require_vdi(file, "render")
             found = read(file, progress=part(bar, k * share, (k + 1) * share, "reading"))
             vdis.append(_at(found, options.time))
         # A look is for those that keep values, and is over the ranges of all of them
@@ -53,13 +55,14 @@ def render(options: argparse.Namespace) -> int:
         look = look_for(options, vdis[asks], options.files[asks])
         bar(0.5, "drawing")
         first = vdis[0]
-        view = camera(options, first.camera)
+        own, size = picture_view(first)
+        view = camera(options, own)
         several = len(vdis) > 1
         transforms = [vdi.camera.model_transform for vdi in vdis]
         image = render_vdi(
             vdis if several else first,
             view,
-            options.size or first.picture_size,
+            options.size or size,
             model_transforms=transforms if several else None,
             transmittance_cutoff=options.transmittance_cutoff,
             device=options.device,
@@ -75,23 +78,26 @@ def view(options: argparse.Namespace) -> int:
     screenshot = None
     if options.screenshot is not None:
         screenshot = str(checked_png_target(options.screenshot))
+    if not is_series(options):
+        refuse(options, ("play", "rate", "time"), _SERIES)
+    shown: Any
+    if is_volume(options):
+        look = classification(options)
+        shown = read_volume(options)
+        size = options.size or WINDOW_SIZE
+        first = filling_camera(shown.bounds, size)
+    else:
+        shown = read(options.file)
+        vdi = _at(shown, options.time)
+        first, own = picture_view(vdi)
+        size = options.size or own
+        look = look_for(options, shown, options.file)
+    # Last: what is wrong with the file is said with and without a display
     if screenshot is None and (trouble := why_no_window()) is not None:
         raise UnsupportedError(
             f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"
         )
-    if not is_series(options):
-        refuse(options, ("play", "rate", "time"), _SERIES)
-    if is_volume(options):
-        looks = classification(options)
-        volume = read_volume(options)
-        size = options.size or WINDOW_SIZE
-        _show(volume, filling_camera(volume.bounds, size), size, looks, options, screenshot)
-    else:
-        shown = read(options.file)
-        vdi = _at(shown, options.time)
-        size = options.size or vdi.picture_size
-        look = look_for(options, shown, options.file)
-        _show(shown, vdi.camera, size, look, options, screenshot)
+    _show(shown, first, size, look, options, screenshot)
     if screenshot is not None:
         print(f"{printable(options.screenshot)}: written")
     return 0
@@ -134,7 +140,6 @@ def _show(
         if isinstance(shown, VDICollection) and shown.times is not None:
             _begin(actor, plotter, options, slider=screenshot is None)
         aim(plotter.camera, camera)
-        plotter.camera_set = True
         plotter.renderer.reset_camera_clipping_range()
         if screenshot is None:
             plotter.show()

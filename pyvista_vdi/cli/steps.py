@@ -7,14 +7,13 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.cli.inputs import laid_out, open_store, quietly, read_volume
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.time_steps import in_step_order, listed_steps, lists_steps
-from pyvista_vdi.io.volumes import needs_pyvista
+from pyvista_vdi.io.volumes.formats import FORMATS
 from pyvista_vdi.model.volume import Volume
 
 
@@ -63,7 +62,7 @@ def _steps_of(
         for listed, at in listed_steps(file):
             yield from _steps_of(str(listed), options, at, in_chunks=in_chunks)
         return
-    elif needs_pyvista(Path(file)):
+    elif file.lower().endswith(FORMATS["VTK"].suffixes):
         from pyvista_vdi.plotting.volume_files import steps_of
 
         with quietly():

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
+
+from pyvista_vdi.model.whole_file import whole_file
 
 #: What lengths and positions in tables are measured in: files of VDIs say no more.
 LENGTHS = {"lengths": "in the units of the volume's spacing, model units"}
@@ -38,3 +41,9 @@ def vector(values: Any) -> str:
 def plain_number(value: float) -> str:
     """Return a number as people write it."""
     return f"{value + 0.0:g}"  # no zero has a sign
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text as UTF-8; the file appears whole or not at all."""
+    with whole_file(path) as stream:
+        stream.write(text.encode())

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from pyvista_vdi.cli.inputs import (
     classification,
@@ -14,47 +18,44 @@ from pyvista_vdi.cli.inputs import (
     measuring,
     output_files,
     read_volume,
-    require_new,
     say_written,
     volume_name,
 )
+from pyvista_vdi.cli.text import write_text
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.measure.paper.datasets import look
-from pyvista_vdi.measure.results import write_text
-from pyvista_vdi.measure.tradeoff import AXES, Setting, measure_tradeoff, sweep
-from pyvista_vdi.measure.tradeoff.report import summary
-from pyvista_vdi.measure.tradeoff.settings import DEFAULT_AXES, QUICK_AXES
+from pyvista_vdi.measure.bench import as_json
+from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_tradeoff, sweep
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.transfer_function import TransferFunction
 
 #: Frames and views, without and with ``--quick``.
 _SIZES = ((640, 360), (320, 180))
 _ANGLES = ((5.0, 30.0, 60.0), (5.0, 30.0))
-
-#: How the volume looks where nothing is said: a ramp from transparent black to opaque white, which
-#: needs no PyVista.
-_DEFAULT_LOOK = "ramp"
 
 
 def tradeoff(options: argparse.Namespace) -> int:
     """Measure and write."""
     arguments = classification(options)
     Classification.composited(arguments, "tradeoff")  # refused before the volume is read
-    settings = _settings(options)
+    # With --quick the last of an axis's usual values
+    usual = {n: values[-1:] if options.quick else values for n, values in AXES.items()}
+    axes = dict(_axis(text, usual) for text in options.sweep or DEFAULT_AXES)
+    settings = sweep(axes, pairs=not options.quick)
     name = options.name or volume_name(options)
     if Path(name).name != name:
         raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
     volume = read_volume(options)
     if not set(arguments) - {"interpolation"} and not volume.rgba:
-        # By default the same without PyVista
-        interpolation = arguments.get("interpolation", "nearest")
-        table = look(_DEFAULT_LOOK, volume.finite_range(), interpolation)
+        # A ramp from transparent black to opaque white, which needs no PyVista
+        ramp = np.linspace(0.0, 1.0, 256)
+        table = TransferFunction(np.stack([ramp] * 3, axis=1), ramp, volume.finite_range())
+        table = table.replace(interpolation=arguments.get("interpolation", "nearest"))
         arguments = {"transfer_function": table}
     vtk = has_vtk(options)
     with (
         output_files(options, f"tradeoff-{name}", "json", "md", "png") as files,
-        measuring("tradeoff", files["json"]) as bar,
+        measuring("tradeoff") as bar,
     ):
-        require_new(files["json"], options)
         found = measure_tradeoff(
             volume,
             settings,
@@ -64,13 +65,15 @@ def tradeoff(options: argparse.Namespace) -> int:
             generations=options.generations,
             vtk=vtk,
             name=name,
-            path=files["json"],
-            resume=options.resume,
             device=options.device,
             progress=bar,
             **arguments,
         )
-    print(summary(found.points))
+    for kind in COSTS:
+        print(f"{kind} against SSIM: {'; '.join(found.front(kind))}")
+    for worse, better in found.dominated().items():
+        print(f"dominated: {worse} (by {better[0]})")
+    write_text(files["json"], json.dumps(as_json(asdict(found)), indent=1) + "\n")
     write_text(files["md"], found.table())
     if find_spec("matplotlib") is None or not found.points:
         del files["png"]
@@ -78,16 +81,6 @@ def tradeoff(options: argparse.Namespace) -> int:
         found.save_plot(files["png"])
     say_written(files.values())
     return 0
-
-
-def _settings(options: argparse.Namespace) -> tuple[Setting, ...]:
-    """Return what the options ask to compare."""
-    usual = {**AXES, **QUICK_AXES} if options.quick else AXES
-    if options.sweep is None:
-        axes = {n: usual[n] for n in (QUICK_AXES if options.quick else DEFAULT_AXES)}
-    else:
-        axes = dict(_axis(text, usual) for text in options.sweep)
-    return sweep(axes, pairs=not options.quick)
 
 
 def _axis(text: str, usual: Mapping[str, tuple[Any, ...]]) -> tuple[str, tuple[Any, ...]]:
@@ -99,7 +92,7 @@ def _axis(text: str, usual: Mapping[str, tuple[Any, ...]]) -> tuple[str, tuple[A
         raise InvalidArgumentError(f"--sweep knows no {given!r}: known are {known}")
     if not equals:
         return name, usual[name]
-    kind, chosen = type(getattr(Setting(), name)), []
+    kind, chosen = type(AXES[name][0]), []
     for value in values.split(","):
         try:
             chosen.append({"on": True, "off": False}[value] if kind is bool else kind(value))

@@ -49,7 +49,6 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--camera-json", view, "FILE")
     thickness = "world units, given to samples that have none (surfaces)"
     declare.option(group, "--thickness", thickness, "LENGTH", declare.parse_number)
-    declare.switch(group, "--from-linear", "the colours are linear light: show it by sRGB's curve")
 
 
 def _add_render(parser: argparse.ArgumentParser) -> None:
@@ -119,8 +118,7 @@ def _add_frames(parser: argparse.ArgumentParser, frames: str) -> None:
     declare.vdi_or_volume(parser)
     declare.output(
         parser,
-        ".gif to write; or .mp4, .webm (pip install 'pyvista-vdi[movie]'); or pictures, "
-        "frame_{:04d}.png",
+        ".gif, .mp4 or .webm to write (pip install 'pyvista-vdi[movie]')",
     )
     declare.size(parser, None)
     declare.option(
@@ -161,13 +159,7 @@ def _add_movie(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
-    front = (
-        "our ways to draw against VTK's, by time and SSIM, for every known volume at hand, "
-        "transfer function and view: hours"
-    )
-    declare.volume(parser, ("--front", front))
-    declare.switch(parser, "--quick", "of --front: 24 cases of two shipped volumes, minutes")
-    declare.switch(parser, "--resume", "of --front: go on with front.json where it was left")
+    declare.volume(parser)
     declare.option(parser, "--out", "where the files go", "FOLDER", default=".")
     declare.size(parser, WINDOW_SIZE)
     declare.angles(
@@ -180,7 +172,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     declare.option(
         parser,
         "--precision",
-        "of the supersegments: exact (default, 24 bytes each), 16-byte or 8-byte",
+        "of the supersegments: exact (default, 24 bytes each) or 8-byte",
         choices=PRECISIONS,
         default="exact",
     )
@@ -195,59 +187,11 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     declare.device(parser)
 
 
-def _add_benchmark(parser: argparse.ArgumentParser) -> None:
-    declare.option(
-        parser,
-        "--profile",
-        "quick (default): small volumes, minutes; full: the paper's sizes and all volumes at "
-        "hand, hours; gpu: the paper's cells, frames that stay on the device, too, minutes on a "
-        "data centre's GPU",
-        choices=("quick", "full", "gpu"),
-        default="quick",
-    )
-    declare.option(
-        parser,
-        "--out",
-        ".json to write; the tables (.md) go beside it (default: benchmark.json)",
-        "FILE",
-        default="benchmark.json",
-    )
-    declare.switch(parser, "--resume", "go on with FILE where it was left")
-    group = parser.add_argument_group("what is measured", "In place of the profile's.")
-    declare.option(
-        group,
-        "--datasets",
-        "volumes known by name, and kingsnake_like, beechnut_like, richtmyer_meshkov_like: "
-        "made at the paper's sizes, or with @4 behind the name at a quarter along each edge",
-        "NAME",
-        nargs="+",
-    )
-    declare.option(
-        group,
-        "--volume",
-        "a file, may be repeated; a NAME of kingsnake, beechnut or richtmyer_meshkov says "
-        "that it is the paper's; raw files are named like x_1024x1024x795_uint8.raw",
-        "[NAME=]FILE",
-        action="append",
-    )
-    declare.option(group, "--sizes", "windows, pixels", "WxH", declare.parse_size, nargs="+")
-    declare.option(group, "--max-supersegments", None, "N", declare.parse_count, nargs="+")
-    declare.angles(group, "degrees from V_O")
-    declare.repeats(group, "timed frames of each kind and view (5)")
-    declare.option(group, "--interpolation", "(nearest)", choices=("nearest", "linear"))
-    declare.option(group, "--seed", "of the made volumes (1)", "N", declare.parse_count)
-    tables = "which of the paper's tables (both)"
-    declare.option(group, "--tables", tables, kind=declare.parse_whole, nargs="+", choices=(1, 2))
-    declare.no_vtk(parser)
-    declare.device(parser)
-
-
 def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
     declare.volume(parser)
     results = "where tradeoff-NAME.json (every figure), .md (tables) and .png (plot) go"
     declare.option(parser, "--out", results, "FOLDER", default=".")
     declare.option(parser, "--name", "in place of the volume's own, for several runs of one")
-    declare.switch(parser, "--resume", "go on with what is there")
     declare.switch(parser, "--quick", "fewer settings and angles in a smaller window")
     parser.add_argument(
         "--size",
@@ -267,8 +211,8 @@ def _add_tradeoff(parser: argparse.ArgumentParser) -> None:
         nargs="+",
     )
     declare.repeats(parser, "timed frames (default: 5)", 5)
-    generations = "timed generations of each VDI (default: 5)"
-    declare.option(parser, "--generations", generations, "N", declare.parse_count, default=5)
+    generations = "timed generations of each VDI (default: 3)"
+    declare.option(parser, "--generations", generations, "N", declare.parse_count, default=3)
     declare.no_vtk(parser)
     declare.classification(parser)
     declare.device(parser)
@@ -324,12 +268,6 @@ VERBS: dict[str, tuple[str, str, str, Any]] = {
         "pyvista-vdi compare --example brain --tf soft --out out",
         _add_compare,
     ),
-    "benchmark": (
-        "benchmark",
-        "measure the paper's tables: frame times and accuracy beside volume rendering",
-        "pyvista-vdi benchmark --profile quick --out quick.json",
-        _add_benchmark,
-    ),
     "tradeoff": (
         "tradeoff",
         "measure what each setting of a VDI costs and gives, and draw the fronts",
@@ -338,7 +276,7 @@ VERBS: dict[str, tuple[str, str, str, Any]] = {
     ),
     "convert": (
         "files",
-        "write a VDI, or each of a series or set, as .vdi, .exr, .vti; all of one as .vdis, .html",
+        "write a VDI, or each of a series or set, as .vdi, .exr; all of one as .vdis, .html",
         "pyvista-vdi convert knee.vdi -o knee.exr",
         _add_convert,
     ),

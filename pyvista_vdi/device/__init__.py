@@ -11,7 +11,7 @@ from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.launches import Launch, padded
 from pyvista_vdi.device.memory import DeviceBuffer, kept_together
 from pyvista_vdi.device.programs import Kernel, KernelDeclaration, Struct
-from pyvista_vdi.device.queues import KernelTime, Profile
+from pyvista_vdi.device.queues import KernelTime
 from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty
 
@@ -23,7 +23,6 @@ __all__ = [
     "KernelDeclaration",
     "KernelTime",
     "Launch",
-    "Profile",
     "Runtime",
     "Struct",
     "aligned_empty",

@@ -131,7 +131,7 @@ def describe_devices() -> str:
         )
         lines.append(f"    {info.version}, driver {info.driver}, selector {info.selector!r}")
         lines.append("    usable" if info.usable else f"    not used: {info.reason}")
-    return "\n".join([*lines, last, *(f"Note: {note}." for note in notes if note)])
+    return "\n".join([*lines, last, *(f"Note: {note}." for note in notes if note not in last)])
 
 
 def _best() -> Runtime:
@@ -193,7 +193,7 @@ def _named(device: Any, origin: str) -> Runtime:
 def _unusable(info: DeviceInfo, asked: str) -> str:
     return (
         f"{asked} means {info.full_name}, which is not usable: {info.reason}; "
-        f"choose another device, or {devices.REMEDY}"
+        f"choose another device, or {devices.remedy()}"
     )
 
 

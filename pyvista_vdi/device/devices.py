@@ -14,7 +14,12 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
 
-from pyvista_vdi.device.icd import Discovery, drivers_visible, own_loader_bound, pocl_cache_at_hand
+from pyvista_vdi.device.icd import (
+    after_listing,
+    drivers_visible,
+    own_loader_bound,
+    pocl_cache_at_hand,
+)
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.model.user_cache import writable_cache
 
@@ -185,17 +190,22 @@ def select(infos: Sequence[DeviceInfo], selector: str, origin: str) -> DeviceInf
             f"{origin}{selector!r} means {len(found)} devices: {listing(found)}; "
             "name one of them by its selector"
         )
-    remedy = f"; {REMEDY}" if not infos else ""
+    advice = f"; {remedy()}" if not infos else ""
     raise NoDeviceError(
-        f"{origin}{selector!r}: there is no such OpenCL device; there is {listing(infos)}{remedy}"
+        f"{origin}{selector!r}: there is no such OpenCL device; there is {listing(infos)}{advice}"
     )
 
 
 def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
     """Text for when nothing can be used: what was found, why it failed, and what to do."""
     found = f"found {listing(infos)}" if infos else "no OpenCL driver lists a device"
-    details = "".join(f"; {note}" for note in notes if note)
-    return f"no usable OpenCL device: {found}{details}. Remedy: {REMEDY}"
+    details = "".join(f"; {note}" for note in notes if note and note != remedy())
+    return f"no usable OpenCL device: {found}{details}. Remedy: {remedy()}"
+
+
+def remedy() -> str:
+    """Return what to do where no device will do; what is installed already is not advised."""
+    return _advice
 
 
 def bytes_text(nbytes: int) -> str:
@@ -208,6 +218,7 @@ def bytes_text(nbytes: int) -> str:
 
 _lock = threading.RLock()
 _found: tuple[list[Candidate], list[str]] | None = None
+_advice = REMEDY
 #: Whether drivers are here that the threads they work with did not follow into a fork.
 forked = False
 
@@ -269,26 +280,30 @@ def find_candidates() -> tuple[list[Candidate], list[str]]:
     Also notes on how they were looked for. MissingDependencyError if pyopencl cannot be imported,
     DeviceError in a fork of a process that had listed them.
     """
-    global _found
+    global _found, _advice
     require_drivers()
     if _found is not None:
         return _found  # likewise without a lock
     with _lock:
         if _found is None:
             with drivers_visible() as discovery, pocl_cache_at_hand():
+                early = "pyopencl" in sys.modules
                 cl = _import_pyopencl()
-                _found = _list(cl, discovery)
+                candidates, notes = _list(cl)
+                discovery = after_listing(discovery) if early else discovery
+            _advice = discovery.note if discovery.hidden else REMEDY
+            _found = candidates, [discovery.note, *notes]
         return _found
 
 
-def _list(cl: ModuleType, discovery: Discovery) -> tuple[list[Candidate], list[str]]:
-    notes = [discovery.note]
+def _list(cl: ModuleType) -> tuple[list[Candidate], list[str]]:
+    notes: list[str] = []
     infos: list[DeviceInfo] = []
     handles: list[Any] = []
     try:
         platforms = cl.get_platforms()
     except cl.Error as exc:  # PLATFORM_NOT_FOUND_KHR: the loader knows no driver
-        return [], [*notes, f"the OpenCL loader says: {exc}"]
+        return [], [f"the OpenCL loader says: {exc}"]
     for platform_index, platform in enumerate(platforms):
         try:
             devices = platform.get_devices()

@@ -37,10 +37,14 @@ INTEL_LIBRARY = "libintelocl.so"
 
 @dataclass(frozen=True)
 class Discovery:
-    """The driver library that was made visible, if any, and why, for :func:`describe_devices`."""
+    """The driver library that was made visible, if any, and why, for :func:`describe_devices`.
+
+    ``hidden``: pip's driver is installed, and ``note`` says what to do for it to be found.
+    """
 
     added: Path | None
     note: str
+    hidden: bool = False
 
 
 def intel_library() -> Path | None:
@@ -94,18 +98,14 @@ def plan() -> tuple[dict[str, str] | None, Discovery]:
     """Return the vendor files to show (None: leave the environment alone), and why."""
     if not sys.platform.startswith("linux"):
         return None, Discovery(None, "drivers are found by the system's own loader")
+    library = intel_library()
     for variable in USER_VARIABLES:
         if os.environ.get(variable):
-            return None, Discovery(None, f"{variable}={os.environ[variable]!r} is set and obeyed")
-    library = intel_library()
+            note = f"{variable}={os.environ[variable]!r} is set and obeyed"
+            unset = f": unset it to have {library} added" if library else ""
+            return None, Discovery(None, note + unset, hidden=library is not None)
     if library is None:
         return None, Discovery(None, f"no {INTEL_LIBRARY} from pip in this environment")
-    if "pyopencl" in sys.modules:
-        note = (
-            f"pyopencl was imported before pyvista_vdi asked for a device, so {library} was not "
-            "added to its search path; import order decides, or set OCL_ICD_VENDORS"
-        )
-        return None, Discovery(None, note)
     system = read_vendor_files([SYSTEM_VENDORS])
     if any(Path(entry).name.startswith(INTEL_LIBRARY) for entry in system.values()):
         return None, Discovery(None, "the system's vendor files name Intel's CPU runtime already")
@@ -114,6 +114,25 @@ def plan() -> tuple[dict[str, str] | None, Discovery]:
     if str(library) not in files.values():
         files["zz-pyvista-vdi-intel.icd"] = str(library)
     return files, Discovery(library, f"added {library} to the loader's search path")
+
+
+def after_listing(discovery: Discovery) -> Discovery:
+    """Return what is true of a driver that was added when pyopencl had been imported already.
+
+    A loader that had listed its drivers by then keeps to them. Call it when they are listed.
+    """
+    if discovery.added is None:
+        return discovery
+    try:
+        ctypes.CDLL(str(discovery.added), mode=os.RTLD_NOLOAD)
+    except OSError:
+        note = (
+            "move  import pyopencl  below the first use of a device by pyvista_vdi, "
+            "pyvista_vdi.list_devices() for instance: an OpenCL loader had listed its drivers "
+            f"before {discovery.added} was added to its search path"
+        )
+        return Discovery(None, note, hidden=True)
+    return discovery
 
 
 @contextlib.contextmanager

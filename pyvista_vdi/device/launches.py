@@ -149,9 +149,7 @@ class Launch:
         except queues.cl.Error as exc:
             doing = f"launching {kernel.name!r} of {kernel.path} on {whole} by {local}"
             raise queues.failure(exc, doing) from exc
-        profile = queues.thread.profile or queues.profiled
-        if profile is not None:
-            profile.record(kernel.name, event)
+        queues.record(kernel.name, event)
 
     def _run_in_pieces(
         self, worker: Worker, whole: tuple[int, ...], local: tuple[int, ...] | None

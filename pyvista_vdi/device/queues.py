@@ -71,11 +71,6 @@ class Profile:
             self._sums[name] = (calls + 1, nanoseconds + elapsed)
         self._pending.clear()
 
-    def kernel_seconds(self) -> float:
-        """Wait for what is pending; device time of all kernels so far, without transfers."""
-        kernels = [row for row in self.figures() if not row.name.startswith("[")]
-        return sum(row.total_ms for row in kernels) * 1e-3
-
     def figures(self) -> list[KernelTime]:
         """Wait for what is pending, and return rows, longest total first."""
         with self._lock:
@@ -104,18 +99,16 @@ def table(title: str, rows: list[KernelTime]) -> str:
 
 
 class _ThisThread(ThisThread):
-    """The calling thread: the number of its queue, and the profile that its times go to."""
+    """The calling thread, with the number of its queue."""
 
     number = 1  # the main queue's
-    profile: Profile | None = None
 
 
 class Device(Turns):
     """A device and a context on it, a command queue for all threads, and others for those that ask.
 
     ``cl`` is pyopencl. ``thread`` has, beside what :class:`Turns` says, the ``number`` of the
-    calling thread's queue, and ``profile``, where its times go; those of all others go to
-    ``profiled`` (with ``PYVISTA_VDI_PROFILE``).
+    calling thread's queue. With ``PYVISTA_VDI_PROFILE`` times go to ``profiled``.
     """
 
     _allocated = 0  # bytes that its buffers hold
@@ -184,10 +177,9 @@ class Device(Turns):
             devices.require_drivers()
         return self._queues[self.thread.number]
 
-    def _new_queue(self, *, profiled: bool = False) -> int:
+    def _new_queue(self) -> int:
         cl = self.cl
-        wanted = profiled or self.profiled is not None
-        properties = cl.command_queue_properties.PROFILING_ENABLE if wanted else 0
+        properties = cl.command_queue_properties.PROFILING_ENABLE if self.profiled else 0
         try:
             queue = cl.CommandQueue(self._context, self._device, properties)
         except cl.Error as exc:
@@ -198,21 +190,19 @@ class Device(Turns):
             return self._queues_made
 
     @contextlib.contextmanager
-    def queue_scope(self, profile: Profile | None = None) -> Iterator[None]:
+    def queue_scope(self) -> Iterator[None]:
         """Open an in-order command queue of the calling thread's own for the ``with`` block.
 
         What was enqueued before is finished first, and what is enqueued inside is finished at
-        the end, so buffers may cross the borders of the block. ``profile`` collects the device
-        times of what the thread enqueues inside.
+        the end, so buffers may cross the borders of the block.
         """
         self.finish()
-        thread, inner = self.thread, self._new_queue(profiled=profile is not None)
-        outer, outer_profile = thread.number, thread.profile
-        thread.number, thread.profile = inner, profile
+        thread, inner = self.thread, self._new_queue()
+        outer, thread.number = thread.number, inner
         try:
             yield
         finally:
-            thread.number, thread.profile = outer, outer_profile
+            thread.number = outer
             self.finish_queues({inner})
             with self._queues_lock:
                 del self._queues[inner]
@@ -262,9 +252,8 @@ class Device(Turns):
 
     def record(self, name: str, event: Any) -> None:
         """Note the time of an enqueued command, if anybody wants it."""
-        profile = self.thread.profile or self.profiled
-        if profile is not None:
-            profile.record(name, event)
+        if self.profiled is not None:
+            self.profiled.record(name, event)
 
     def _print_profile(self) -> None:
         rows = self.profile()

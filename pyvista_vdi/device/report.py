@@ -1,4 +1,4 @@
-"""What is installed and what is missing, for a report of a defect: ``pvdi.Report()``."""
+"""What is installed, for a report of a defect: ``pvdi.Report()``."""
 
 from __future__ import annotations
 
@@ -7,29 +7,20 @@ import platform
 import re
 from importlib import metadata
 
-from packaging.requirements import Requirement
-
 from pyvista_vdi._version import __version__
 from pyvista_vdi.device.choice import describe_devices
 from pyvista_vdi.errors import VDIError
 
-#: Extras for those who work on this project, which nobody else misses.
-_FOR_DEVELOPERS = ("browser", "dev", "docs", "fuzz", "ome-zarr", "qt", "test")
-_EXTRA = re.compile(r"""extra\s*==\s*["']([\w-]+)["']""")
-
 
 class Report:
-    """Devices, drivers, versions, and what is missing; needs neither VTK nor PyVista.
+    """Devices, drivers and versions; needs neither VTK nor PyVista.
 
     Attributes
     ----------
     devices : str
         What :func:`pyvista_vdi.describe_devices` says, or why it cannot.
-    packages : dict of str to (str or None)
-        Version of every package that is needed, or that an extra brings; ``None`` where it is
-        missing.
-    missing : dict of str to list of str
-        By extra (``""``: needed always), packages that are not here, or are too old.
+    packages : dict of str to str
+        Versions of the packages that are needed, or that extras bring, as far as they are here.
 
     Examples
     --------
@@ -38,61 +29,26 @@ class Report:
     """
 
     devices: str
-    packages: dict[str, str | None]
-    missing: dict[str, list[str]]
+    packages: dict[str, str]
 
     def __init__(self) -> None:
         try:
             self.devices = describe_devices()
         except VDIError as error:
             self.devices = str(error)
-        self.packages, self.missing = {}, {}
-        for extra, required in _requirements():
-            found = _version(required.name)
-            self.packages[required.name] = found
-            if found is None or not required.specifier.contains(found, prereleases=True):
-                self.missing.setdefault(extra, []).append(f"{required.name}{required.specifier}")
+        wanted = re.findall(r"^[\w.-]+", "\n".join(metadata.requires("pyvista-vdi") or ()), re.M)
+        found = {each.metadata["Name"].lower(): each.version for each in metadata.distributions()}
+        self.packages = {n: found[n.lower()] for n in sorted({*wanted}) if n.lower() in found}
 
     def __repr__(self) -> str:
-        lines = [
-            f"pyvista-vdi {__version__}",
-            f"Python {platform.python_version()} ({platform.python_implementation()})",
-            f"{platform.platform()}, {platform.machine()}",
-            "",
-            "OpenCL devices",
-            *(f"  {line}" for line in self.devices.splitlines()),
-            "",
-            "Packages",
-        ]
-        width = max(map(len, self.packages), default=0)
-        for name in sorted(self.packages, key=str.lower):
-            lines.append(f"  {name:{width}}  {self.packages[name] or 'missing'}")
-        lines += ["", "Missing" if self.missing else "Nothing is missing."]
-        for extra, names in self.missing.items():
-            remedy = f"[{extra}]" if extra else ""
-            lines.append(f'  {", ".join(names)}: pip install "pyvista-vdi{remedy}"')
-        return "\n".join(lines)
+        return "\n".join(
+            (
+                f"pyvista-vdi {__version__}, Python {platform.python_version()}",
+                f"{platform.platform()}, {platform.machine()}",
+                self.devices,
+                *(f"{name} {version}" for name, version in self.packages.items()),
+            )
+        )
 
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(repr(self))}</pre>"
-
-
-def _requirements() -> list[tuple[str, Requirement]]:
-    """Return (extra or "", requirement) of what this installation's metadata names for here."""
-    found = []
-    for text in metadata.requires("pyvista-vdi") or ():
-        required = Requirement(text)
-        extra = _EXTRA.search(str(required.marker or ""))
-        name = extra[1] if extra else ""
-        if name in _FOR_DEVELOPERS or required.name == "pyvista-vdi":
-            continue
-        if required.marker is None or required.marker.evaluate({"extra": name}):
-            found.append((name, required))
-    return found
-
-
-def _version(name: str) -> str | None:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return None

@@ -71,29 +71,11 @@ def generate_deferred(
     """Make a deferred VDI; of the request's transfer function the interpolation counts.
 
     ``generate`` makes the VDI of a request: here, in blocks, or by workers; where it makes none, as
-    on all of MPI's ranks but one, there is no deferred one either, and None is returned.
-    InvalidArgumentError if the range or the importance cannot be used, UnsupportedError for what
-    cannot be deferred, and what ``generate`` raises.
+    on all of MPI's ranks but one, there is no deferred one either, and None is returned. Raises
+    what :func:`kept_range` and ``generate`` do.
     """
     volume, options = request.volume, request.options
-    if volume.rgba:
-        raise UnsupportedError(
-            "RGBA volumes have colours of their own, so that nothing is left to be classified "
-            "afterwards: leave classification='deferred' out"
-        )
-    if options.ambient_occlusion is not None:
-        raise UnsupportedError(
-            "ambient occlusion follows from opacities, which a deferred VDI does not have: leave "
-            "ambient_occlusion out, or classification='deferred'"
-        )
-    asked = volume.finite_range() if deferral.value_range is None else deferral.value_range
-    low, high = as_range(asked)
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InvalidArgumentError(
-            f"value_range must be two finite scalars, low < high; got {asked!r}, as the volume's: "
-            "give value_range=(low, high)"
-        )
-    points = importance_points(deferral.importance, (low, high))
+    (low, high), points = kept_range(volume, options, deferral)
     given = {each.name: getattr(options, each.name) for each in fields(options)}
     made = generate(
         request.replace(
@@ -119,7 +101,7 @@ def generate_deferred(
     metadata: dict[str, Any] = dict(made.metadata)
     for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
         metadata.pop(name)
-    if volume.chunks is None or volume.chunks.ranges() is not None:  # else nothing is read for it
+    if volume.chunks is None:  # else all would be read for it
         metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
     lists = VDI(
         made.camera,
@@ -141,6 +123,38 @@ def generate_deferred(
         "importance": points,
     }
     return DeferredVDI.of_lists(lists, about).with_precision(options.precision)
+
+
+def kept_range(
+    volume: Volume, options: GenerationOptions, deferral: Deferral
+) -> tuple[tuple[float, float], Any]:
+    """Return the range of values that is kept, and the points of their importance.
+
+    InvalidArgumentError if the range or the importance cannot be used, UnsupportedError for what
+    cannot be deferred.
+    """
+    if volume.rgba:
+        raise UnsupportedError(
+            "RGBA volumes have colours of their own, so that nothing is left to be classified "
+            "afterwards: leave classification='deferred' out"
+        )
+    if options.ambient_occlusion is not None:
+        raise UnsupportedError(
+            "ambient occlusion follows from opacities, which a deferred VDI does not have: leave "
+            "ambient_occlusion out, or classification='deferred'"
+        )
+    asked = volume.finite_range() if deferral.value_range is None else deferral.value_range
+    low, high = as_range(asked)
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InvalidArgumentError(
+            f"value_range must be two finite scalars, low < high; got {asked!r}"
+            + (
+                ", as the volume's: give value_range=(low, high)"
+                if deferral.value_range is None
+                else ""
+            )
+        )
+    return (low, high), importance_points(deferral.importance, (low, high))
 
 
 def warn_of_range(kept: DeferredVDI, volume: Volume) -> None:

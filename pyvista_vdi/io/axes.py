@@ -1,19 +1,13 @@
-"""Where points lie: maps to the world, and coordinates along axes, for every format alike."""
+"""Where points lie: maps to the world, and units of length, for every format alike."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import UnsupportedError
-
-#: By how much of a step coordinates may differ from equal ones.
-_EVEN = 1e-4
-
-#: Units of length in metres, as OME-Zarr, OME-TIFF and the conventions of NetCDF write them.
+#: Units of length in metres, as OME-Zarr and OME-TIFF write them.
 METRES = {
     "km": 1e3,
     "m": 1.0,
@@ -48,23 +42,6 @@ def to_world(steps: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[n
     place[:3, :3] = np.diag(along) if along.ndim == 1 else along
     place[:3, 3] = origin
     return place
-
-
-def first_and_step(coordinates: Any, what: str) -> tuple[float, float]:
-    """Return the first of an axis' coordinates and the step between them.
-
-    Raises UnsupportedError where they are not equally far apart.
-    """
-    places = np.asarray(coordinates, dtype=np.float64)
-    if len(places) < 2:
-        return float(places[0]) if len(places) else 0.0, 1.0
-    step = (places[-1] - places[0]) / (len(places) - 1)
-    if not np.abs(np.diff(places) - step).max() <= _EVEN * abs(step):
-        raise UnsupportedError(
-            f"{what} at unequal distances ({places[0]:g}, {places[1]:g} ... {places[-1]:g}): "
-            "interpolate it, for instance by xarray's data.interp"
-        )
-    return float(places[0]), float(step)
 
 
 def in_one_unit(lengths: Sequence[float], units: Sequence[str]) -> tuple[list[float], str]:

@@ -9,16 +9,20 @@ from typing import Any, BinaryIO
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
-from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.volumes.table import VOLUME_SUFFIXES
+from pyvista_vdi.io.volumes.formats import FORMATS
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 from pyvista_vdi.registry import FileFormat
+
+#: What reads and writes a VDI in its VTK form, as any image of VTK's.
+_FROM_VTK = "pyvista_vdi.vtk_pipeline.vdi_from_image(pyvista.read(path))"
+_TO_VTK = "pyvista.wrap(pyvista_vdi.vtk_pipeline.vdi_to_image(vdi)).save(path)"
 
 
 def suffixes() -> tuple[str, ...]:
@@ -68,7 +72,7 @@ def write(
     progress: Progress | None = None,
     **options: Any,
 ) -> Path:
-    """Write a VDI to a file: ``.vdi``, an OpenEXR deep image, VTK's image, or a page with a viewer.
+    """Write a VDI to a file: ``.vdi``, an OpenEXR deep image, or a page with a viewer.
 
     The file appears whole or not at all: it is written under a temporary name in the same folder
     and moved into place, and what was there before stays until then.
@@ -78,18 +82,15 @@ def write(
     vdi : VDI or DeferredVDI
         What to write; the second in ``.vdi`` files and pages only.
     path : path-like
-        The target; its name ends in ``.vdi``, ``.exr``, ``.vti`` or ``.html``.
+        The target; its name ends in ``.vdi``, ``.exr`` or ``.html``.
     progress : callable, optional
-        Called with the finished fraction, 0 to 1; when it returns False, nothing is written. VTK
-        does not say how far it is: of ``.vti`` with 1 alone.
+        Called with the finished fraction, 0 to 1; when it returns False, nothing is written.
     **options
         ``compression`` and ``level`` for these; ``precision`` for ``.vdi`` and ``.html``, there
         ``title``, ``background`` and ``controls`` as well, and of a DeferredVDI what its
         transfer function begins with, as :meth:`DeferredVDI.classified` takes it: ``cmap``,
-        ``opacity``, ...; ``exact`` and ``linear`` for ``.exr``.
+        ``opacity``, ... . ``.exr`` has none.
         See :func:`pyvista_vdi.io.vdi_file.writer.write`,
-        :func:`pyvista_vdi.extensions.deep_exr.files.write`,
-        :func:`pyvista_vdi.vtk_pipeline.filters.vti.write` and
         :func:`pyvista_vdi.extensions.web.page.page`.
 
     Returns
@@ -106,7 +107,7 @@ def write(
     Cancelled
         If ``progress`` returned False.
     MissingDependencyError
-        If VTK is not installed and the name ends in ``.vti``.
+        If what such files need is not installed: OpenEXR for ``.exr``.
 
     See Also
     --------
@@ -122,35 +123,28 @@ def write(
     if options.get("level", 0) is None:  # as where it is not given
         del options["level"]
     check_write_options(target, options)
-    written: Path
-    if found.reports_progress:
-        written = found.load().write(vdi, target, progress=progress, **options)
-    else:
-        written = found.load().write(vdi, target, **options)
-        Pieces(progress, 1)()
-    return written
+    return found.load().write(vdi, target, progress=progress, **options)  # type: ignore[no-any-return]
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> Any:
-    """Read a VDI from a ``.vdi`` file, an OpenEXR deep image, VTK's image file or a page.
+    """Read a VDI from a ``.vdi`` file, an OpenEXR deep image or a page.
 
     Or a series or a set of them: whatever the format of that name holds.
 
     Parameters
     ----------
     path : path-like
-        The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.vti`` one of VTK,
-        ``.html`` a page.
+        The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.html`` a page.
     progress : callable, optional
         As for :func:`write`.
     **options
-        ``camera``, ``thickness`` and ``linear`` for ``.exr``: see
-        :func:`pyvista_vdi.extensions.deep_exr.files.read`.
+        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.read`.
 
     Returns
     -------
     VDI or DeferredVDI or VDISeries or VDISet
-        The same to the last bit as was written by :func:`write`.
+        The same to the last bit as was written by :func:`write`; of ``.exr`` within float32's
+        rounding.
 
     Raises
     ------
@@ -162,17 +156,17 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     Cancelled
         If ``progress`` returned False.
     MissingDependencyError
-        If VTK is not installed and the name ends in ``.vti``.
+        If what such files need is not installed: OpenEXR for ``.exr``.
     """
     found = format_of(path) or _own()
-    if format_named(path) is None and str(path).lower().endswith(VOLUME_SUFFIXES):
-        raise VDIFileError(f"{path} is no VDI by its name: pyvista_vdi.read_volume reads volumes")
+    of_volumes = tuple(suffix for each in FORMATS.values() for suffix in each.suffixes)
+    if format_named(path) is None and str(path).lower().endswith(of_volumes):
+        others = "pyvista_vdi.read_volume reads volumes"
+        if str(path).lower().endswith(".vti"):
+            others += f", and {_FROM_VTK} a VDI in its VTK form"
+        raise VDIFileError(f"{path} is no VDI by its name: {others}")
     _check_names("read", path, options, found.read_options)
-    if found.reports_progress:
-        return found.load().read(path, progress=progress, **options)
-    read_whole = found.load().read(path, **options)
-    Pieces(progress, 1)()
-    return read_whole
+    return found.load().read(path, progress=progress, **options)
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
@@ -181,7 +175,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     Parameters
     ----------
     path : path-like
-        A ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file.
+        A ``.vdi``, ``.exr`` or ``.html`` file.
 
     Returns
     -------
@@ -207,16 +201,11 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     Returns
     -------
     bool
-        For ``.vti``, whether a VDI is in it; for unknown names, whether it begins as ours.
-
-    Raises
-    ------
-    MissingDependencyError
-        If VTK is not installed and the name ends in ``.vti``.
+        For unknown names, whether it begins as ours.
     """
     found = format_named(path)
     if found is not None and found.holds == "VDI":
-        return bool(found.load().holds_vdi(path)) if found.shared else True
+        return True
     return os.path.isfile(path) and reader.begins_as_vdi(path)  # noqa: PTH113 - too long a name, too
 
 
@@ -237,12 +226,19 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     ------
     VDIFileError
         If the name ends in something else, or the target cannot be written.
+    MissingDependencyError
+        If what writes such files is not installed.
     """
     try:
         target = Path(path)
     except TypeError as error:
         raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
-    return check_writable(with_suffix(target, suffixes(), "a VDI"))
+    if target.suffix.lower() == ".vti":
+        raise VDIFileError(f"{target}: VTK writes its own files, {_TO_VTK}; name a .vdi file here")
+    named = format_named(with_suffix(target, suffixes(), "a VDI"))
+    if named is not None:
+        named.load()  # what it needs is missed now
+    return check_writable(target)
 
 
 def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:

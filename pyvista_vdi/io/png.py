@@ -13,9 +13,6 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.metrics import over_background
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 
-#: The name that a picture's name ends in.
-PNG_SUFFIX = ".png"
-
 
 def to_bytes(image: ArrayLike, background: Sequence[float] | None = None) -> NDArray[np.uint8]:
     """Return a rendered image in eight bits per channel.
@@ -27,18 +24,15 @@ def to_bytes(image: ArrayLike, background: Sequence[float] | None = None) -> NDA
     """
     pixels = np.asarray(image)
     if background is not None:
-        return _rounded(over_background(pixels, background))
+        return np.rint(over_background(pixels, background).clip(0, 1) * 255).astype(np.uint8)
     if pixels.ndim != 3 or pixels.shape[2] != 4:
         raise InvalidArgumentError(
             f"an image is premultiplied RGBA of shape (height, width, 4); got {pixels.shape}"
         )
     color, alpha = pixels[..., :3].astype(np.float64), pixels[..., 3:].astype(np.float64)
     straight = np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0)
-    return _rounded(np.concatenate([straight, alpha], axis=2))
-
-
-def _rounded(values: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
+    both = np.concatenate([straight, alpha], axis=2)
+    return np.rint(both.clip(0, 1) * 255).astype(np.uint8)
 
 
 def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
@@ -50,7 +44,7 @@ def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
     """
     from PIL import Image
 
-    target = with_suffix(as_path(path), (PNG_SUFFIX,), "a picture")
+    target = with_suffix(as_path(path), (".png",), "a picture")
     with whole_file(target) as stream:
         Image.fromarray(pixels).save(stream, format="png")
     return target
@@ -58,4 +52,4 @@ def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
 
 def checked_png_target(path: str | os.PathLike[str]) -> Path:
     """Raise VDIFileError now if a picture could not be written there later."""
-    return check_writable(with_suffix(as_path(path), (PNG_SUFFIX,), "a picture"))
+    return check_writable(with_suffix(as_path(path), (".png",), "a picture"))

@@ -1,1 +1,1 @@
-"""Measurements that a user can repeat: comparisons, benchmarks and trade-offs against VTK."""
+"""Measurements that a user can repeat: comparisons with VTK and trade-offs."""

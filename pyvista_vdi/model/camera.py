@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
 from pyvista_vdi.model.checks import as_flag, as_float, as_floats
 
@@ -137,8 +138,9 @@ class Camera:
 
         Parameters
         ----------
-        camera : Camera or vtkCamera or pyvista.Camera
+        camera : Camera or vtkCamera or pyvista.Camera or three vectors
             VTK's cameras are read through their ``Get…`` methods; VTK itself is not imported.
+            Position, focal point and view up are what PyVista's ``camera_position`` has.
         model_transform : array_like, shape (4, 4), optional
             Replaces the model transform; by default a ``Camera`` keeps its own and others get the
             identity (``vtkCamera``'s own model transform is used where it has been set).
@@ -160,10 +162,15 @@ class Camera:
             given = model_transform is not None
             return camera.replace(model_transform=model_transform) if given else camera
         if not hasattr(camera, "GetDirectionOfProjection"):
-            raise InvalidCameraError(
-                f"expected a pyvista_vdi.Camera, a vtkCamera or a pyvista.Camera; "
-                f"got {type(camera).__name__}"
-            )
+            try:
+                vectors: Any = () if isinstance(camera, str) else camera
+                position, focal_point, view_up = vectors
+            except (TypeError, ValueError):
+                raise InvalidCameraError(
+                    "expected a pyvista_vdi.Camera, a vtkCamera, a pyvista.Camera or (position, "
+                    f"focal_point, view_up); got {type(camera).__name__}"
+                ) from None
+            return cls(position, focal_point, view_up, model_transform=model_transform)
         reasons = []
         if tuple(camera.GetViewShear()) != (0.0, 0.0, 1.0):
             reasons.append("a view shear (SetViewShear)")
@@ -214,6 +221,33 @@ class Camera:
             state[name] = list(state[name])
         state["model_transform"] = self.model_transform.tolist()
         return state
+
+    def to_pyvista(self) -> Any:
+        """Return the view of the model frame as a PyVista camera: ``plotter.camera = ...``.
+
+        An actor whose matrix is the identity is seen as the model transform placed it: where this
+        is rigid by an eye that has moved instead, else by the camera's own model transform. Needs
+        PyVista.
+
+        Returns
+        -------
+        pyvista.Camera
+            The same picture.
+
+        Raises
+        ------
+        MissingDependencyError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import pyvista as pv
+        >>> import pyvista_vdi as pvdi
+        >>> plotter = pv.Plotter(off_screen=True)
+        >>> plotter.camera = pvdi.Camera((0, -4, 1), (0, 0, 0), (0, 0, 1)).to_pyvista()
+        >>> plotter.close()
+        """
+        return registry.method("Camera.to_pyvista")(self)
 
     def replace(self, **changes: Any) -> Camera:
         """Return a copy with some arguments of the constructor changed."""
@@ -429,7 +463,7 @@ class Camera:
         if _length(_cross(_unit(forward), _unit(np.asarray(self.view_up)))) < 1e-12:
             raise InvalidCameraError(
                 f"view_up {self.view_up} is parallel to the direction of projection "
-                f"{tuple(_unit(forward))}: choose another up direction"
+                f"{tuple(_unit(forward).tolist())}: choose another up direction"
             )
         # By a power of two, which rounds nothing: squares may overflow
         forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])

@@ -3,25 +3,26 @@
 Whoever gives such an array has its library. Nothing is read until a part is asked for.
 """
 
+import functools
 import importlib
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, VDIError
-from pyvista_vdi.model.chunk_ranges import keeper_of
-from pyvista_vdi.model.store_identity import by_absolute_path, identity_of
+from pyvista_vdi.model.store_identity import (
+    Digests,
+    by_absolute_path,
+    digests_of,
+    local_files,
+    state_of,
+)
 
-#: The least and the largest scalar of each chunk, NaN left out; NaN where there is nothing else.
-Ranges = tuple[NDArray[np.float64], NDArray[np.float64]]
-#: Keeps ranges beside a store, and gives them back: ``load() -> Ranges | None``, ``save(ranges)``;
-#: and raises where the array must be opened again: ``check_unchanged()``.
-Keeper = Any
 #: Chunks of arrays that have none.
 _CHUNK_POINTS = 64
 
@@ -81,8 +82,12 @@ class ChunkedArray:
             self.lazy = self._array = self.lazy.map_blocks(
                 _held, checked, self.dtype, dtype=self.dtype
             )
-        self._keeper: Keeper = keeper_of(self._array, index)
-        self._ranges: Ranges | None = None
+        self._watch()
+
+    def _watch(self) -> None:
+        """Remember the files of the array as they are now: they must stay so."""
+        self._files = local_files(self._array)
+        self._before = None if self._files is None else state_of(self._array, self._files)
 
     def _chunks(self, kept: Sequence[int]) -> tuple[int, int, int]:
         chunks: Any = getattr(self._array, "chunks", None) or (_CHUNK_POINTS,) * len(self._index)
@@ -126,8 +131,7 @@ class ChunkedArray:
                 f"{self.source} is read by three slices of step 1 (z, y, x); got {box!r}: "
                 "load the volume (volume.load()) for anything else"
             )
-        if self._keeper is not None:
-            self._keeper.check_unchanged()
+        self._require_unchanged()
         parts = iter(box)
         at = tuple(next(parts) if isinstance(k, slice) else k for k in self._index)
         try:
@@ -166,49 +170,39 @@ class ChunkedArray:
             "block by block; volume.load() reads it whole"
         )
 
-    def ranges(self) -> Ranges | None:
-        """Return the least and the largest scalar of each chunk, or None while nobody knows."""
-        return self._ranges if self._keeper is None else self._keeper.load()  # type: ignore[no-any-return]
+    def digests(self) -> Digests:
+        """Return what tells the array's files from others, empty where it is in none here."""
+        return digests_of(self._array)
 
-    def keep_ranges(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
-        """Keep what was found while the array was read."""
-        if self._keeper is None:
-            self._ranges = (low, high)
-        else:
-            self._keeper.save((low, high))
-
-    def identity(self) -> Any:
-        """Return what tells the array's files from others, ``None`` where it is in none here."""
-        found = identity_of(self._array, self._index)
-        return None if found is None else found.absolute()
-
-    def found_ranges(self) -> Ranges:
-        """Return the ranges, from the chunks themselves where nobody knows them yet."""
-        ranges = self.ranges()
-        if ranges is None:
-            counts = [-(-n // chunk) for n, chunk in zip(self.shape, self.chunks, strict=True)]
-            low, high = np.full(counts, np.nan), np.full(counts, np.nan)
-            for at, box in self._boxes(counts):
-                part = self[box]
-                low[at], high[at] = np.fmin.reduce(part, axis=None), np.fmax.reduce(part, axis=None)
-            self.keep_ranges(low, high)
-            ranges = low, high
-        return ranges
-
-    def _boxes(self, counts: Sequence[int]) -> Iterator[tuple[tuple[int, ...], tuple[slice, ...]]]:
+    @functools.cached_property
+    def ends(self) -> tuple[float, float]:
+        """The least and the largest scalar, NaN left out; all chunks are read for it, once."""
+        counts = [-(-n // chunk) for n, chunk in zip(self.shape, self.chunks, strict=True)]
+        low, high = [np.nan], [np.nan]
         for at in itertools.product(*map(range, counts)):
-            yield (
-                at,
-                tuple(slice(k * n, (k + 1) * n) for k, n in zip(at, self.chunks, strict=True)),
-            )
+            pairs = zip(at, self.chunks, strict=True)
+            part = self[tuple(slice(k * n, (k + 1) * n) for k, n in pairs)]
+            low.append(np.fmin.reduce(part, axis=None))
+            high.append(np.fmax.reduce(part, axis=None))
+        return float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
+
+    def _require_unchanged(self) -> None:
+        if self._files is None or state_of(self._array, self._files) == self._before:
+            return
+        if getattr(self._array, "id", None):
+            # While it is open, HDF5 gives whoever opens it again what it has in memory of it
+            self._array.file.close()
+        raise InvalidVolumeError(
+            f"{self._files} was closed, removed or written anew since it was opened: open it again"
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave an open HDF5 file behind: it is opened where this is unpickled."""
-        return {**self.__dict__, "_array": closed(self._array), "_keeper": None}
+        return {**self.__dict__, "_array": closed(self._array)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _array=opened(state["_array"]))
-        self._keeper = keeper_of(self._array, self._index)
+        self._watch()
 
     def __repr__(self) -> str:
         return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"

@@ -267,6 +267,11 @@ def refuse_unknown(given: Mapping[str, Any], function: str, known: tuple[str, ..
         hint = f"did you mean {suggestion!r}?" if suggestion else f"known are {', '.join(known)}"
         if name in ("classification", "value_range", "importance"):
             hint = "values in place of colours are kept by generate, generate_series and InSitu"
+        elif (meant or name) not in known and (meant or name) in (*Look.declared, *IN_PLACE):
+            hint = (
+                "this VDI's colours are fixed: give it to generate, or generate with "
+                "classification='deferred', which keeps values"
+            )
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
 
 

@@ -35,6 +35,12 @@ class VDICollection(Sequence[VDI]):
     def nearest(self, at: Any) -> int:
         """Return the index of the VDI that is nearest to a time, or to a view."""
 
+    def _place(self, index: int, what: str) -> int:
+        """Return an index counted from the first; IndexError if there is no such VDI."""
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"[{index}] is out of range: there are {len(self)} {what}")
+        return range(len(self))[index]
+
     @property
     def value_range(self) -> tuple[float, float] | None:
         """Least and largest value that its VDIs keep; ``None`` where they have colours."""

@@ -14,10 +14,10 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
-    UnsupportedError,
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_floats, as_number, as_range
+from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 
 if TYPE_CHECKING:
@@ -280,15 +280,11 @@ class DeferredVDI:
         """Return it with supersegments of fewer bytes: ``"exact"``, ``"8-byte"``.
 
         In 8 bytes depths have 14 bits of the list's extent, the mean 3825 steps over the range of
-        values, the spread 4 significant bits and the share 8 bits. There are no 16-byte ones:
-        UnsupportedError.
+        values, the spread 4 significant bits and the share 8 bits.
         """
         if precision == self.precision:
             return self
-        if precision == "16-byte":
-            raise UnsupportedError(
-                "a DeferredVDI has no 16-byte supersegments: choose 'exact' or '8-byte'"
-            )
+        check_precision(precision)
         lists = self._lists
         mean = self.mean.astype(np.float64)
         low, spread = np.zeros_like(mean), lists.optical_depth

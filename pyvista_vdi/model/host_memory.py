@@ -55,44 +55,36 @@ def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
 
 
 class GrowingArray:
-    """An array whose number of elements is known when the last one is written.
+    """A float32 array whose number of elements is known when the last one is written.
 
     Systems take memory as it is written, so room for the most that there may be costs nothing. Only
     where that is refused do its elements, of the shape ``item``, move when it grows. ``room``:
     elements that there is room for.
     """
 
-    def __init__(self, item: tuple[int, ...] = (), dtype: DTypeLike = np.float32) -> None:
-        self._item = item
-        self._dtype = np.dtype(dtype)
-        self._bytes = math.prod(item) * self._dtype.itemsize
-        self._raw = np.empty(0, np.uint8)
-        self._start = 0  # where it is aligned as that of aligned_empty
-        self.room = 0
+    def __init__(self, item: tuple[int, ...] = ()) -> None:
+        self._item, self._bytes = item, 4 * math.prod(item)
+        self._raw, self._start, self.room = np.empty(0, np.uint8), 0, 0  # from where it is aligned
 
     def reserve(self, n: int, most: int) -> None:
         """Make room for at least n elements (MemoryError), for the most if it can be had."""
-        if n <= self.room:
-            return
-        for room in (most, 2 * n):
+        for room in (most, 2 * n, n):
+            if n <= self.room:
+                return
             try:
-                self._move(room)
+                raw = np.empty(room * self._bytes + HOST_ALIGNMENT, np.uint8)
             except MemoryError:
+                if room == n:
+                    raise
                 continue
-            return
-        self._move(n)
-
-    def _move(self, room: int) -> None:
-        raw = np.empty(room * self._bytes + HOST_ALIGNMENT, np.uint8)
-        start = -raw.ctypes.data % HOST_ALIGNMENT
-        kept = self.room * self._bytes
-        raw[start : start + kept] = self._raw[self._start : self._start + kept]
-        self._raw, self._start, self.room = raw, start, room
+            start, kept = -raw.ctypes.data % HOST_ALIGNMENT, self.room * self._bytes
+            raw[start : start + kept] = self._raw[self._start : self._start + kept]
+            self._raw, self._start, self.room = raw, start, room
 
     def part(self, first: int, last: int) -> NDArray[Any]:
         """Return elements to write, a view that is valid until the next call of another method."""
         begin, end = (self._start + n * self._bytes for n in (first, last))
-        return self._raw[begin:end].view(self._dtype).reshape(last - first, *self._item)
+        return self._raw[begin:end].view(np.float32).reshape(last - first, *self._item)
 
     def finished(self, n: int) -> NDArray[Any]:
         """Return the first n elements; the room for others is given back."""

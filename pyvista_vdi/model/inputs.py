@@ -44,9 +44,6 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
             f"got a NumPy array of shape {volume.shape}, which has no spacing: "
             "wrap it as pyvista_vdi.Volume(array, spacing), indexed [z, y, x]"
         )
-    from_data = registry.made_of("volumes", volume)
-    if from_data is not None:
-        return from_data(volume, scalars, preference)  # type: ignore[no-any-return]
     raise InvalidVolumeTypeError(
         "expected a pyvista.ImageData, a vtkImageData, a pyvista_vdi.Volume or a file's path; "
         f"got {_described(volume)}"

@@ -215,6 +215,11 @@ class Lights:
         """Whether any light has a position."""
         return any(light.positional for light in self.lights)
 
+    @property
+    def of_scene(self) -> bool:
+        """Whether any light stands in the world, and does not follow the camera."""
+        return any(light.kind == "scene" for light in self.lights)
+
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON."""
         lights = [

@@ -253,7 +253,7 @@ class GenerationOptions(MediumOptions):
         Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
         see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
         by least error or within ``tolerance``. ``"homogeneity"`` cuts without regard to it.
-    precision : {"exact", "16-byte", "8-byte"}
+    precision : {"exact", "8-byte"}
         What a supersegment takes; see :meth:`VDI.with_precision`.
     sample_distance, lights, ambient_occlusion, memory_limit
         As for :class:`MediumOptions`. The light is baked into the colours: it stays as it is where

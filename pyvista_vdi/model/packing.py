@@ -1,6 +1,6 @@
-"""Packed supersegments: 16 and 8 bytes each in place of 24, in integers alone.
+"""Packed supersegments: 8 bytes each in place of 24, in integers alone.
 
-``docs/conventions.md`` ("Packed supersegments") has the bits and what each form loses.
+``docs/conventions.md`` ("Packed supersegments") has the bits and what they lose.
 """
 
 import math
@@ -17,7 +17,7 @@ from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.host_memory import aligned_empty
 
 #: What a supersegment takes: 24 bytes as it was made, or less.
-PRECISIONS = ("exact", "16-byte", "8-byte")
+PRECISIONS = ("exact", "8-byte")
 
 #: Largest code of a depth in a list, 14 bits: those of ``opencl/raycasting/supersegments.cl``, as
 #: are the colours' steps and the optical depths' base.
@@ -38,9 +38,8 @@ TAU_CODES = (1 << 12) - 1
 TAU_BASE = (127 - 18) << 7
 _LEAST_TAU = np.float32(2.0**-19)
 
-#: Steps of red, green and blue, and where their bits begin.
-_COLOR_16 = ((2047, 0), (2047, 11), (1023, 22))
-_COLOR_8 = ((255, 8), (255, 16), (255, 24))
+#: Steps of red, green and blue, and where the bits of each begin.
+_COLOR_STEPS, _COLOR_BITS = 255, (8, 16, 24)
 
 
 class Lists(Protocol):
@@ -60,26 +59,6 @@ class Lists(Protocol):
     @property
     def n_supersegments(self) -> int:
         """Number of supersegments in all lists."""
-
-
-@dataclass(frozen=True)
-class Packed16:
-    """The 16-byte form: depths and optical depths as they are, colours in 32 bits.
-
-    ``color``: uint32 (n,): red in bits 0 to 10, green in 11 to 21, blue in 22 to 31.
-    """
-
-    color: NDArray[np.uint32]
-    precision = "16-byte"
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes beside the VDI's own arrays."""
-        return self.color.nbytes
-
-    def media(self, counts: NDArray[np.int64]) -> dict[str, NDArray[np.float32]]:
-        """Return what takes the place of the VDI's arrays: the colours."""
-        return {"color": unpacked_color(self.color, _COLOR_16)}
 
 
 @dataclass(frozen=True)
@@ -141,7 +120,7 @@ class Packed8:
         low, high = self.words[rows, 0], self.words[rows, 1]
         media = {}
         if "color" in names:
-            media["color"] = unpacked_color(high, _COLOR_8)
+            media["color"] = unpacked_color(high)
         for name, first_bit in (("front", 0), ("back", 14)):
             if name in names:
                 codes = (low >> np.uint32(first_bit) & np.uint32(DEPTH_CODES)).view(np.int32)
@@ -154,26 +133,21 @@ class Packed8:
         return media
 
 
-Packing = Packed16 | Packed8
-
-
 def check_precision(precision: object) -> str:
     """Return one of :data:`PRECISIONS`, or raise InvalidArgumentError."""
     return one_of(precision, "precision", PRECISIONS)
 
 
-def packing_of(vdi: Lists, precision: str) -> Packing:
-    """Return a VDI's supersegments in a packed form.
+def packing_of(vdi: Lists) -> Packed8:
+    """Return a VDI's supersegments in 8 bytes each.
 
-    Raises InvalidArgumentError if a list is too long for the 8-byte form.
+    Raises InvalidArgumentError if a list is too long for that.
     """
-    if precision == "16-byte":
-        return Packed16(packed_color(vdi.color, _COLOR_16))
     counts = vdi.counts.reshape(-1)
     if counts.max() > DEPTH_CODES:
         raise InvalidArgumentError(
             f"a list of {counts.max()} supersegments cannot be packed into 8 bytes each: at most "
-            f"{DEPTH_CODES} have depths of their own; use the precision '16-byte'"
+            f"{DEPTH_CODES} have depths of their own; use the precision 'exact'"
         )
     origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
     words = np.empty((vdi.n_supersegments, 2), np.uint32)
@@ -187,7 +161,7 @@ def packing_of(vdi: Lists, precision: str) -> Packing:
         step = 2.0 ** max(exponent, _LEAST_STEP_EXPONENT)
     for lists, part in _pieces(counts):
         origins[lists], strides[lists], front, back = _depths(vdi, step, counts[lists], part)
-        tau, color = _tau_codes(vdi.optical_depth[part]), packed_color(vdi.color[part], _COLOR_8)
+        tau, color = _tau_codes(vdi.optical_depth[part]), packed_color(vdi.color[part])
         words[part] = _words(front, back, tau, color)
     return Packed8(step, origins, strides, words)
 
@@ -216,26 +190,22 @@ def _words(
     return words
 
 
-def packed_color(
-    color: NDArray[np.float32], channels: tuple[tuple[int, int], ...]
-) -> NDArray[np.uint32]:
+def packed_color(color: NDArray[np.float32]) -> NDArray[np.uint32]:
     """Return straight RGB, float32 (n, 3), in whole steps; uint32 (n,)."""
     packed = aligned_empty(len(color), np.uint32)
     packed[...] = 0
-    for channel, (steps, first_bit) in enumerate(channels):
-        code = np.rint(color[:, channel] * np.float32(steps)).astype(np.uint32)
+    for channel, first_bit in enumerate(_COLOR_BITS):
+        code = np.rint(color[:, channel] * np.float32(_COLOR_STEPS)).astype(np.uint32)
         packed |= code << np.uint32(first_bit)
     return packed
 
 
-def unpacked_color(
-    packed: NDArray[np.uint32], channels: tuple[tuple[int, int], ...]
-) -> NDArray[np.float32]:
+def unpacked_color(packed: NDArray[np.uint32]) -> NDArray[np.float32]:
     """Return straight RGB, float32 (n, 3); one multiplication, which every device rounds alike."""
     color = aligned_empty((len(packed), 3), np.float32)
-    for channel, (steps, first_bit) in enumerate(channels):
-        code = packed >> np.uint32(first_bit) & np.uint32(steps)
-        color[:, channel] = code.astype(np.float32) * (np.float32(1) / np.float32(steps))
+    for channel, first_bit in enumerate(_COLOR_BITS):
+        code = packed >> np.uint32(first_bit) & np.uint32(_COLOR_STEPS)
+        color[:, channel] = code.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
     return color
 
 

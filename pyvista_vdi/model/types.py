@@ -56,7 +56,7 @@ Progress: TypeAlias = Callable[[float], object]
 
 #: A path is a file that ``read_volume`` reads.
 VolumeLike: TypeAlias = Union["Volume", VTKObject, str, "os.PathLike[str]"]
-CameraLike: TypeAlias = Union["Camera", VTKObject]
+CameraLike: TypeAlias = Union["Camera", VTKObject, Sequence[ArrayLike]]
 VDILike: TypeAlias = Union["VDI", VTKObject]
 LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]
 CroppingLike: TypeAlias = Union["Cropping", VTKObject, Sequence[float], Sequence[object]]
@@ -79,7 +79,7 @@ RangeLike: TypeAlias = ArrayLike
 MatrixLike: TypeAlias = ArrayLike | VTKObject
 
 Criterion: TypeAlias = Literal["least-error", "homogeneity"]
-Precision: TypeAlias = Literal["exact", "16-byte", "8-byte"]
+Precision: TypeAlias = Literal["exact", "8-byte"]
 Quality: TypeAlias = Literal["reference", "high", "balanced", "fast"]
 Preference: TypeAlias = Literal["point", "cell"]
 Interpolation: TypeAlias = Literal["nearest", "linear"]

@@ -1,17 +1,16 @@
 """The folder in which this package keeps what it would otherwise make anew in each process."""
 
+import contextlib
 import logging
 import os
 import stat
 import tempfile
-import threading
 from functools import cache
 from pathlib import Path
 
 import platformdirs
 
 _logger = logging.getLogger(__name__)
-_lock = threading.Lock()
 
 
 def user_cache() -> Path | None:
@@ -23,10 +22,7 @@ def user_cache() -> Path | None:
     try:
         return writable_cache("pyvista-vdi")
     except OSError as error:
-        found = _temporary()
-        with _lock:  # so that it is said once
-            _say(str(error), found)
-        return found
+        return _instead(str(error))
 
 
 def writable_cache(name: str, author: str | None = None) -> Path:
@@ -47,25 +43,19 @@ def writable_cache(name: str, author: str | None = None) -> Path:
 
 
 @cache
-def _say(why: str, found: Path | None) -> None:
+def _instead(why: str) -> Path | None:
+    """Return this user's folder among temporary files, unless somebody else can write there."""
+    found = None
+    with contextlib.suppress(OSError, AttributeError):  # other systems have no os.getuid
+        folder = Path(tempfile.gettempdir()) / f"pyvista-vdi-{os.getuid()}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+        state = folder.lstat()
+        own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid()
+        found = folder if own and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
     _logger.warning(
         "the user's cache folder cannot be written (%s): compiled kernels are kept %s; set "
         "XDG_CACHE_HOME to a folder that can be",
         why,
         f"in {found}" if found else "nowhere, and made anew in each process",
     )
-
-
-def _temporary() -> Path | None:
-    """Return this user's folder among temporary files, unless somebody else can write there."""
-    if not hasattr(os, "getuid"):
-        return None
-    try:
-        folder = Path(tempfile.gettempdir()) / f"pyvista-vdi-{os.getuid()}"
-        folder.mkdir(mode=0o700, exist_ok=True)
-        state = folder.lstat()
-    except OSError:
-        return None
-    others = state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not others
-    return folder if own and os.access(folder, os.W_OK | os.X_OK) else None
+    return found

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
-from pyvista_vdi.model.packing import Packing, check_precision, packing_of
+from pyvista_vdi.model.packing import Packed8, check_precision, packing_of
 
 if TYPE_CHECKING:
     import os
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: The arrays of supersegments.
 _MEDIA = ("front", "back", "color", "optical_depth")
+#: What of a camera differs between a view on the screen and one that covers all of a volume.
+_LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
 
 
 class ClassifiedValues(Protocol):
@@ -83,7 +85,7 @@ class VDI:
     depth_origin: float
     metadata: dict[str, Any]
     #: The packed form of the arrays, not public; ``None`` where they are exact.
-    packing: Packing | None
+    packing: Packed8 | None
     #: What a classified deferred VDI is made of, not public: its arrays are made when asked for.
     values: ClassifiedValues | None = None
 
@@ -197,7 +199,8 @@ class VDI:
     def picture_size(self) -> tuple[int, int]:
         """Width and height of the pictures that it was made for, pixels.
 
-        The window that was asked for where a dial has chosen the lists, else :attr:`window_size`.
+        The plotter's or the window's that was asked for, where lists cover more or a dial has
+        chosen them; else :attr:`window_size`.
         """
         return picture_size(self.window_size, self.metadata)
 
@@ -231,14 +234,15 @@ class VDI:
     def with_precision(self, precision: str) -> VDI:
         """Return the VDI with supersegments of fewer bytes, on devices and in ``.vdi`` files.
 
-        Its arrays, float32 as ever, hold what the packed form gives back, so that whatever reads
-        them sees what is drawn. docs/conventions.md ("Packed supersegments") has the bounds.
+        With 8 bytes each list that is not empty takes 16 more, so that lists of one supersegment
+        save nothing; in this process's memory the packed form lies beside the arrays. These hold
+        what it gives back, so that whatever reads them sees what is drawn. docs/conventions.md
+        ("Packed supersegments") has the bounds.
 
         Parameters
         ----------
-        precision : {"exact", "16-byte", "8-byte"}
+        precision : {"exact", "8-byte"}
             ``"exact"``: 24 bytes, whatever float32 holds; from a packed VDI, its values.
-            ``"16-byte"``: colours in steps of 1/2047, blue of 1/1023; all else exact.
             ``"8-byte"``: depths in 14 bits of the list's extent, optical depth with 8 significant
             bits, colours in steps of 1/255.
 
@@ -256,10 +260,10 @@ class VDI:
             return self
         if precision == "exact":
             return self._with_media(None, {})
-        packing = packing_of(self, precision)
+        packing = packing_of(self)
         return self._with_media(packing, packing.media(self.counts.reshape(-1)))
 
-    def _with_media(self, packing: Packing | None, media: Mapping[str, Any]) -> VDI:
+    def _with_media(self, packing: Packed8 | None, media: Mapping[str, Any]) -> VDI:
         arrays: dict[str, Any] = {name: media.get(name, getattr(self, name)) for name in _MEDIA}
         about = {"depth_origin": self.depth_origin, "metadata": self.metadata}
         arrays |= {"offsets": self.offsets, "bounds": self.bounds, **about}
@@ -268,7 +272,7 @@ class VDI:
         return vdi
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi``, ``.exr``, ``.vti`` or ``.html`` file that `pyvista_vdi.read` opens.
+        """Write a ``.vdi``, ``.exr`` or ``.html`` file that `pyvista_vdi.read` opens.
 
         The options are those of :func:`pyvista_vdi.io.write`.
         """
@@ -390,7 +394,28 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
 
 def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> tuple[int, int]:
     """Return :attr:`VDI.picture_size` of a VDI of these lists and metadata."""
+    for what in ("screen", "dial"):
+        try:
+            return check_window_size(metadata[what]["window_size"])
+        except (TypeError, KeyError, InvalidArgumentError):  # none, or what somebody has put
+            continue
+    return window_size
+
+
+def screen_metadata(camera: Camera, window_size: tuple[int, int]) -> dict[str, Any]:
+    """Return what metadata say of the view on the screen whose volume a wider window covers."""
+    lens = {name: getattr(camera, name) for name in _LENS}
+    return {"window_size": list(window_size), **lens, "window_center": list(camera.window_center)}
+
+
+def picture_view(vdi: Any) -> tuple[Camera, tuple[int, int]]:
+    """Return the view that a VDI, or one of several, was made for, and the size of its picture.
+
+    That on the screen, where the lists cover all of a volume.
+    """
+    screen: Any = getattr(vdi, "metadata", {}).get("screen")
+    camera, size = vdi.camera, getattr(vdi, "picture_size", vdi.window_size)
     try:
-        return check_window_size(metadata["dial"]["window_size"])
-    except (TypeError, KeyError, InvalidArgumentError):  # no dial's, or what somebody has put
-        return window_size
+        return camera.replace(**{name: screen[name] for name in _LENS}), size
+    except (TypeError, KeyError, VDIError):  # none, or what somebody has put
+        return camera, size

@@ -264,11 +264,7 @@ class Volume(Geometry):
         InvalidVolumeError
             If every value is NaN.
         """
-        if self.chunks is None:
-            low, high = self._range_in_memory
-        else:
-            lows, highs = self.chunks.found_ranges()
-            low, high = float(np.fmin.reduce(lows, None)), float(np.fmax.reduce(highs, None))
+        low, high = self._range
         if np.isnan(low):
             raise InvalidVolumeError(
                 f"every value of {self.name!r} is NaN: there is nothing to render; choose another "
@@ -277,7 +273,9 @@ class Volume(Geometry):
         return low, high
 
     @functools.cached_property
-    def _range_in_memory(self) -> tuple[float, float]:
+    def _range(self) -> tuple[float, float]:
+        if self.chunks is not None:
+            return self.chunks.ends
         if self.array.dtype.kind != "f":
             return float(self.scalars.min()), float(self.scalars.max())
         low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)

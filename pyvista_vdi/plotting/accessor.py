@@ -12,7 +12,6 @@ import pyvista as pv
 from pyvista_vdi.api import generate
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image
-from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 
 @pv.register_dataset_accessor("vdi", pv.DataSet, override=True)  # of registration._Pending
@@ -121,10 +120,6 @@ class VDIAccessor:
                 plotter.show_bounds()
             if cpos is not None:
                 plotter.camera_position = cpos
-            elif isinstance(shown, VDI):
-                aim(plotter.camera, shown.camera)
-                plotter.camera_set = True
-                plotter.renderer.reset_camera_clipping_range()
             if parallel_projection:
                 plotter.enable_parallel_projection()
             if eye_dome_lighting:

@@ -10,9 +10,10 @@ from pyvista.plotting.volume import Volume
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
-from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods, keep, let_go
+from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData, weakly
+from pyvista_vdi.vtk_pipeline.filters.view import framed
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkCamera, vtkImageData, weakly
 
 # PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
 require_this_build(Volume)
@@ -104,20 +105,6 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             return f"PlotterVDIActor(a volume, of which actor.vdi makes a VDI{hidden})"
         return f"PlotterVDIActor({vdi!r}{hidden})"
 
-    def SetMapper(self, mapper: Any) -> None:  # noqa: N802
-        """Set the mapper, and hold it: PyVista's lose their lookup table with the last reference.
-
-        Parameters
-        ----------
-        mapper : PlotterVDIMapper or None
-            Of this actor alone.
-        """
-        before = self.GetMapper()
-        super().SetMapper(mapper)
-        let_go(thing=before, owner=self)  # a copy's may be another's, still
-        if mapper is not None:
-            keep(mapper, self)
-
     def SetProperty(self, prop: Any) -> None:  # noqa: N802
         """Set the volume property, of which the VDI is made anew.
 
@@ -146,6 +133,10 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             if mine is not shown:
                 mapper.SetInputData(mine)
         super().SetProperty(prop)
+
+    def camera_to_come(self, renderer: Any) -> Any:
+        """Return the camera of a renderer's next picture."""
+        return first_camera(renderer, renderer.ComputeVisiblePropBounds())
 
     def add_time_slider(self, plotter: Any, **options: Any) -> Any:
         """Show a slider that sets :attr:`time`, and in each frame shows that of the step drawn.
@@ -220,3 +211,27 @@ def _copied(table: pv.LookupTable) -> pv.LookupTable:
     copied.DeepCopy(table)
     vars(copied).update(vars(table))  # the name of its colour map, and the like
     return copied
+
+
+def first_camera(renderer: Any, bounds: Any) -> Any:
+    """Return the camera that a renderer of these bounds has in its next picture.
+
+    A plotter resets those that nobody has set before the first one; the renderer's stays as it is.
+    """
+    camera = renderer.GetActiveCamera()
+    if not isinstance(renderer, pv.Renderer) or camera.is_set:
+        return camera
+    plotter = renderer.parent
+    if not plotter._first_time:
+        return camera
+    # Of several that share a camera, the first resets it
+    first = next(each for each in plotter.renderers if each.GetActiveCamera() is camera)
+    if first is not renderer:
+        renderer, bounds = first, first.ComputeVisiblePropBounds()
+    copied = vtkCamera()
+    copied.DeepCopy(camera)
+    position, focal_point, up = renderer.get_default_cam_pos()
+    copied.SetPosition(position)
+    copied.SetFocalPoint(focal_point)
+    copied.SetViewUp(up)
+    return framed(copied, renderer, bounds)

@@ -13,15 +13,13 @@ import pyvista as pv
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
-from pyvista_vdi.generation.deferred import generate_deferred, unclassified, warn_of_range
+from pyvista_vdi.generation.deferred import kept_range
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
-    GenerationRequest,
     Options,
     QualityTarget,
     option,
@@ -29,21 +27,21 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.render_options import DrawingOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.prepared import framing_camera, prepared, require_grid
+from pyvista_vdi.plotting.prepared import prepared
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import Refinement
-from pyvista_vdi.plotting.volumes import as_image, held
+from pyvista_vdi.plotting.uniform import UniformGrid
+from pyvista_vdi.plotting.volumes import as_image, held, require_grid
 from pyvista_vdi.quality.dial import refuse_settings
 from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.filters.view import as_array
-from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
+from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
 
 #: What ``add_actor`` understands as culling, besides nothing.
 _CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
@@ -152,22 +150,23 @@ def added(
 ) -> PlotterVDIActor:
     """Add a volume, or what is made of one already, to a plotter, and return its actor."""
     get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
-    volume, stored = prepared(
-        *(plotter, volume, asked.array.scalars, asked.resample, asked.mask, asked.progress_bar)
-    )
+    volume, stored = prepared(plotter, volume, asked)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
         first = vdi_from_image(first)
     if asked.deferral.given and (several is not None or isinstance(first, VDI | DeferredVDI)):
         _refuse_deferral(first, asked.deferral)
-    elif asked.deferral.given:
-        first, asked = _deferred(first, asked, plotter)
     if isinstance(first, DeferredVDI):
-        shown = _deferred_shown(first, asked)
+        asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
+        title = str(first.metadata.get("scalars") or "Data")
+        shown = _values_shown(first, asked, first.value_range, first.unit_distance, title)
+    elif isinstance(first, VDI):
+        shown = _vdi_shown(first, asked)
+    elif asked.deferral.given:
+        shown = _deferred(first, asked)
     else:
-        made = isinstance(first, VDI)
-        shown = _vdi_shown(first, asked) if made else _volume_shown(first, asked, plotter, stored)
+        shown = _volume_shown(first, asked, plotter, stored)
     actor = PlotterVDIActor()
     if shown.prop is not None:
         actor.prop = shown.prop
@@ -177,23 +176,37 @@ def added(
         mapper.SetInputData(thing)
         if shown.prop is not None:  # which classifies what keeps values
             mapper.driver.input.prop = shown.prop
+        if isinstance(first, DeferredVDI):
             mapper.driver.input.vdi()  # refuse now what cannot be classified, and warn once
     else:
         mapper.SetInputConnection(thing.GetOutputPort())
+        mapper.driver.input.of_scene = True
     actor.mapper = mapper
     place = asked.place
     actor.user_matrix = np.eye(4) if place.user_matrix is None else place.user_matrix
     remember(actor)
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
+    render = not plotter._first_time if place.render is None else place.render
+    camera = plotter.renderer.camera  # plotter.camera would set it
+    touched = camera.is_set or camera.parallel_projection
+    own = _own(first, several)
+    opens = own is not None and place.reset_camera is not False and not touched
     with _all_or_nothing(plotter, actor):
         plotter.add_actor(
             actor,
-            reset_camera=place.reset_camera,
+            reset_camera=False if opens else place.reset_camera,
             name=place.name,
             culling=place.culling,
             pickable=place.pickable,
-            render=not plotter._first_time if place.render is None else place.render,
+            render=render and not opens,
         )
+        if opens:  # from its own view: others may show little of it
+            aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
+            if place.reset_camera:
+                plotter.reset_camera(render=False)
+            plotter.renderer.reset_camera_clipping_range()
+            if render:
+                plotter.render()
         themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
         if themed if shown.bar is None else shown.bar:
             plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
@@ -215,7 +228,7 @@ def added_blocks(
     """
     blocks = pv.wrap(blocks)
     for block in blocks.recursive_iterator(skip_none=True):
-        require_grid(block, asked.resample)
+        require_grid(block, uniform=asked.resample is None)
     actors: list[Any] = []
     maps = cycle(_MAPS)
     with _all_or_nothing(plotter, actors):
@@ -230,6 +243,15 @@ def added_blocks(
             add = added_blocks if isinstance(block, pv.MultiBlock) else added
             actors.append(add(plotter, block, own, remember))
     return actors
+
+
+def _own(first: Any, several: VDICollection | None) -> Any:
+    """Return what has a view to open from; ``None`` for volumes, and sets that tell of none."""
+    if several is not None and several.times is None:
+        return several if "camera" in getattr(several, "about", {}) else None
+    if several is not None:
+        return several
+    return first if isinstance(first, VDI | DeferredVDI) else None
 
 
 def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
@@ -266,10 +288,9 @@ def _refuse_deferral(vdi: VDI | DeferredVDI, deferral: Deferral) -> None:
     )
 
 
-def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, Addition]:
-    """Generate a deferred VDI for the plotter's view, and say what is left to be honoured."""
-    array = asked.array
-    array.require_composite()
+def _deferred(volume: Any, asked: Addition) -> _Shown:
+    """Return the values of a volume, which the first picture has made for its view."""
+    asked.array.require_composite()
     asked.deferral.refuse_target(asked.target)
     _refuse_of_values(asked.look)
     fixed = {"coverage": asked.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
@@ -280,28 +301,14 @@ def _deferred(volume: Any, asked: Addition, plotter: Any) -> tuple[DeferredVDI, 
             f"what the view shows, and the volume is let go of; leave {refused} out, or "
             "classification"
         )
-    image, name = as_image(volume, array.scalars, asked.resolution)
-    read = as_volume(image, name, array.preference)
-    view = asked.camera or framing_camera(plotter, read.bounds)
-    request = GenerationRequest(
-        read,
-        unclassified(asked.look.interpolation),
-        view,  # type: ignore[arg-type]  # which it checks
-        tuple(plotter.window_size),
-        asked.options,
-        get_runtime(asked.device),
-        metadata={"scalars": read.name},
-    )
-    plain: dict[str, Any] = {
-        "array": ArrayChoice(),
-        "options": GenerationOptions(),
-        "deferral": Deferral(),
-    }
-    plain |= {"resolution": None, "resample": None, "mask": None, "camera": None}
-    look = replace(asked.look, interpolation="nearest")
-    kept = generate_deferred(request, asked.deferral)
-    warn_of_range(kept, read)
-    return kept, replace(asked, look=look, **plain)
+    source = _source(volume, asked)
+    source.SetDeferral("deferred", asked.deferral.value_range, asked.deferral.importance)
+    source.SetVolumeProperty(pv.VolumeProperty(interpolation_type=asked.look.interpolation))
+    read = source.GetVolume()
+    ends, _ = kept_range(read, asked.options, asked.deferral)
+    plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
+    values = LateValues(source)
+    return _values_shown(values, plain, ends, read.default_unit_distance, read.name)
 
 
 def _refuse_of_values(look: Looks) -> None:
@@ -317,52 +324,72 @@ def _refuse_of_values(look: Looks) -> None:
             )
 
 
-def _deferred_shown(deferred: DeferredVDI, asked: Addition) -> _Shown:
+def _values_shown(
+    values: DeferredVDI | LateValues,
+    asked: Addition,
+    value_range: tuple[float, float],
+    unit_distance: float,
+    title: str,
+) -> _Shown:
     """Return values with the property that classifies them, as ``add_volume`` makes it."""
-    look, place = asked.look, asked.place
+    look = asked.look
     _refuse_of_values(look)
-    asked.refuse_with_a_vdi({n: v for n, v in look.given.items() if n == "interpolation"})
-    table = look.lookup_table(np.array(deferred.value_range))
-    prop = look.volume_property(table, deferred.unit_distance)
-    shown = DeferredInput(deferred, prop)
-    title = str(deferred.metadata.get("scalars") or "Data")
-    return _Shown(shown, table, table.scalar_range, title, prop, place.show_scalar_bar)
+    table = look.lookup_table(np.array(value_range))
+    prop = look.volume_property(table, unit_distance)
+    bar = asked.place.show_scalar_bar
+    return _Shown(DeferredInput(values, prop), table, table.scalar_range, title, prop, bar)
 
 
-def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | None) -> _Shown:
-    """Return a source of VDIs of a volume, classified as ``add_volume`` would."""
-    scalars, preference = asked.array.scalars, asked.array.preference
-    look, place, source = asked.look, asked.place, VDISource()
-    image, array_name = as_image(volume, scalars, asked.resolution)
+def _source(volume: Any, asked: Addition) -> VDISource:
+    """Return a source of VDIs of a volume, made as it was asked for."""
+    source, preference = VDISource(), asked.array.preference
+    uniform = volume if isinstance(volume, UniformGrid) else None
+    if uniform is None:
+        image, array_name = as_image(volume, asked.array.scalars, asked.resolution)
+        data = held(image)
+    else:
+        data, array_name = uniform.image, uniform.name
     asked.array.require_composite()
-    told = {name: value for name, value in look.describe().items() if name in Look.declared}
-    source.SetMetadata({"classification": {**asked.array.describe(), **told}})
-    data = held(image)
     named = None if array_name is None else data.GetPointData().GetArray(array_name)
     if named is not None and preference == "point":
         # As add_volume: another may be made the active one of the mapper's dataset
         data.GetPointData().SetActiveScalars(array_name)
         array_name = None
-    source.SetInputDataObject(data)
+    if uniform is None:
+        source.SetInputDataObject(data)
+    else:
+        source.SetInputConnection(uniform.GetOutputPort())
     source.SetScalars(array_name, preference)
     source.SetOptions(asked.options)
     source.SetTarget(asked.target)
-    source.SetCoverage(asked.coverage)
     source.SetDevice(asked.device)
     source.SetProgressCallback(progress_callback(asked.progress_bar))
+    if asked.camera is not None:
+        source.SetCamera(asked.camera)
+    return source
+
+
+def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | None) -> _Shown:
+    """Return a source of VDIs of a volume, classified as ``add_volume`` would."""
+    scalars, look, source = asked.array.scalars, asked.look, _source(volume, asked)
+    told = {name: value for name, value in look.describe().items() if name in Look.declared}
+    source.SetMetadata({"classification": {**asked.array.describe(), **told}})
+    source.SetCoverage(asked.coverage)
     read = source.GetVolume()
-    bar = place.show_scalar_bar
+    bar = asked.place.show_scalar_bar
     if read.rgba:
         look, bar = look.of_rgba(), False
     look = replace(look, clim=range_to_classify(scalars, look.clim))
-    table = look.lookup_table(read.array)
     unit_distance = (read if stored is None else stored).default_unit_distance
+    values = read.array
+    if isinstance(volume, UniformGrid) and asked.resample is not None:
+        # As add_volume, of the grid itself
+        values, unit_distance = volume.values, volume.unit_distance
+    table = look.lookup_table(values)
     prop = look.volume_property(table, unit_distance, rgba=read.rgba)
     look.light(prop)
     source.SetLights(plotter.renderer)
     source.SetVolumeProperty(prop)
-    if asked.camera is not None:
-        source.SetCamera(asked.camera, _matrix(plotter, place.user_matrix))
     # As add_volume: values that come without a name have none
     title = read.name if scalars is None or isinstance(scalars, str) else ""
     return _Shown(source, table, look.scalar_range(table, read), title, prop, bar)
@@ -390,17 +417,10 @@ def _mapper(shown: _Shown, asked: Addition, theme: Any) -> Any:
 @contextlib.contextmanager
 def _all_or_nothing(plotter: Any, actors: Any) -> Iterator[None]:
     """Take an actor, or several, away again where something is refused on the way."""
+    was_set = plotter.camera_set
     try:
         yield
     except BaseException:
         plotter.remove_actor(actors, reset_camera=False, render=False)
+        plotter.camera_set = was_set
         raise
-
-
-def _matrix(plotter: Any, user_matrix: Any) -> Any:
-    """Return the actor's matrix as it will be in the scene, with the renderer's scale."""
-    stand_in = vtkVolume()
-    stand_in.SetScale(*plotter.renderer.scale)
-    if user_matrix is not None:
-        stand_in.SetUserMatrix(pv.vtkmatrix_from_array(np.asarray(user_matrix, dtype=float)))
-    return as_array(stand_in.GetMatrix())

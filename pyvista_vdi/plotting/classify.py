@@ -21,6 +21,7 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.model.checks import as_float, not_taken
+from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.classification import BLENDINGS, Look
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.model.options import option, record
@@ -212,8 +213,8 @@ def blending_name(mode: Any) -> str:
 
 def _scalar_range(scalars: Any, clim: float | ArrayLike | None) -> tuple[float, float]:
     if clim is None:
-        # Of what is read chunk by chunk the ends are known, or found so
-        values = np.asarray(scalars.found_ranges() if hasattr(scalars, "found_ranges") else scalars)
+        # Of what is read chunk by chunk the ends are found so
+        values = np.asarray(scalars.ends if isinstance(scalars, ChunkedArray) else scalars)
         if values.dtype.kind == "f" and np.isnan(values).all():
             raise InvalidVolumeError(
                 "every value is NaN: there is nothing to render; choose another array, or leave "

@@ -145,8 +145,10 @@ class AddVDI(Component):
             VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
             view is drawn. With VDIs nothing is generated, and arguments that
-            only a volume can honour are refused. A :class:`DeferredVDI`, or a series or a set of
-            such, takes a look (``cmap``, ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
+            only a volume can honour are refused; where nobody has set the camera, the plotter opens
+            from the VDI's own view, ``plotter.camera = vdi.camera.to_pyvista()``. A
+            :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``,
+            ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
         scalars : str or numpy.ndarray, optional
             Name of an array, or the values, per point or per cell; RGBA as uint8 (n, 4).
         clim : float or (float, float), optional
@@ -166,8 +168,9 @@ class AddVDI(Component):
             As in ``add_volume``.
         ambient, diffuse, specular, specular_power, shade
             As in ``add_volume``: without ``shade`` the others change nothing. A shaded VDI is lit
-            by the plotter's lights as they stand in its generating view: lights that follow the
-            camera move in the picture when the VDI is regenerated, and other lights regenerate it.
+            by the lights of the plotter that shows it, as they stand in its generating view: lights
+            that follow the camera move in the picture when the VDI is regenerated; other lights,
+            and another place among lights of the scene, regenerate it.
         categories : bool or int
             As many colours as there are different values, or this many.
         multi_colors : bool
@@ -188,12 +191,13 @@ class AddVDI(Component):
         log_scale : bool
             Map values to colours by their logarithm.
         resample : "auto" or (int, int, int), optional
-            Take rectilinear, structured and unstructured grids, too, and blocks of them, each
-            resampled to a uniform grid of so many points along x, y and z; ``"auto"``: voxels as
-            large as the mean cell. What lies outside their cells is not drawn. The log says the
-            largest and the mean difference at the grid's own points.
-        mask : pyvista.ImageData, Volume, numpy.ndarray or path, optional
-            Labels at the points of the volume: where they are 0, nothing is drawn.
+            Resample any grid, and blocks of them, to a uniform one of so many points along x, y
+            and z; ``"auto"``: voxels as large as the mean cell, a uniform grid as it is. What lies
+            outside their cells is not drawn. With ``categories``, by the nearest value. The log
+            says the largest and the mean difference at the grid's own points.
+        mask : pyvista.DataSet, Volume, numpy.ndarray or path, optional
+            Labels of the volume's points, or of its cells: where they are 0, nothing is drawn. A
+            grid may have its axes mirrored or in another order.
         max_supersegments : int
             Longest list, 1 to 4096.
         criterion : {"least-error", "homogeneity"}
@@ -205,7 +209,7 @@ class AddVDI(Component):
             Error that may be traded for shorter lists.
         view_cone : float
             Half angle of the cone of new views that must be served, degrees.
-        precision : {"exact", "16-byte", "8-byte"}
+        precision : {"exact", "8-byte"}
             What a supersegment takes, see :meth:`pyvista_vdi.VDI.with_precision`.
         quality : {"reference", "high", "balanced", "fast"}, optional
             Choose the settings by how good pictures are to be, from a short measurement: see
@@ -226,8 +230,8 @@ class AddVDI(Component):
         interpolation : {"nearest", "linear"}
             Between voxels; ``add_volume`` draws ``"nearest"``.
         camera : pyvista.Camera or vtkCamera or Camera, optional
-            The generating view; by default the plotter's camera at the first render, and that of
-            the frame where ``regenerate`` says so.
+            The generating view; by default that of the first picture, and that of the frame where
+            ``regenerate`` says so.
         coverage : {"bounds", "view"}
             ``"bounds"``: the VDI covers the whole volume, so that neither panning nor zooming out
             shows a cut edge. ``"view"``: it covers the window.
@@ -269,9 +273,9 @@ class AddVDI(Component):
             if it returns ``False``. Ctrl-C stops it as well.
         classification : {"baked", "deferred"}
             When scalars are classified: as the VDI is made, or by whoever shows it. Deferred, one
-            :class:`DeferredVDI` is made, for the plotter's view or ``camera``, and ``actor.prop``
-            and its lookup table classify it: what is changed there is seen in the next frame, and
-            nothing is generated again.
+            :class:`DeferredVDI` is made with the first picture, of its view or ``camera``, and
+            ``actor.prop`` and its lookup table classify it: what is changed there is seen in the
+            next frame, and nothing is generated again.
         value_range : (float, float), optional
             Least and largest scalar to keep, where deferred: as for :func:`pyvista_vdi.generate`.
         importance : array_like of float, optional
@@ -282,10 +286,11 @@ class AddVDI(Component):
         Returns
         -------
         PlotterVDIActor or list
-            A ``pyvista.Volume``; ``actor.vdi`` is the current VDI, made now where there is none,
+            A ``pyvista.Volume``; ``actor.vdi`` is the VDI, made whenever it is asked for and there
+            is none, before the first picture too, for the view that this would have,
             ``actor.regenerate()`` makes another from the current view, and ``actor.status`` says
-            how it is drawn. Changes to ``actor.prop`` or to the array's values are in the next
-            picture. A ``MultiBlock`` gives a list of actors.
+            how it is drawn. Changes to ``actor.prop``, to the array's values or to the mask are in
+            the next picture. A ``MultiBlock`` gives a list of actors.
 
         Raises
         ------

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import MissingDependencyError
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.vtk_pipeline.vtk import explain_import_error
 
 
@@ -20,6 +21,15 @@ def import_pyvista() -> Any:
             ) from error
         raise explain_import_error(error) from error
     return pv
+
+
+def camera_to_pyvista(camera: Camera) -> Any:
+    """Return a camera as PyVista's; see :meth:`Camera.to_pyvista`."""
+    theirs = import_pyvista().Camera()
+    from pyvista_vdi.vtk_pipeline.filters.view import aim
+
+    aim(theirs, camera)
+    return theirs
 
 
 def volumes_in(file: Path) -> Any:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-from types import MethodType
-from typing import Any
 
 import pyvista as pv
 import pyvista.plotting  # whole: pv.Plotter is missing while another thread imports it
@@ -68,13 +66,3 @@ class PlotterVDIs(Component):
             self._plotter, filename, controls=controls
         )
         return page
-
-    def __getattr__(self, name: str) -> Any:
-        """Return a method that an extension brings."""
-        place = None if name.startswith("_") else registry.methods("plotter.vdi.").get(name)
-        if place is None:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        return MethodType(registry.load(place), self._plotter)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *registry.methods("plotter.vdi.")})

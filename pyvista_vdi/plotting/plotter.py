@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import pyvista as pv
 
-from pyvista_vdi.plotting.add_transfer_function_editor import (
-    AddTransferFunctionEditor,
-    RemoveTransferFunctionEditor,
-)
+from pyvista_vdi.plotting.add_transfer_function_editor import AddTransferFunctionEditor
 from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
 from pyvista_vdi.plotting.component import AddVDI
 from pyvista_vdi.plotting.pages import PlotterVDIs
@@ -32,5 +29,4 @@ class Plotter(pv.Plotter):
     add_vdi: AddVDI
     add_vdi_clip_plane: AddVDIClipPlane
     add_transfer_function_editor: AddTransferFunctionEditor
-    remove_transfer_function_editor: RemoveTransferFunctionEditor
     vdi: PlotterVDIs

@@ -30,7 +30,6 @@ COMPONENTS = {
     "add_vdi": "pyvista_vdi.plotting.component",
     "add_vdi_clip_plane": "pyvista_vdi.plotting.clip_plane",
     "add_transfer_function_editor": "pyvista_vdi.plotting.add_transfer_function_editor",
-    "remove_transfer_function_editor": "pyvista_vdi.plotting.add_transfer_function_editor",
     "vdi": "pyvista_vdi.plotting.pages",
 }
 ACCESSORS = {"vdi": "pyvista_vdi.plotting.accessor"}

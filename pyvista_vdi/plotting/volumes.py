@@ -16,29 +16,44 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.convert import as_numpy, require_image
-from pyvista_vdi.vtk_pipeline.vtk import vtkRectilinearGrid
+from pyvista_vdi.vtk_pipeline.vtk import vtkCommonDataModel, vtkRectilinearGrid
 
 #: What ``add_volume`` calls scalars that are given as an array.
 _UNNAMED = "Data"
 
 
 def as_image(volume: Any, scalars: Any, resolution: Any) -> tuple[Any, str | None]:
-    """Return a uniform grid and the name of its scalars, ``None`` for the active ones.
+    """Return a uniform grid and the name of its scalars: see :func:`as_grid`."""
+    return as_grid(volume, scalars, resolution, uniform=True)
+
+
+def as_grid(volume: Any, scalars: Any, resolution: Any, *, uniform: bool) -> tuple[Any, str | None]:
+    """Return a grid and the name of its scalars, ``None`` for the active ones.
 
     ``volume`` is a grid, a NumPy array with the spacing ``resolution``, or a Volume; the user's own
     grid is returned where that is possible, so that changes to it are seen. ``scalars`` is a name,
-    or values per point or cell, which go into a shallow copy. Other grids are refused with a
-    remedy; a rectilinear one whose points are equidistant is a uniform one.
+    or values per point or cell, which go into a shallow copy. A rectilinear grid whose points are
+    equidistant is a uniform one; others are refused with a remedy, if it is to be ``uniform``.
     """
     if isinstance(volume, np.ndarray):
         image = _from_array(volume, resolution)
     elif isinstance(volume, Volume):
         image = to_image_data(volume)
     else:
-        image = require_image(_as_uniform(volume))
+        image = _as_uniform(volume)
+        require_grid(image, uniform=uniform)
     if scalars is None or isinstance(scalars, str):
         return image, scalars
     return _with_values(image, np.asarray(scalars)), _UNNAMED
+
+
+def require_grid(data: Any, *, uniform: bool) -> None:
+    """Refuse what is no uniform grid, or, where it need not be uniform, what has no volume."""
+    other = isinstance(data, vtkCommonDataModel.vtkDataSet) and not isinstance(
+        data, vtkCommonDataModel.vtkPolyData
+    )
+    if uniform or not other:
+        require_image(data)
 
 
 def _as_uniform(grid: Any) -> Any:
@@ -110,7 +125,7 @@ def _with_values(image: Any, values: Any) -> pv.ImageData:
             f"scalars must have one value per point ({n_points}) or per cell ({n_cells}); "
             f"got shape {values.shape}"
         )
-    copy = pv.ImageData()
+    copy = type(pv.wrap(image))()
     copy.CopyStructure(image)
     for to, marks in (
         (copy.GetPointData(), image.GetPointGhostArray()),

@@ -19,8 +19,8 @@ def write_vdi(dataset: Any, path: str, **options: Any) -> None:
     path : str
         The target; its name ends in ``.vdi`` or ``.exr``.
     **options
-        Those of ``VDI.save``: ``level``; ``exact`` and ``linear`` for ``.exr``. PyVista takes
-        ``compression`` for its own: ``VDI.save`` has it.
+        Those of ``VDI.save``: ``level`` for ``.vdi``. PyVista takes ``compression`` for its own:
+        ``VDI.save`` has it.
 
     Raises
     ------

@@ -77,6 +77,9 @@ _PLACEHOLDER_RATE = 30.0
 #: the share of rays below which it is said to cover too little: corners of bounds are often empty.
 _TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
 
+#: What a view that is far from the VDI's own, without its volume, has as a remedy.
+_GO_BACK = "its own view is plotter.camera = vdi.camera.to_pyvista()"
+
 
 def decide(state: FrameState, event: Event) -> Decision:
     """Return the state after an event, and what is to be done, in this order."""
@@ -114,7 +117,8 @@ def decide(state: FrameState, event: Event) -> Decision:
                 (Complain(error), Show("before")) if shown else (Do("forget view"), Raise(error))
             )
         case VDIAsked(there, stamp):
-            if there and (state.settings.draw != "auto" or state.behind):
+            # Where frames keep it up to date, or will
+            if there and (state.settings.draw == "vdi" or state.behind):
                 return state, ()
             state, actions = _nothing_goes_on(state)
             again = stamp != state.failed_in_frame
@@ -183,14 +187,16 @@ def _frame(state: FrameState, f: FrameAsked) -> Decision:
         f = replace(f, look=f.whole and f.number != state.number)
         state = replace(state, number=f.number)
     if settings.draw == "volume" and not f.joint:
+        state = replace(state, behind=False)
         if f.trouble is not None:
             return state, (Raise(f.trouble),)
         if _drawable(state, f, f.wanted):
-            return state, (Show("wanted", replace(f, look=False), f.wanted.content),)
+            asked = replace(f, look=False)
+            return state, (*_follow(state, f), Show("wanted", asked, f.wanted.content))
     state = replace(state, behind=f.watched)
     if f.watched:
         return _watched(state, f)
-    if f.seen is None and (settings.draw != "auto" or callable(settings.regenerate)):
+    if f.seen is None and (settings.draw == "vdi" or callable(settings.regenerate)):
         return state, (*_update(state, f), Show("last"))
     before: tuple[Action, ...] = ()
     if f.one_view and f.look:
@@ -199,9 +205,8 @@ def _frame(state: FrameState, f: FrameAsked) -> Decision:
         if f.answer:
             again = AskAgain(replace(f, answer=False))
             return state, (Do("take view"), Do("update"), again)
-        if settings.regenerate != "never" and _other_content(state, f):
-            before = (Do("follow view"),)
-    if settings.draw == "auto":
+        before = _follow(state, f)
+    if settings.draw != "vdi":
         return _faithful(state, f, before)
     return state, (*before, *_update(state, f, before), Show("last"))
 
@@ -369,6 +374,12 @@ def _drawable(state: FrameState, f: FrameAsked, of: Any) -> bool:
     return state.refused is None or bool(state.refused != of.content)
 
 
+def _follow(state: FrameState, f: FrameAsked) -> tuple[Action, ...]:
+    """Ask for this frame's view, if it is a whole picture, for a VDI of what has changed."""
+    follows = f.one_view and f.look and state.settings.regenerate != "never"
+    return (Do("follow view"),) if follows and _other_content(state, f) else ()
+
+
 def _other_content(state: FrameState, f: FrameAsked) -> bool:
     """Whether a VDI shows what is no longer so, and the source has not failed at this already."""
     made = None if f.seen is None else f.seen.request
@@ -434,13 +445,13 @@ def _lacking(of: StoredSeen) -> tuple[Action, ...]:
     if seen.angle > of.cone:
         what = (
             f"the view is {seen.angle:.0f} degrees from the VDI's generating view, which was to "
-            f"serve {of.cone:.0f}: it shows less, and less of what was hidden"
+            f"serve {of.cone:.0f}: it shows less, and less of what was hidden; {_GO_BACK}"
         )
         lacking.append(("angle", what))
     if seen.coverage < _TOO_LITTLE:
         what = (
             f"{1 - seen.coverage:.0%} of the view's rays through the volume leave what the VDI "
-            "covers: there it shows nothing"
+            f"covers: there it shows nothing; {_GO_BACK}"
         )
         lacking.append(("coverage", what))
     if seen.magnification > _TOO_COARSE:

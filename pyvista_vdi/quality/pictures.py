@@ -21,6 +21,9 @@ _FASTER_WITHIN = 10.0
 _NEAR, _WORTH_A_VDI = 0.09, 12
 #: Pictures by the volume, and estimates, that are remembered.
 _PICTURES, _ESTIMATES = 2 * _WORTH_A_VDI, 64
+#: Rays that an estimate casts, 16 tiles of 24 x 24 by the VDI and by the volume: a VDI of no more
+#: pixels takes no longer to be made.
+_JUDGED = 2 * 16 * 24**2
 #: An estimate holds for pictures of views as near as this to its own (about radians).
 _ANOTHER_JUDGEMENT = 0.02
 
@@ -38,6 +41,10 @@ def serves(
     if seen.angle > within or seen.angle >= pictures.poor_from or seen.coverage < 1:
         return pictures, False
     if f.judged is False:
+        return pictures, False
+    alone = f.joint and f.one_view and f.own_pixels  # what is made is kept
+    at_home = seen.request is not None and seen.request.screen == f.view
+    if alone and not at_home and seen.pixels <= _JUDGED:
         return pictures, False
     if f.judged is not None and f.judged not in pictures.judged:
         pictures = replace(pictures, judged=(*pictures.judged[1 - _ESTIMATES :], f.judged))

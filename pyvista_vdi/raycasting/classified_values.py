@@ -62,6 +62,13 @@ def classify_on_device(
     return classify(deferred, transfer_function, on_device)
 
 
+def release_values(deferred: DeferredVDI) -> None:
+    """Release a deferred VDI's values from devices; they are uploaded when used again."""
+    with _lock:
+        gone = _uploads.pop(deferred, None)
+    del gone  # without the lock
+
+
 def integrals(of_cells: Floats) -> NDArray[np.float32]:
     """Return what kernels take of a transfer function, float32 (CELLS + 2, 2, 4).
 

@@ -120,15 +120,15 @@ PREPARE_LISTS = KernelDeclaration(
     headers="HEADER_T*",
     fronts="float*",
     backs="float*",
-    colors="ulong*",
+    colors="float*",
     optical_depths="float*",
     depth_origin="float",
     nearest="float",
     width="int",
     height="int",
     centre_ray="float*",
-    faces="ulong*",
-    media="ulong*",
+    faces="float2*",
+    media="float4*",
 )
 PREPARE_PACKED = KernelDeclaration(
     "raycasting/prepare_packed.cl",

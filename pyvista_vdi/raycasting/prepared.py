@@ -5,7 +5,7 @@ import copy
 import functools
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,10 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classify_values import CELLS, ValuesLook
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.float32_limits import lists_are_far
-from pyvista_vdi.model.packing import Packed8, Packed16
+from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.classified_values import integrals, values_on_device
+from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.classified_values import integrals, release_values, values_on_device
 from pyvista_vdi.raycasting.kernels import (
     COUNT_PACKED,
     COUNT_SUPERSEGMENTS,
@@ -31,6 +32,7 @@ from pyvista_vdi.raycasting.kernels import (
     PREPARE_VALUES,
 )
 from pyvista_vdi.raycasting.packets import share_lit
+from pyvista_vdi.volume.upload import release_voxels
 
 #: Squares of stacks along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
 _SQUARES = 12
@@ -225,6 +227,20 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> "PreparedVDI":
         return place.prepared
 
 
+def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) -> None:
+    """Release VDIs, values and volumes from devices; they are uploaded when used again."""
+    for thing in things:
+        if isinstance(thing, Volume):
+            release_voxels(thing)
+        elif thing is not None:
+            if isinstance(thing, DeferredVDI):
+                release_values(thing)
+            places: Any = _kept if isinstance(thing, DeferredVDI) else _prepared
+            with _lock:
+                gone = places.pop(thing, None)
+            del gone  # without the lock
+
+
 class PreparedVDI:
     """A VDI on a device, in the form that the raycaster reads; the VDI itself is not kept."""
 
@@ -262,8 +278,8 @@ class PreparedVDI:
         #: the lists lie at the far end of the bounds' depths, 2 at the near one.
         self.double_float = self._double_float(vdi, depths)
         self.list_rows = self.list_space(vdi.camera)
-        #: Bytes of a packed supersegment; 0 where they are exact.
-        self.packed = {Packed16: 16, Packed8: 8}.get(type(vdi.packing), 0)
+        #: Whether supersegments have 8 bytes.
+        self.packed = vdi.packing is not None
         self.depth_step = 1.0
         self._upload(vdi)
 
@@ -295,7 +311,7 @@ class PreparedVDI:
         switches: dict[str, int | str] = {
             "OFFSET_T": "long" if self.long_offsets else "int",
             "DEPTH": "PARALLEL" if self.parallel else "SHIFTED" if self.shifted else "RECIPROCAL",
-            "PACKED": self.packed,
+            "PACKED": int(self.packed),
         }
         if self.double_float:
             switches["DOUBLE_FLOAT_RAYS"] = self.double_float
@@ -319,7 +335,7 @@ class PreparedVDI:
 
     def _headers(self, vdi: VDI) -> tuple[NDArray[Any], int]:
         """Return where lists begin, by their bundles or, of 8-byte supersegments, each; the end."""
-        if self.packed == 8:
+        if self.packed:
             lengths = vdi.counts + LIST_HEADER * (vdi.counts > 0)
         else:
             lengths = _longest(vdi.counts) * BUNDLE**2
@@ -329,7 +345,7 @@ class PreparedVDI:
         # Kernels count words of 8 bytes, of which an entry takes up to two, by signed numbers
         self.long_offsets = 2 * entries >= 2**31
         offset_type = np.int64 if self.long_offsets else np.int32
-        if self.packed == 8:
+        if self.packed:
             headers: NDArray[Any] = begins.astype(offset_type)
         else:
             longest = lengths.reshape(-1) // BUNDLE**2
@@ -375,24 +391,19 @@ class PreparedVDI:
                 stored = {**faces, "stored": faces["words"], "words": self.faces}
                 prepare = runtime.bind(PREPARE_PACKED, self.switches, **common, **stored)
             else:
-                # Depth coordinates and extinctions, 24 or 16 bytes, by bundles of lists
+                # Depth coordinates and extinctions by bundles of lists
                 faces = {
                     "fronts": upload(vdi.front, "front depths"),
                     "backs": upload(vdi.back, "back depths"),
                 }
-                if isinstance(packing, Packed16):
-                    self.faces = self.media = made((entries, 4), np.uint32, "supersegments")
-                    colors: NDArray[Any] = packing.color
-                else:
-                    self.faces = made((entries, 2), np.float32, "supersegment faces")
-                    self.media = made((entries, 4), np.float32, "supersegment media")
-                    colors = vdi.color
+                self.faces = made((entries, 2), np.float32, "supersegment faces")
+                self.media = made((entries, 4), np.float32, "supersegment media")
                 prepare = runtime.bind(
                     PREPARE_LISTS,
                     self.switches,
                     **common,
                     **faces,
-                    colors=upload(colors, "supersegment colours"),
+                    colors=upload(vdi.color, "supersegment colours"),
                     optical_depths=upload(vdi.optical_depth, "optical depths"),
                     depth_origin=self.depth_origin,
                     nearest=self.nearest,
@@ -401,7 +412,7 @@ class PreparedVDI:
                 )
 
             def count(**grid: Any) -> None:
-                kernel = COUNT_PACKED if self.packed == 8 else COUNT_SUPERSEGMENTS
+                kernel = COUNT_PACKED if self.packed else COUNT_SUPERSEGMENTS
                 lists = {"OFFSET_T": self.switches["OFFSET_T"]}
                 counting = runtime.bind(kernel, lists, offsets=starts, **faces, **grid)
                 counting(padded(self.window[0] * self.window[1], GROUP), GROUP)
@@ -428,7 +439,7 @@ class KeptValues(PreparedVDI):
 
     def _upload(self, vdi: VDI) -> None:
         """Bring offsets and faces to the device, and where the lists of a look may lie."""
-        runtime, self.packed = self.runtime, 0
+        runtime, self.packed = self.runtime, False
         headers, self._entries = self._headers(vdi)
         offsets = vdi.offsets.astype(np.int64 if self.long_offsets else np.int32)
         self._lists = vdi

@@ -182,7 +182,7 @@ class Scene:
             self.forms[:_COORDINATE_FORMS].astype(np.float64),
             (near - self.reference_depth, far - self.reference_depth),
             parallel=prepared.parallel,
-            in_bundles=prepared.packed != 8,
+            in_bundles=not prepared.packed,
         )
 
     @property

@@ -139,6 +139,13 @@ def uploads_of(volume: Volume) -> _Uploads:
         return _uploads.setdefault(volume, _Uploads())
 
 
+def release_voxels(volume: Volume) -> None:
+    """Release a volume from devices; it is uploaded when it is used again."""
+    with _uploads_lock:
+        gone = _uploads.pop(volume, None)
+    del gone  # without the lock
+
+
 class _Uploads:
     """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
 

@@ -48,11 +48,12 @@ _NAMES = {
     ),
     "vtkCommonExecutionModel": "vtkAlgorithm vtkStreamingDemandDrivenPipeline vtkTrivialProducer",
     "vtkCommonMath": "vtkMatrix4x4",
+    "vtkCommonTransforms": "vtkTransform",
     "vtkFiltersCore": (
-        "vtkCellDataToPointData vtkContourFilter vtkImageAppend vtkResampleToImage "
-        "vtkTriangleFilter"
+        "vtkCellDataToPointData vtkClipPolyData vtkContourFilter vtkExtractEdges "
+        "vtkImageAppend vtkResampleToImage vtkTriangleFilter"
     ),
-    "vtkFiltersGeneral": "vtkMultiBlockDataGroupFilter",
+    "vtkFiltersGeneral": "vtkMultiBlockDataGroupFilter vtkTransformFilter",
     "vtkFiltersGeometry": "vtkDataSetSurfaceFilter",
     "vtkFiltersHybrid": "vtkImplicitModeller vtkTemporalInterpolator",
     "vtkFiltersSources": "vtkPlaneSource vtkSphereSource",
@@ -72,12 +73,11 @@ _NAMES = {
     "vtkImagingHybrid": "vtkGaussianSplatter",
     "vtkImagingSources": "vtkImageGaussianSource vtkImageSinusoidSource",
     "vtkInteractionStyle": "vtkInteractorStyleTrackballCamera",
-    "vtkParallelCore": "vtkMultiProcessController",
     "vtkRenderingAnnotation": (
         "vtkAnnotatedCubeActor vtkAxesActor vtkCaptionActor2D vtkCornerAnnotation vtkScalarBarActor"
     ),
     "vtkRenderingCore": (
-        "vtkActor vtkActor2D vtkAssembly vtkBillboardTextActor3D vtkCamera "
+        "vtkActor vtkActor2D vtkAssembly vtkBillboardTextActor3D vtkCamera vtkCameraInterpolator "
         "vtkColorTransferFunction vtkFollower vtkHardwarePicker vtkHardwareSelector vtkImageActor "
         "vtkImageSlice vtkLight vtkLightKit vtkMapper vtkPolyDataMapper vtkPolyDataMapper2D "
         "vtkProp3D vtkPropAssembly vtkPropCollection vtkPropPicker vtkRenderWindow "
@@ -97,6 +97,7 @@ _NAMES = {
         "vtkFixedPointVolumeRayCastMapper vtkGPUVolumeRayCastMapper vtkMultiVolume"
     ),
     "vtkRenderingVolumeOpenGL2": "vtkOpenGLGPUVolumeRayCastMapper",
+    "vtkViewsContext2D": "vtkContextInteractorStyle",
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

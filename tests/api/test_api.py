@@ -244,6 +244,14 @@ def test_what_is_no_vdi(camera):
             api.render(given, camera)
 
 
+@pytest.mark.parametrize("name", ["cmap", "rng", "transfer_function"])
+def test_a_vdi_of_colours_takes_no_look(name, camera):
+    vdi = pvdi.VDI(camera, (1, 1), [0, 0], [], [], np.empty((0, 3)), [], (0, 1, 0, 1, 0, 1))
+    for function, arguments in ((api.render, ()), (api.render_depth, ()), (api.pick, ((0, 0),))):
+        with pytest.raises(TypeError, match=f"{name!r}: this VDI's colours are fixed: .*deferred"):
+            function(vdi, camera, *arguments, **{name: "bone"})
+
+
 def test_volumes_without_something_to_render(camera):
     pv = pytest.importorskip("pyvista")
     plane = pv.ImageData(dimensions=(4, 4, 1))
@@ -284,8 +292,9 @@ def test_settings_that_are_refused(change, message, volume, camera, default_runt
 def test_cameras_and_devices_that_are_none(volume, camera, default_runtime):
     with pytest.raises(InvalidCameraError, match="position and focal point are the same point"):
         api.generate(volume, pvdi.Camera((1, 2, 3), (1, 2, 3), (0, 0, 1)), SIZE)
-    with pytest.raises(InvalidCameraError, match="expected a pyvista_vdi.Camera, a vtkCamera"):
-        api.generate(volume, "xy", SIZE)
+    for none in ("xyz", (1, 2), ((1, 2, 3), (1, 2, 4))):
+        with pytest.raises(InvalidCameraError, match="expected a pyvista_vdi.Camera, a vtkCamera"):
+            api.generate(volume, none, SIZE)
     with pytest.raises(NoDeviceError, match="no such device|no .*device") as caught:
         api.generate(volume, camera, SIZE, transfer_function=ramp(volume), device="no such device")
     assert default_runtime.info.name in str(caught.value)  # the message lists what exists

@@ -48,7 +48,7 @@ LEVELS = (
     ("errors", "_version"),
     ("registry",),
     ("model",),
-    ("reference", "device", "io"),
+    ("device", "io"),
     ("volume",),
     ("generation", "raycasting"),
     ("quality",),
@@ -72,7 +72,6 @@ LEVELS_WITHIN = {
     "io": (
         ("progress",),
         ("png", "time_steps", "vdi_file", "axes"),
-        ("coordinates",),
         ("stores",),
         ("volumes",),
         ("files",),
@@ -84,13 +83,13 @@ LEVELS_WITHIN = {
 WITH_VTK = (
     *("vtk_pipeline", "plotting", "extensions.paraview", "extensions.web.scenes"),
     *("extensions.series.shown", "extensions.sets.shown"),
-    *("extensions.large.vtk_ranks", "extensions.paraview.parts"),
+    "extensions.paraview.parts",
 )
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
 HEAVY = """
-aiohttp anywidget astropy cvista dask distributed h5py matplotlib mrcfile nibabel nrrd paraview
-pydicom pyopencl pyvista scipy skimage tifffile traitlets trame vtk vtkmodules xarray zarr
+SimpleITK aiohttp anywidget cvista dask distributed h5py matplotlib nrrd paraview pydicom pyopencl
+pyvista scipy skimage tifffile traitlets trame vtk vtkmodules zarr
 """
 
 

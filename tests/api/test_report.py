@@ -18,29 +18,17 @@ from pyvista_vdi.model.standard_cases import filling_camera
 SIZE = (64, 48)
 
 
-def test_a_report_names_versions_and_devices(default_runtime):
+def test_a_report_names_versions_and_devices(default_runtime, monkeypatch):
     said = repr(pvdi.Report())
-    assert "numpy " in said
-    assert metadata.version("numpy") in said
+    assert f"numpy {metadata.version('numpy')}" in said
     assert default_runtime.info.name in said
     assert "<pre>" in pvdi.Report()._repr_html_()
 
-
-def test_a_report_says_what_is_missing(monkeypatch):
     def none():
         raise NoDeviceError("no device")
 
-    def version(name, found=metadata.version):
-        if name == "h5py":
-            raise metadata.PackageNotFoundError(name)
-        return found(name)
-
     monkeypatch.setattr(report, "describe_devices", none)
-    monkeypatch.setattr(metadata, "version", version)
-    described = pvdi.Report()
-    assert described.packages["h5py"] is None
-    assert 'pip install "pyvista-vdi[hdf5]"' in repr(described)
-    assert "no device" in repr(described)
+    assert "no device" in repr(pvdi.Report())
 
 
 @pytest.fixture(scope="module")

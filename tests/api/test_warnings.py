@@ -75,7 +75,13 @@ def a_view_from_inside(plotter, tmp_path):
     plotter.screenshot(return_img=True)
 
 
+def a_camera_that_looks_away(plotter, tmp_path):
+    away = ((50, 5, 5), (90, 5, 5), (0, 0, 1))  # as PyVista's camera_position
+    pvdi.generate(pvdi.Volume(VALUES), away, (8, 8))
+
+
 CASES = [
+    a_camera_that_looks_away,
     missed_by_a_dial,
     opacity_of_colours,
     a_mapper_of_vtk,

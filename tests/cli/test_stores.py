@@ -45,7 +45,8 @@ def test_info_tells_levels_and_reads_no_voxel(image, capsys):
     said = capsys.readouterr().out
     for part in (
         "dapi, uint8, range not known yet",
-        "OME-Zarr 0.4: 2 along c, 16 along z, 24 along y, 32 along x; lengths in micrometer",
+        "OME-Zarr 0.4: 2 along c, 16 along z, 24 along y, 32 along x\n",
+        "lengths    in micrometer\n",
         "level 1    16 x 12 x 8 points, spacing (1, 1, 1)",
     ):
         assert part in said

@@ -28,9 +28,8 @@ RIGHT = {
     "serve": "v.npy --port 0 --shade",
     "info": "v.npy",
     "compare": "v.npy --out new --size 12x8 --angles 5 --repeats 1 --no-vtk --shade",
-    "benchmark": "--out new.json --datasets v.npy --no-vtk",
     "tradeoff": "v.npy --out new --quick --no-vtk --shade",
-    "convert": "a.vdi -o old.exr",
+    "convert": "a.vdi -o old.vdi",
     "series": "v.npy -o old.vdis --size 12x8 --shade",
     "set": "v.npy -o old.vdiset --size 16x12 --shade",
     "paraview": "",
@@ -100,7 +99,6 @@ WRONG = {
     "--quality": NO_CHOICE,
     "--rate": (*NOT_ABOVE_0, "1e9"),
     "--regenerate": NO_CHOICE,
-    "--regenerate-below": (*BELOW_0, "1.5"),
     "--repeats": NO_COUNT,
     "--sample-distance": NOT_ABOVE_0,
     "--scalars": ("nothing", "''"),
@@ -149,12 +147,11 @@ OF_A_VERB = {
     ("view", "--screenshot"): tuple(name.format(".png") for name in NO_TARGET),
     ("turntable", "--output"): (*(name.format(".gif") for name in NO_TARGET), "a.png"),
     ("movie", "--output"): tuple(name.format(".gif") for name in NO_TARGET),
-    ("convert", "--output"): tuple(name.format(".exr") for name in NO_TARGET),
+    ("convert", "--output"): tuple(name.format(".vdi") for name in NO_TARGET),
     ("series", "--output"): tuple(name.format(".vdis") for name in NO_TARGET),
     ("set", "--output"): tuple(name.format(".vdiset") for name in NO_TARGET),
     ("compare", "--out"): ("v.npy", "v.npy/a"),
     ("tradeoff", "--out"): ("v.npy", "v.npy/a"),
-    ("benchmark", "--out"): tuple(name.format(".json") for name in NO_TARGET),
 }
 #: Files in place of the verb's first.
 FILES = {

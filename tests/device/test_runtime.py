@@ -304,26 +304,6 @@ def test_profile_counts_calls_and_sums_times(runtime, scale_file, monkeypatch):
     assert runtime.profile() == []
 
 
-def test_a_scope_can_be_profiled_by_itself(runtime, scale_file):
-    launch = runtime.bind(scaling(scale_file), {"ADD": 1}, factor=1, n=4)
-    profile = queues.Profile()
-    with runtime.buffer((4,)) as x:
-        runtime.fill(x, 0)
-        launch.set(x=x)
-        with runtime.queue_scope(profile):
-            launch(4)
-            with runtime.queue_scope():  # another's work, in the same thread
-                launch(4)
-            runtime.download(x)
-        launch(4)
-        assert np.all(runtime.download(x) == 3)
-    calls = {row.name: row.calls for row in profile.figures()}
-    assert calls == {"scale": 1, "[read]": 1}
-    (kernels,) = (row.total_ms for row in profile.figures() if row.name == "scale")
-    assert profile.kernel_seconds() == pytest.approx(kernels * 1e-3)
-    assert runtime.profile() == []
-
-
 def test_profile_table_is_printed_at_exit(runtime):
     code = f"from pyvista_vdi.device import get_runtime\nget_runtime({runtime.info.selector!r})"
     done = run_python(code, PYVISTA_VDI_PROFILE="1")

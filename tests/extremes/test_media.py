@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 from drawing import generate_vdi, raycast_volume, render_vdi, render_vdis
 from extreme_scenes import (
     BOUND,
@@ -15,7 +16,7 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import Camera, InvalidArgumentError, TransferFunction, Volume, reference
+from pyvista_vdi import Camera, InvalidArgumentError, TransferFunction, Volume
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
 

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 import pytest
+import reference
 from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     FIELD,
@@ -30,7 +31,6 @@ from pyvista_vdi import (
     Shading,
     TransferFunction,
     Volume,
-    reference,
 )
 from pyvista_vdi.model.float32_limits import scalars_suit_float32
 from pyvista_vdi.volume.upload import GRADIENT_SHARE

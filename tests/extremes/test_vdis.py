@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 from drawing import generate_vdi, render_vdi
 from extreme_scenes import (
     WINDOW,
@@ -16,7 +17,7 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import VDI, Camera, Volume, reference
+from pyvista_vdi import VDI, Camera, Volume
 
 pytestmark = pytest.mark.extremes
 

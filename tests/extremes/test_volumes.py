@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import reference
 from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     BOUND,
@@ -18,7 +19,7 @@ from extreme_scenes import (
     view,
 )
 
-from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume, reference
+from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume
 from pyvista_vdi.device import Launch
 from pyvista_vdi.volume import upload
 

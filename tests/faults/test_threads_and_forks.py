@@ -131,6 +131,66 @@ def test_two_plotters_in_two_threads(default_runtime):
     assert finished(TWO_PLOTTERS) == "the same\n"
 
 
+MANY_VDIS = """
+import gc, threading
+import pyvista as pv
+from pyvista_vdi.vtk_pipeline.vtk import vtkAssembly, vtkObjectBase
+
+def grid(number):
+    grid = pv.ImageData(dimensions=(6, 6, 6), origin=(0.4 * number, 0.3 * number, 0))
+    grid["v"] = np.arange(216, dtype=np.uint8)
+    return grid
+
+def scene(columns):
+    # No actor is kept here, nor by PyVista but for the one added last
+    plotter = pv.Plotter(shape=(1, columns), off_screen=True, window_size=(60, 45))
+    for number in range(8):
+        plotter.subplot(0, number % columns)
+        plotter.add_vdi(grid(number), name=str(number), show_scalar_bar=False)
+    assembly = vtkAssembly()
+    assembly.AddPart(plotter.add_vdi(grid(8), name="8", show_scalar_bar=False))
+    plotter.remove_actor("8")
+    plotter.add_actor(assembly)
+    plotter.volume = None
+    plotter.show(auto_close=False)
+    for number in range(4):
+        plotter.camera.azimuth += 5
+        plotter.render()
+        plotter.remove_actor(str(number))
+    plotter.clear()
+    plotter.add_vdi(grid(0), show_scalar_bar=False)
+    plotter.render()
+    plotter.close()
+
+def alive():
+    gc.collect()
+    return sum(issubclass(type(each), vtkObjectBase) for each in gc.get_objects())
+
+def collect():
+    while not ended.wait(0.05):
+        gc.collect()
+
+scene(1)
+before, ended = alive(), threading.Event()
+collector = threading.Thread(target=collect, daemon=True)
+collector.start()
+gc.set_threshold(1, 1, 1)
+for turn in range(int(sys.argv[1])):
+    scene(1 + turn % 2)
+ended.set()
+collector.join()
+assert alive() <= before
+print("nothing is left")
+"""
+
+
+@pytest.mark.parametrize("turns", [2, pytest.param(30, marks=pytest.mark.slow)])
+def test_many_vdis_while_python_collects(default_runtime, turns):
+    """At any allocation, and in another thread: VTK is asked for nothing within a collection."""
+    pytest.importorskip("pyvista")
+    assert finished(MANY_VDIS, str(turns)) == "nothing is left\n"
+
+
 # -- forks -----------------------------------------------------------------------------------------
 
 FORK = """

@@ -2,7 +2,7 @@
 
     pip install "pyvista-vdi[fuzz]"
     python tests/fuzz/run.py --seconds 600
-    python tests/fuzz/run.py exr_patches --seconds 3600 --corpus found/
+    python tests/fuzz/run.py vdi_members --seconds 3600 --corpus found/
 
 An input that breaks a promise is written to ``--crashes`` and named; ``--replay FILE TARGET`` runs
 it again. Put it into ``tests/fuzz/corpus/TARGET/`` when the bug is fixed: the test suite runs
@@ -58,7 +58,6 @@ def _import_instrumented() -> None:
     except ImportError:
         raise SystemExit('atheris is not installed: pip install "pyvista-vdi[fuzz]"') from None
     with atheris.instrument_imports(include=["pyvista_vdi"]):
-        import pyvista_vdi.extensions.deep_exr.files  # noqa: F401
         import pyvista_vdi.plotting.classify  # noqa: F401
         import pyvista_vdi.vtk_pipeline.filters.convert  # noqa: F401
 

@@ -9,11 +9,12 @@ import itertools
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import slabs_vdi
 
-from pyvista_vdi import Camera, TransferFunction, Volume, reference
+from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.options import CRITERIA
 

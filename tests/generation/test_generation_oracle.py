@@ -13,17 +13,18 @@ import itertools
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
+from reference.generate import near_depth
+from reference.ranges import ROUNDOFF
+from reference.raycast import NEAR_LIMIT
 from sampling_uncertainty import uncertainties
 
-from pyvista_vdi import Camera, Cancelled, reference
+from pyvista_vdi import Camera, Cancelled
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
-from pyvista_vdi.reference.generate import near_depth
-from pyvista_vdi.reference.ranges import ROUNDOFF
-from pyvista_vdi.reference.raycast import NEAR_LIMIT
 
 WINDOW = (14, 10)
 

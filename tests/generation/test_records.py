@@ -4,7 +4,7 @@ two runs gives and costs, and the four ways of shortening a record.
 The reference is float64 and written from docs/conventions.md and the head of the kernel file: a run
 is a homogeneous medium of straight colour c and optical depth tau over a length; it looks like
 (c f, f) per reference length l with f = tau / (tau + l); merging costs what the sum of squares
-about the mean, along the ray, grows by. Cuts are those of pyvista_vdi.reference.shading.
+about the mean, along the ray, grows by. Cuts are those of reference.shading.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from recorded_runs import (
     random_records,
     random_segments,
 )
+from reference.shading import cut_where_unlike
 
 from pyvista_vdi.model import compositing
 from pyvista_vdi.model.compositing import Segment
-from pyvista_vdi.reference.shading import cut_where_unlike
 
 FILE = "record_functions.cl"
 #: Ways of shortening a record.

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from extreme_scenes import slabs_vdi
 from ray_scenes import rebuilt
+from reference.raycast import centre_ray_scale, render
 
 from pyvista_vdi import VDI, Camera
 from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.reference.raycast import centre_ray_scale, render
 
 BOUNDS = (-1, 1, -1, 1, -1, 1)
 STRETCHED = np.diag([1.0, 2.0, 3.0, 1.0])

@@ -254,8 +254,7 @@ def test_nothing_is_read_when_a_store_is_opened(image, tmp_path):
     volume = pvdi.open_volume(path, time=1)
     view = filling_camera(volume.bounds, (4, 1))
     assert volume.at_level("auto", view, (4, 1)).level == 1
-    assert volume.array.ranges() is None
-    with pytest.raises(Exception):  # noqa: B017, PT011 - the codec's own
+    with pytest.raises(InvalidVolumeError, match=r"x\.ome\.zarr.*copy it from its source"):
         volume.load()
 
 
@@ -322,10 +321,38 @@ def test_numbers_of_numpy_choose_as_others_do(image):
     np.testing.assert_array_equal(volume.load().array, VALUES[1, 2, ::2, ::2, ::2])
     assert volume.describe().startswith("level 1 of 3")
     assert volume.at_level(0).channel == 2
-    # Ranges are kept for what was chosen, and not for the type of a number
-    volume.finite_range()
-    same = pvdi.open_volume(image[0], level=1, time=1, channel=2)
-    assert same.array.ranges() is not None
+
+
+@pytest.mark.parametrize("name", ["x.zarr", "x.h5"])
+def test_a_store_that_is_written_anew_must_be_opened_again(name, tmp_path):
+    zarr, h5py = pytest.importorskip("zarr"), pytest.importorskip("h5py")
+
+    def write(values):
+        if name == "x.zarr":
+            shutil.rmtree(tmp_path / name, ignore_errors=True)
+            zarr.save_array(str(tmp_path / name), values)
+        else:
+            (tmp_path / name).unlink(missing_ok=True)
+            with h5py.File(tmp_path / name, "w") as file:
+                file["v"] = values
+
+    write(VALUES[0, 0])
+    volume = pvdi.open_volume(tmp_path / name)
+    assert volume.finite_range() == (VALUES[0, 0].min(), VALUES[0, 0].max())
+    write(VALUES[0, 0, 1:])
+    with pytest.raises(InvalidVolumeError, match=r"written anew.*open it again"):
+        volume.load()
+    again = pvdi.open_volume(tmp_path / name)
+    np.testing.assert_array_equal(again.load().array, VALUES[0, 0, 1:])
+
+
+def test_what_its_own_process_writes_into_an_hdf5_file_is_read(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["v"] = VALUES[0, 0]
+        volume = pvdi.Volume(file["v"])
+        file["v"][1, 2, 3] = 9999
+        assert volume.finite_range()[1] == 9999
 
 
 def test_what_is_no_store_is_said(tmp_path):

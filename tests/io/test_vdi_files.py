@@ -30,8 +30,7 @@ from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
 from pyvista_vdi.model.packing import channel_differences, colors_of_differences
 
 CODECS = ("lz4", "zstd", "deflate", "none")
-PACKED = ("16-byte", "8-byte")
-PRECISIONS = ("exact", *PACKED)
+PRECISIONS = ("exact", "8-byte")
 ARRAYS = ("counts", "front", "back", "color", "optical_depth")
 VIEW = Camera((0, 0, 0), (0, 0, 1), (0, 1, 0))
 
@@ -161,7 +160,7 @@ def test_compressed_and_packed_files_are_smaller(tmp_path):
         for precision in PRECISIONS:
             path = vdi.save(tmp_path / "a.vdi", precision=precision, compression=codec)
             sizes[codec, precision] = path.stat().st_size
-        assert sizes[codec, "exact"] > sizes[codec, "16-byte"] > sizes[codec, "8-byte"]
+        assert sizes[codec, "exact"] > sizes[codec, "8-byte"]
     assert sizes["zstd", "exact"] < 0.9 * sizes["none", "exact"]
 
 
@@ -306,12 +305,10 @@ def test_permissions_are_the_users_and_kept_and_links_are_followed(tmp_path):
         ("a.vdi", {"compression": "gzip"}, r"must be one of lz4, zstd, deflate and none; got 'gz"),
         ("a.vdi", {"level": 0}, "level must be a whole number from 1 to 9; got 0"),
         ("a.vdi", {"level": "best"}, "level must be a whole number from 1 to 9; got 'best'"),
-        ("a.vdi", {"precision": "half"}, "precision must be one of exact, 16-byte and"),
+        ("a.vdi", {"precision": "half"}, "precision must be .exact. or .8-byte."),
         ("a.vdi", {"exact": True}, "options compression, level, precision; got exact"),
         ("a.exr", {"precision": "8-byte"}, "got precision"),
-        ("a.exr", {"compression": "zstd"}, r"of .*a\.exr must be one of zips and none; got 'zstd'"),
-        ("a.exr", {"level": 0}, "level must be a whole number from 1 to 9; got 0"),
-        ("a.exr", {"color": "half"}, "options compression, level, exact, linear; got color"),
+        ("a.exr", {"compression": "zips"}, "with the options none; got compression"),
         ("a.html", {"compression": "zstd"}, "must be deflate; got 'zstd'"),
         ("a.html", {"exact": True}, "got exact"),
         ("a.html", {"background": (2, 0)}, "background"),
@@ -423,7 +420,7 @@ def test_a_missing_member(name, file):
 
 
 KEYS = "format version window_size n_supersegments camera bounds depth_origin codec chunk_rows"
-PACKED_JUNK = ("exact", "16-byte", 0.0, -0.5, 0.3, 2.0**-200, 2.0**200)
+PACKED_JUNK = ("exact", 0.0, -0.5, 0.3, 2.0**-200, 2.0**200)
 
 
 CASES = [

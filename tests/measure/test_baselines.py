@@ -20,8 +20,7 @@ if not BENCHMARKS.is_dir():
     pytest.skip("the benchmarks are not beside the tests", allow_module_level=True)
 sys.path.insert(0, str(BENCHMARKS))
 
-from baselines.criteria import CRITERIA, cut, cut_at_equal_lengths  # noqa: E402
-from baselines.world_rays import WorldRays  # noqa: E402
+from baselines import CRITERIA, WorldRays, cut, cut_runs  # noqa: E402
 
 #: Largest difference per channel: they cut rays at t in float32, where a short stretch far from
 #: t = 0 has few digits; list space keeps 2e-5 (tests/support/oracle.py).
@@ -66,7 +65,7 @@ def test_an_empty_vdi_is_empty(runtime, way):
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_one_medium_is_cut_into_equal_shares(criterion):
     whole = Segment(2.0, 10.0, np.array([0.2, 0.5, 0.9]), 3.0)
-    found = CRITERIA[criterion]([whole], 8)
+    found = cut_runs([whole], criterion, 8)
     tau = np.array([part.optical_depth for part in found])
     share = {
         "length": np.array([part.back - part.front for part in found]),
@@ -100,5 +99,5 @@ def places(vdi):
 def test_empty_stretches_make_no_supersegment():
     """Two thin media far apart: of ten equal lengths only the two that hold something are left."""
     parts = [Segment(0.0, 1.0, np.ones(3), 1.0), Segment(19.5, 20.0, np.ones(3), 1.0)]
-    found = cut_at_equal_lengths(parts, 10)
+    found = cut_runs(parts, "length", 10)
     assert [(part.front, part.back) for part in found] == [(0.0, 1.0), (19.5, 20.0)]

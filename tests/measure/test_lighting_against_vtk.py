@@ -95,7 +95,7 @@ def coloured(volume):
 )
 def test_pictures_are_those_of_vtk(name, default_runtime):
     pytest.importorskip("pyvista")
-    from pyvista_vdi.measure.vtk_baselines import VTKBaseline
+    from pyvista_vdi.measure.vtk_mappers import VTKMapper
 
     case = CASES[name]
     volume = examples.load_brain(as_volume=True)
@@ -104,10 +104,10 @@ def test_pictures_are_those_of_vtk(name, default_runtime):
     prop = the_property(volume, case)
     camera = filling_camera(volume.bounds, WINDOW)
     turned = camera.azimuth(10)
-    peer = VTKBaseline(volume, prop, WINDOW, "gpu", min(volume.spacing) / 2)
+    peer, step = VTKMapper(volume, prop, WINDOW, "gpu"), min(volume.spacing) / 2
     if "lights" in case:
         put_lights(peer.renderer, case["lights"])
-    from_10_degrees, from_v_o = peer.image(turned), peer.image(camera)
+    from_10_degrees, from_v_o = peer.image(turned, step), peer.image(camera, step)
     looks = {"volume_property": prop, "lights": peer.renderer if "lights" in case else None}
     vdi = api.generate(volume, camera, WINDOW, **looks)
     own = {

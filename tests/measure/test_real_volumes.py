@@ -6,7 +6,6 @@ volumes are checked small on every run.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -14,8 +13,7 @@ import pytest
 from real_data import TEST_WHOLE, require_data
 
 from pyvista_vdi import examples
-from pyvista_vdi.measure.compare import AngleResult, Report, Settings, measure
-from pyvista_vdi.model.metrics import Comparison
+from pyvista_vdi.measure.compare import measure
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 SMALL = (320, 180)
@@ -76,13 +74,13 @@ def looks(transfer_function, interpolation):
 def test_shipped_volumes_small(name, transfer_function, interpolation, default_runtime):
     pytest.importorskip("pyvista")
     volume = examples.load_data(name, as_volume=True)
-    settings = Settings(looks(transfer_function, interpolation), SMALL, repeats=0, vtk=False)
-    report, vdi, _ = measure(volume, settings)
-    at_generating_view, *turned = (result.vdi_to_raycaster for result in report.angles)
-    assert at_generating_view.worst_pixel <= ROUNDING
+    look = looks(transfer_function, interpolation)
+    report, vdi, _ = measure(volume, look, SMALL, repeats=0, vtk=False)
+    at_generating_view, *turned = (view["near"]["vdi_to_raycaster"] for view in report["views"])
+    assert at_generating_view["worst_pixel"] <= ROUNDING
     for found, ssim in zip(turned, MEASURED[name, transfer_function, interpolation], strict=True):
-        assert found.ssim >= ssim - SSIM_MARGIN
-        assert found.mean_brightness_ratio == pytest.approx(1, abs=BRIGHTNESS_TOLERANCE)
+        assert found["ssim"] >= ssim - SSIM_MARGIN
+        assert found["brightness"] == pytest.approx(1, abs=BRIGHTNESS_TOLERANCE)
     assert np.diff(vdi.offsets).max() <= 20
 
 
@@ -100,10 +98,10 @@ def test_shipped_volumes_against_vtk(name, interpolation, default_runtime):
     """The soft transfer function's bounds; measured small: SSIM .9949, PSNR 40.0 dB at least."""
     pytest.importorskip("pyvista")
     volume = examples.load_data(name, as_volume=True)
-    report, _, _ = measure(volume, Settings(looks("soft", interpolation), SMALL, repeats=0))
-    for result in report.angles:
-        assert result.raycaster_to_gpu.ssim >= SSIM_TO_VTK, result.angle
-        assert result.raycaster_to_gpu.psnr >= PSNR_TO_VTK, result.angle
+    report, _, _ = measure(volume, looks("soft", interpolation), SMALL, repeats=0)
+    for view in report["views"]:
+        assert view["near"]["raycaster_to_gpu"]["ssim"] >= SSIM_TO_VTK, view["angle"]
+        assert view["near"]["raycaster_to_gpu"]["psnr"] >= PSNR_TO_VTK, view["angle"]
 
 
 #: Bounds that are known to be missed, and why (docs/accuracy.md): vessels and noise thinner than a
@@ -118,36 +116,36 @@ TOO_THIN = {
 
 def missed_by_the_vdi(report, name, transfer_function):
     """Return what is beyond its bound, of V_O, 5 and 30 degrees."""
-    at_v_o, *turned = (result.vdi_to_raycaster for result in report.angles)
-    if not (at_v_o.ssim >= AT_V_O[0] and at_v_o.worst_pixel <= AT_V_O[1]):
+    at_v_o, *turned = (view["near"]["vdi_to_raycaster"] for view in report["views"])
+    if not (at_v_o["ssim"] >= AT_V_O[0] and at_v_o["worst_pixel"] <= AT_V_O[1]):
         yield at_v_o
     bounds = BINARY_SOLID.get(name, FROM_NEW_VIEWS[transfer_function])
     for found, ssim in zip(turned, bounds, strict=True):
-        if not (
-            found.ssim >= ssim and abs(found.mean_brightness_ratio - 1) <= BRIGHTNESS_TOLERANCE
-        ):
+        if not (found["ssim"] >= ssim and abs(found["brightness"] - 1) <= BRIGHTNESS_TOLERANCE):
             yield found
 
 
 def missed_against_vtk(report, transfer_function):
     """Return the comparisons with VTK's GPU mapper that are beyond their bounds."""
-    for result in report.angles:
-        ours, theirs = result.raycaster_to_gpu, result.fixed_point_to_gpu
+    for view in report["views"]:
+        ours, theirs = (view["near"][f"{name}_to_gpu"] for name in ("raycaster", "fixed_point"))
         ssim, psnr = SSIM_TO_VTK, PSNR_TO_VTK
         if transfer_function != "soft":
-            ssim = 1 - FACTOR_OF_VTK * (1 - theirs.ssim)
-            psnr = theirs.psnr - 20 * np.log10(FACTOR_OF_VTK)
-        if not (ours.ssim >= ssim and ours.psnr >= psnr):
+            ssim = 1 - FACTOR_OF_VTK * (1 - theirs["ssim"])
+            psnr = theirs["psnr"] - 20 * np.log10(FACTOR_OF_VTK)
+        if not (ours["ssim"] >= ssim and ours["psnr"] >= psnr):
             yield ours
 
 
 def test_bounds_are_those_of_a_case_and_a_missed_one_is_seen():
     def report(ssim, psnr=60.0, brightness=1.0, theirs=1.0):
-        near = Comparison(ssim, psnr, 0.0, (0, 0), brightness)
-        vtk = Comparison(theirs, 40.0, 0.0, (0, 0), 1.0)
-        exact = Comparison(1.0, 60.0, 0.0, (0, 0), 1.0)
-        views = (AngleResult(angle, exact, exact, vtk, {}) for angle in (0.0, 5.0))
-        return Report({}, {}, {}, None, None, [*views, AngleResult(30.0, near, near, vtk, {})])
+        def view(ssim=1.0, psnr=60.0, brightness=1.0):
+            ours = {"ssim": ssim, "psnr": psnr, "worst_pixel": 0.0, "brightness": brightness}
+            vtk = {"ssim": theirs, "psnr": 40.0}
+            names = ("vdi_to_raycaster", "raycaster_to_gpu")
+            return {"near": {**dict.fromkeys(names, ours), "fixed_point_to_gpu": vtk}}
+
+        return {"views": [view(), view(), view(ssim, psnr, brightness)]}
 
     for name, look, bound in (
         *(("brain", "soft", 0.97), ("brain", "steep", 0.97)),
@@ -199,12 +197,12 @@ def standard_cases():
 def test_standard_table(name, transfer_function, interpolation, default_runtime):
     pytest.importorskip("pyvista")
     volume = require_data(name)
-    settings = Settings(looks(transfer_function, interpolation), repeats=0)
-    report, _, _ = measure(volume, settings)
-    assert [result.angle for result in report.angles] == [0, 5, 30]
+    look = looks(transfer_function, interpolation)
+    report, _, _ = measure(volume, look, repeats=0)
+    assert [view["angle"] for view in report["views"]] == [0, 5, 30]
     missed = list(missed_by_the_vdi(report, name, transfer_function))
     if list(missed_against_vtk(report, transfer_function)):
         finer = min(volume.spacing) / CONVERGED_STEPS
-        report, _, _ = measure(volume, replace(settings, sample_distance=finer))
+        report, _, _ = measure(volume, look, repeats=0, sample_distance=finer)
         missed += missed_against_vtk(report, transfer_function)
     assert not missed

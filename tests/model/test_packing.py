@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import render_first_hits, render_vdi
 from extreme_scenes import slabs_vdi
@@ -11,11 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import assert_explained, total
 
-from pyvista_vdi import VDI, Camera, reference, render
-from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, Packed16, gaps_and_thicknesses, packed_8
+from pyvista_vdi import VDI, Camera, render
+from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, gaps_and_thicknesses, packed_8
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
-PACKED = ("16-byte", "8-byte")
 BOUNDS = (-1, 1, -1, 1, -1, 1)
 CAMERA = Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))
 
@@ -74,12 +74,12 @@ def quanta(packed, counts):
 
 
 @settings(max_examples=60)
-@given(strategies.GENERATORS, st.sampled_from(PACKED))
-def test_packing_keeps_the_rules_of_any_vdi(rng, precision):
+@given(strategies.GENERATORS)
+def test_packing_keeps_the_rules_of_any_vdi(rng):
     vdi = hard_vdi(rng)
-    packed = vdi.with_precision(precision)  # a VDI is checked when it is made
-    assert packed.precision == precision
-    assert packed.with_precision(precision) is packed
+    packed = vdi.with_precision("8-byte")  # a VDI is checked when it is made
+    assert packed.precision == "8-byte"
+    assert packed.with_precision("8-byte") is packed
     assert packed.with_precision("exact").equals(packed)
     assert packed.offsets is vdi.offsets or np.array_equal(packed.offsets, vdi.offsets)
     # What touches still does
@@ -123,17 +123,6 @@ def test_the_8_byte_form_is_within_its_bounds(rng):
     assert np.abs(form.color - vdi.color).max(initial=0) <= 1 / 510 + 1e-7
 
 
-@given(strategies.GENERATORS)
-def test_the_16_byte_form_loses_colour_alone(rng):
-    vdi = hard_vdi(rng)
-    form = vdi.with_precision("16-byte")
-    assert isinstance(form.packing, Packed16)
-    for name in ("front", "back", "optical_depth"):
-        assert np.array_equal(getattr(form, name), getattr(vdi, name))
-    error = np.abs(form.color - vdi.color).max(axis=0, initial=0)
-    assert (error <= np.array([1 / 4094, 1 / 4094, 1 / 2046]) + 1e-7).all()
-
-
 @given(strategies.GENERATORS, st.integers(1, 50))
 def test_gaps_and_thicknesses_give_the_codes_back(rng, rows):
     vdi = hard_vdi(rng).with_precision("8-byte")
@@ -174,17 +163,16 @@ def test_long_lists_and_one_ulp_each(count):
 
 
 @pytest.mark.every(11)
-@pytest.mark.parametrize("precision", PACKED)
 @pytest.mark.parametrize("kind", strategies.VIEWS)
 @pytest.mark.parametrize("dealt", strategies.DEALT)
-def test_every_pixel_is_that_of_the_unpacked_vdi(runtime, monkeypatch, dealt, precision, kind):
+def test_every_pixel_is_that_of_the_unpacked_vdi(runtime, monkeypatch, dealt, kind):
     """Random VDIs against the oracle of what the packed form holds."""
     strategies.deal_rays(monkeypatch, runtime, dealt)
     parts = []
     for case in range(4):
         seed = [case, strategies.VIEWS.index(kind), 8]
         rng = np.random.default_rng(seed)
-        vdi = strategies.random_vdi(rng).with_precision(precision)
+        vdi = strategies.random_vdi(rng).with_precision("8-byte")
         camera, size = strategies.random_view(rng, vdi, kind)
         image = render_vdi(vdi, camera, size, device=runtime)
         parts.append(assert_explained(vdi, camera, size, image, name=f"seed {seed}, {kind}"))
@@ -192,12 +180,11 @@ def test_every_pixel_is_that_of_the_unpacked_vdi(runtime, monkeypatch, dealt, pr
 
 
 @pytest.mark.every(5)
-@pytest.mark.parametrize("precision", PACKED)
 @pytest.mark.parametrize("kind", ["near", "beside", "parallel", "inside"])
-def test_every_mode_draws_as_with_the_unpacked_vdi(runtime, precision, kind):
+def test_every_mode_draws_as_with_the_unpacked_vdi(runtime, kind):
     """Skipping, previews and first hits; extinctions are rounded otherwise, by 4 roundings."""
     rng = np.random.default_rng([strategies.VIEWS.index(kind), 9])
-    packed = strategies.random_vdi(rng, max_window=(40, 40)).with_precision(precision)
+    packed = strategies.random_vdi(rng, max_window=(40, 40)).with_precision("8-byte")
     exact = packed.with_precision("exact")
     camera, size = strategies.random_view(rng, packed, kind)
     for options in ({"skip_empty": False}, {"skip_empty": True}, {"preview_samples": 50}):
@@ -208,12 +195,11 @@ def test_every_mode_draws_as_with_the_unpacked_vdi(runtime, precision, kind):
     assert same.all()
 
 
-@pytest.mark.parametrize("precision", PACKED)
-def test_packed_and_exact_vdis_are_merged(runtime, precision):
+def test_packed_and_exact_vdis_are_merged(runtime):
     rng = np.random.default_rng(4)
     bounds = strategies.random_bounds(rng)
     pair = [strategies.random_vdi(rng, bounds=bounds) for _ in range(2)]
-    pair[0] = pair[0].with_precision(precision)
+    pair[0] = pair[0].with_precision("8-byte")
     view = strategies.camera_around(rng, bounds, np.eye(4), parallel=False)
     images = [
         render([first, pair[1]], view, (16, 12), device=runtime)
@@ -223,11 +209,10 @@ def test_packed_and_exact_vdis_are_merged(runtime, precision):
     assert np.abs(images[0] - images[1]).max() <= 2e-5
 
 
-@pytest.mark.parametrize("precision", PACKED)
-def test_nothing_and_faces_on_the_eye_s_plane(runtime, precision):
+def test_nothing_and_faces_on_the_eye_s_plane(runtime):
     camera = Camera((0, 0, 0), (0, 0, 1), (0, 1, 0), view_angle=60)
     for faces in ([], [(0, 1), (1, 2)]):
-        vdi = slabs_vdi(camera, faces, 1.0, bounds=(-2, 2, -2, 2, 0, 2)).with_precision(precision)
+        vdi = slabs_vdi(camera, faces, 1.0, bounds=(-2, 2, -2, 2, 0, 2)).with_precision("8-byte")
         image = render_vdi(vdi, camera, (5, 5), device=runtime)
         assert np.abs(image - reference.render(vdi, camera, (5, 5))).max() <= 2e-5
         assert image.any() == bool(faces)
@@ -237,12 +222,11 @@ def test_what_the_forms_take_on_a_device(runtime):
     rng = np.random.default_rng(3)
     vdi = strategies.random_vdi(rng, max_window=(24, 18))
     n, lists, occupied = vdi.n_supersegments, vdi.counts.size, np.count_nonzero(vdi.counts)
-    taken = {p: PreparedVDI(runtime, vdi.with_precision(p)).list_bytes for p in ("exact", *PACKED)}
+    taken = {p: PreparedVDI(runtime, vdi.with_precision(p)).list_bytes for p in ("exact", "8-byte")}
     # Lists of 2 x 2 are as long as the longest of them, and begin with 8 bytes
     height, width = vdi.counts.shape
     padded = np.pad(vdi.counts, ((0, height % 2), (0, width % 2)))
     longest = np.maximum.reduce([padded[y::2, x::2] for y in (0, 1) for x in (0, 1)])
     entries = 4 * longest.sum()
     assert taken["exact"] == 8 * longest.size + 24 * entries
-    assert taken["16-byte"] == 8 * longest.size + 16 * entries
     assert taken["8-byte"] == 4 * (lists + 1) + 8 * n + 16 * occupied

@@ -125,7 +125,7 @@ def test_what_values_cannot_honour_is_refused(default_runtime, plotter, asked, e
 def test_it_is_refused_before_anything_is_generated(
     default_runtime, plotter, monkeypatch, asked, says
 ):
-    monkeypatch.setattr("pyvista_vdi.plotting.adding.generate_deferred", None)
+    monkeypatch.setattr("pyvista_vdi.generation.deferred.generate_vdi", None)
     with pytest.raises(UnsupportedError, match=says):
         plotter.add_vdi(volume(), classification="deferred", **asked)
 

@@ -53,7 +53,7 @@ def test_without_a_dial_nothing_is_chosen(plotter):
 
 
 def test_precision_and_limits_reach_the_vdi(plotter):
-    assert shown(plotter, precision="16-byte").vdi.precision == "16-byte"
+    assert shown(plotter, precision="8-byte").vdi.precision == "8-byte"
     with pytest.warns(VDIWarning, match=r"1e\+09 full frames per second cannot be reached"):
         actor = shown(plotter, full_fps=1e9, name="fast")
     assert actor.vdi.metadata["max_supersegments"] == LADDER[0].max_supersegments

@@ -21,10 +21,7 @@ from pyvista.plotting.plotter import _ALL_PLOTTERS
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.plotting.add_transfer_function_editor import (
-    AddTransferFunctionEditor,
-    RemoveTransferFunctionEditor,
-)
+from pyvista_vdi.plotting.add_transfer_function_editor import AddTransferFunctionEditor
 from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
 from pyvista_vdi.plotting.component import AddVDI
 from pyvista_vdi.plotting.pages import PlotterVDIs
@@ -174,7 +171,6 @@ def test_help_is_the_method_s_and_what_is_promised_is_there(plotter):
         "add_vdi": AddVDI,
         "add_vdi_clip_plane": AddVDIClipPlane,
         "add_transfer_function_editor": AddTransferFunctionEditor,
-        "remove_transfer_function_editor": RemoveTransferFunctionEditor,
         "vdi": PlotterVDIs,
     }
     assert pvdi.Plotter.__annotations__ == {name: kind.__name__ for name, kind in kinds.items()}

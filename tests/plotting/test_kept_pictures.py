@@ -46,7 +46,6 @@ def film(angles, **options):
 
 def test_one_picture_makes_no_vdi_and_actor_vdi_makes_that_of_its_view(plotter):
     actor = plotter.add_vdi(soft_ball(), **LOOKS)
-    assert actor.vdi is None
     plotter.camera_position = VIEW
     shown(plotter)
     assert (actor.status.drawn, actor.status.generation, actor.status.vdi) == ("volume", 0, None)

@@ -176,7 +176,8 @@ def test_parts_of_an_assembly_are_drawn(kind, how):
         if add is add_nothing:
             return
         if how == "two":
-            parts[1].user_matrix = pv.Transform().translate(0.5, 1.2, 0).matrix
+            # In front of the other one: VTK blends volumes in the order of adding
+            parts[1].user_matrix = pv.Transform().translate(1.5, 1.4, 1.1).matrix
         assembly = kind()
         for part in parts:
             plotter.remove_actor(part, render=False)

@@ -245,7 +245,7 @@ def test_reference_is_what_is_made_without_a_dial(runtime):
     assert reference.metadata == plain.metadata
     assert "dial" not in plain.metadata
     assert describe(plain.metadata) is None
-    for precision in ("exact", "16-byte", "8-byte"):
+    for precision in ("exact", "8-byte"):
         packed = generated(runtime, precision=precision)
         assert packed.precision == precision
         assert packed.equals(plain.with_precision(precision))

@@ -13,12 +13,12 @@ import strategies
 from drawing import generate_vdi, pick_vdi, raycast_volume, render_first_hits, render_vdi
 from oracle import assert_explained, total
 from ray_scenes import random_cropping, random_ends, random_planes
+from reference.raycast import clip, inside_box, kept_parts, pixel_ray
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.cropping import PRESETS, Cropping
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.reference.raycast import clip, inside_box, kept_parts, pixel_ray
 
 in_two_ways = pytest.mark.parametrize("dealt", ["one by one", "blocks"], indirect=True)
 

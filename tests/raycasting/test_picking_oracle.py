@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from ray_scenes import random_ends
+from reference import raycast as oracle
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import reference
-from pyvista_vdi.reference import raycast as oracle
 
 #: All but the view at half size, in which every ray runs along borders: which of two lists is met
 #: is then a matter of rounding.

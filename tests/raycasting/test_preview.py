@@ -8,10 +8,10 @@ import strategies
 from drawing import render_vdi
 from extreme_scenes import slabs_vdi
 from ray_scenes import rebuilt
+from reference.raycast import centre_ray_scale
 
 from pyvista_vdi import Camera
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.reference.raycast import centre_ray_scale
 
 BOUNDS = (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 COLOR = np.array([0.8, 0.5, 0.2])

@@ -8,9 +8,10 @@ import strategies
 from extreme_scenes import slabs_vdi
 from ray_scenes import rebuilt
 
-from pyvista_vdi import Camera, InvalidArgumentError, reference
+import reference
+from pyvista_vdi import Camera, InvalidArgumentError
 from pyvista_vdi.model.compositing import Segment, composite, split
-from pyvista_vdi.reference.raycast import centre_ray_scale, near_limit
+from reference.raycast import centre_ray_scale, near_limit
 
 #: Float64 rounding, grown by a few hundred operations and by media as thin as 1e-3 of the depth.
 EXACT = 1e-9

@@ -1,58 +1,62 @@
-"""Deep images as other programs write or change them."""
+"""Deep images as other programs write or change them, by the package OpenEXR."""
 
 from __future__ import annotations
 
-import struct
+from typing import Any, NamedTuple
 
 import numpy as np
+import OpenEXR
 
-from pyvista_vdi.extensions.deep_exr import layout
-from pyvista_vdi.extensions.deep_exr.record import ATTRIBUTE
 from pyvista_vdi.extensions.deep_exr.view import view_matrices
 
 MATRICES = ("worldToCamera", "worldToNDC")
 
 
-def read_deep(path):
-    return layout.read_image(path, lambda name: True)
+class Deep(NamedTuple):
+    """An image: all samples of its pixels, the bottom row first."""
+
+    header: dict[str, Any]
+    counts: np.ndarray  # samples of each pixel, (H, W)
+    channels: dict[str, np.ndarray]
 
 
-def matrices_of(view, size, depth_offset=0.0):
-    return dict(zip(MATRICES, view_matrices(view, size, depth_offset), strict=True))
+def read_deep(path, part=0):
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        header, arrays = dict(file.parts[part].header), {}
+        for name, channel in file.parts[part].channels.items():
+            arrays[name] = channel.pixels[::-1].ravel()
+        shape = channel.pixels.shape
+    counts = [0 if samples is None else len(samples) for samples in arrays["Z"]]
+    kept = {name: [s for s in each if s is not None] for name, each in arrays.items()}
+    channels = {name: np.concatenate([np.empty(0, "f2"), *each]) for name, each in kept.items()}
+    return Deep(header, np.reshape(counts, shape), channels)
 
 
-def write_deep(path, counts, channels, attributes, compression="zips"):
-    """Write a deep image.
+def matrices_of(view, size):
+    return view_matrices(view, size, 0.0)
 
-    ``attributes`` are text, matrices for column vectors, or an OpenEXR type and its bytes.
-    """
-    header = {
-        "screenWindowCenter": ("v2f", bytes(8)),
-        "screenWindowWidth": ("float", struct.pack("<f", 1)),
+
+def part_of(counts, channels, header, compression="ZIPS"):
+    """Return a part of a file."""
+    pixels = {}
+    for name, array in channels.items():
+        pixels[name] = np.empty(counts.size, object)
+        pixels[name][:] = np.split(array, np.cumsum(counts.ravel())[:-1])
+        pixels[name] = np.ascontiguousarray(pixels[name].reshape(counts.shape)[::-1])
+    kind = {
+        "type": OpenEXR.deepscanline,
+        "compression": getattr(OpenEXR, f"{compression}_COMPRESSION"),
     }
-    for name, value in attributes.items():
-        if isinstance(value, np.ndarray):
-            header[name] = layout.matrix_attribute(value)
-        else:
-            header[name] = ("string", value.encode()) if isinstance(value, str) else value
-    with path.open("wb") as stream:
-        layout.write_image(
-            stream,
-            counts,
-            {name: array.dtype for name, array in channels.items()},
-            lambda first, last: {name: array[first:last] for name, array in channels.items()},
-            header,
-            compression=compression,
-            level=1,
-        )
+    return OpenEXR.Part(kind | header, pixels, "deep")
+
+
+def write_deep(path, counts, channels, header, compression="ZIPS"):
+    OpenEXR.File([part_of(counts, channels, header, compression)]).write(str(path))
     return path
 
 
-def change(path, **changes):
-    """Write a deep image of ours again with other channels, matrices or description."""
+def change(path, header=None, **channels):
+    """Write a deep image of ours again with other channels, or attributes of the header."""
     image = read_deep(path)
-    channels = {name: changes.get(name, array) for name, array in image.channels.items()}
-    kept = {ATTRIBUTE: image.attributes[ATTRIBUTE]}
-    kept |= {name: image.attributes[name].T for name in MATRICES}
-    attributes = {name: changes.get(name, value) for name, value in kept.items()}
-    return write_deep(path, image.counts, channels, attributes, "none")
+    kept = {n: image.header[n] for n in (*MATRICES, "pyvistaVDI", "software")}
+    return write_deep(path, image.counts, image.channels | channels, kept | (header or {}))

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 from oracle import explain
 from sampling_uncertainty import uncertainties
 
-from pyvista_vdi import VDI, Camera, TransferFunction, Volume, reference
+from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 
 #: Odd, so that what is thinner than a pixel and lies in the middle is seen.
 WINDOW = (9, 7)

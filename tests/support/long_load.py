@@ -1,6 +1,6 @@
 """Thousands of frames of a plotter that is used as people use it, and what they leave behind.
 
-    python tests/support/long_load.py --frames 10000 --json long_load.json
+    PYTHONPATH=tests python tests/support/long_load.py --frames 10000 --json long_load.json
 
 Random views; windows that are resized; transfer functions that are edited; regenerations, in the
 frame and in the background between previews; volumes that come and go. Memory of the process and of
@@ -23,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 import pyvista as pv
+import reference
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import reference
 from pyvista_vdi.device import get_runtime
 
 #: Largest error that a channel may have beyond the oracle's range (docs/conventions.md).

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import signal
 import sys
 from pathlib import Path
@@ -13,11 +12,8 @@ from mpi4py import MPI
 
 from pyvista_vdi import TransferFunction
 from pyvista_vdi.errors import (
-    Cancelled,
-    DeviceError,
     InvalidArgumentError,
     NoDeviceError,
-    UnsupportedError,
     VDIError,
     VDIFileError,
 )
@@ -152,115 +148,6 @@ def mistakes(folder, every=4):
             writer(**showing)
     signal.alarm(0)
 
-
-def pipeline(folder):
-    """VTK's pipeline with a part of the volume on each rank, as in a parallel server."""
-    signal.alarm(200)
-    from pyvista_vdi.extensions.large import vtk_ranks as ranks
-    from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, announce
-    from pyvista_vdi.vtk_pipeline.filters.files import VDIWriter
-    from pyvista_vdi.vtk_pipeline.vtk import (
-        VTK_FLOAT,
-        VTK_UNSIGNED_CHAR,
-        vtkImageData,
-        vtkPolyData,
-        vtkStreamingDemandDrivenPipeline,
-        vtkVolumeProperty,
-    )
-
-    # VTK's own controller is not of MPI in every build
-    ranks.communicator, ranks.are_several = lambda: COMM, lambda: True
-    camera = VIEWS["all of it"](volume_of("uint8"))
-    last = COMM.size - 1
-
-    class Reader(Algorithm):
-        """Gives a volume, or what a reader gives whose file is missing."""
-
-        fails = None
-
-        def __init__(self):
-            super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
-
-        def RequestInformation(self, request, inputs, outputs):
-            announce(outputs, (16, 16), (VTK_FLOAT, 1))
-            extent = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
-            outputs.GetInformationObject(0).Set(extent, (0, 15) * 3, 6)
-            return int(self.fails != "information")
-
-        def RequestData(self, request, inputs, outputs):
-            image = vtkImageData.GetData(outputs, 0)
-            image.SetDimensions(16, 16, 16)
-            image.AllocateScalars(VTK_FLOAT, 1)
-            image.GetPointData().GetScalars().Fill(1)
-            return int(self.fails != "data")
-
-    def source(skipped=None, points=16, kind=VTK_FLOAT, fails=None, data=None):
-        image, made = vtkImageData(), ranks.RanksVDISource()
-        image.SetDimensions(points, 16, 16)
-        if skipped != "scalars":
-            image.AllocateScalars(kind, 1)
-            image.GetPointData().GetScalars().Fill(1)
-        if fails is not None:
-            reader = Reader()
-            reader.fails = fails
-            made.SetInputConnection(reader.GetOutputPort())
-        elif skipped != "input":
-            made.SetInputDataObject(image if data is None else data)
-        settings = {"Camera": camera, "WindowSize": (8, 6), "VolumeProperty": vtkVolumeProperty()}
-        for name, value in settings.items():
-            if name != skipped:
-                getattr(made, f"Set{name}")(value)
-        return made
-
-    assert source().GetVDI().window_size == (8, 6)
-    assert source(fails="no").GetVDI().window_size == (8, 6)
-    for change, asked_by in itertools.product(
-        (
-            {"skipped": "Camera"},
-            {"skipped": "WindowSize"},
-            {"skipped": "VolumeProperty"},
-            {"skipped": "scalars"},
-            {"skipped": "input"},
-            {"kind": VTK_UNSIGNED_CHAR},
-            {"points": 12},
-            {"data": vtkPolyData()},
-            {"data": "x"},
-            {"fails": "information"},
-            {"fails": "data"},
-        ),
-        ("Python", "VTK"),
-    ):
-        if asked_by == "VTK" and "fails" in change:
-            continue  # VTK tells nobody
-        made = source(**(change if COMM.rank == last else {}))
-        for _ in range(1 if "fails" in change else 2):  # VTK asks no reader again that has failed
-            if asked_by == "VTK":
-                writer = VDIWriter()
-                writer.SetInputConnection(made.GetOutputPort())
-                writer.SetFileName(str(folder / f"{COMM.rank}.vdi"))
-                with pytest.raises(VDIError):
-                    writer.Write()
-                continue
-            with pytest.raises(VDIError) as caught:
-                made.GetVDI()
-            assert not isinstance(caught.value, DeviceError), (change, caught.value)
-            if "kind" not in change:
-                assert f"rank {last}" in str(caught.value), (change, caught.value)
-    # One that is right again makes all right again
-    made = source(**({"data": vtkPolyData()} if COMM.rank == last else {}))
-    with pytest.raises(UnsupportedError, match=f"1 of {COMM.size} ranks; rank {last}: .*PolyData"):
-        made.Update()
-    made.SetInputDataObject(source().GetInputDataObject(0, 0))
-    assert made.GetVDI().window_size == (8, 6)
-    # What one rank takes of it, the others need not know
-    assert COMM.rank or made.GetVDI().window_size == (8, 6)
-    # Stopped on one rank, it stops on all, once
-    made.Modified()
-    if COMM.rank == last:
-        made.SetAbortExecute(1)
-    with pytest.raises(Cancelled):
-        made.Update()
-    assert made.GetVDI().window_size == (8, 6)
     signal.alarm(0)
 
 
@@ -302,7 +189,6 @@ if __name__ == "__main__":
             "failing": failing,
             "mistakes": mistakes,
             "all_mistakes": all_mistakes,
-            "pipeline": pipeline,
             "series": series,
             "deferred": deferred,
         }[case](Path(sys.argv[2]))

@@ -2,7 +2,7 @@
 
 Every channel of every pixel lies within 2e-5 of the range over the ray moved by the roundings of
 list coordinates (docs/conventions.md; the number of roundings is derived in
-``pyvista_vdi.reference.ranges``). 2e-5 is 336 unit roundoffs of float32: a ray in these tests
+``reference.ranges``). 2e-5 is 336 unit roundoffs of float32: a ray in these tests
 composites up to about 100 supersegments, each with three roundings that reach the image, and the
 raycaster may drop what lies behind a transmittance of 1e-6.
 """
@@ -12,8 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-
-from pyvista_vdi import reference
+import reference
 
 #: Largest difference per channel; see above.
 TOLERANCE = 2e-5

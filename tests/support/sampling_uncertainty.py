@@ -6,10 +6,9 @@ import itertools
 
 import numpy as np
 import strategies
-
-from pyvista_vdi.reference.generate import medium_at, near_depth
-from pyvista_vdi.reference.ranges import ROUNDOFF
-from pyvista_vdi.reference.raycast import pixel_ray
+from reference.generate import medium_at, near_depth
+from reference.ranges import ROUNDOFF
+from reference.raycast import pixel_ray
 
 #: Roundings of a grid coordinate: six coefficients and five multiply-adds in the pixel's position
 #: and in depth, and depth's own four (entry, step number, step length, sum).

@@ -25,8 +25,6 @@ class WebClient:
         self._folder, self._headers = folder, headers
         self.messages = []
         self.head, self.parts = None, []  # of the VDI that comes, or came last
-        self.said = 0  # messages
-        self._picture = None  # head of the picture that the next bytes are
 
     async def __aenter__(self):
         self._session = aiohttp.ClientSession()
@@ -48,31 +46,22 @@ class WebClient:
         await self._session.close()
 
     async def say(self, kind, **entries):
-        self.said += 1
         await self.socket.send_str(json.dumps({"type": kind, **entries}))
 
-    async def look_from(self, camera, size, *, moving=False):
+    async def look_from(self, camera, size):
         names = ["position", "focal_point", "view_up"]
         names.append("parallel_scale" if camera.parallel_projection else "view_angle")
         state = {name: getattr(camera, name) for name in names}
-        await self.say("view", camera=state, size=size, moving=moving)
+        await self.say("view", camera=state, size=size)
 
     async def receive(self):
-        """Return the next message: a dictionary, bytes, or the end's code.
-
-        A picture is its head and its bytes, as one.
-        """
+        """Return the next message: a dictionary, bytes, or the end's code."""
         message = await asyncio.wait_for(self.socket.receive(), PATIENCE)
         if message.type is aiohttp.WSMsgType.TEXT:
             self.messages.append(json.loads(message.data))
             if self.messages[-1]["type"] == "vdi":
                 self.head, self.parts = self.messages[-1], []
-            if self.messages[-1]["type"] == "picture" and self.messages[-1]["bytes"]:
-                self._picture = self.messages[-1]
             return self.messages[-1]
-        if message.type is aiohttp.WSMsgType.BINARY and self._picture is not None:
-            head, self._picture = self._picture, None
-            return head, message.data
         if message.type is aiohttp.WSMsgType.BINARY:
             self.parts.append(message.data)
             return message.data
@@ -99,22 +88,12 @@ class WebClient:
             if isinstance(found, bytes) and self.is_whole:
                 return self.head, b"".join(self.parts)
 
-    async def picture(self):
-        """Return the head and the image file of the next picture of a view at rest."""
-        while True:
-            found = await self.receive()
-            assert not isinstance(found, int), f"the server has ended the connection: {found}"
-            if isinstance(found, tuple):
-                return found
-
-    async def vdi(self, level=None):
-        """Return the next VDI (of a level) as it was read from its file."""
-        while True:
-            head, file = await self.file()
-            if level in (None, head["level"]):
-                path = self._folder / "received.vdi"
-                path.write_bytes(file)
-                return pvdi.read(path)
+    async def vdi(self):
+        """Return the next VDI as it was read from its file."""
+        _, file = await self.file()
+        path = self._folder / "received.vdi"
+        path.write_bytes(file)
+        return pvdi.read(path)
 
     async def idle(self):
         """Wait until the server has done something for this client, and has nothing more to do."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
+from reference.generate import node_occlusion
 from runtimes import let_lack
 from scipy.interpolate import RegularGridInterpolator
 
@@ -15,11 +17,9 @@ from pyvista_vdi import (
     Shading,
     TransferFunction,
     Volume,
-    reference,
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.reference.generate import node_occlusion
 from pyvista_vdi.volume import classified_volume as device_volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.upload import uploads_of

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 from drawing import generate_chunked, generate_vdi, raycast_volume
 from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
-from pyvista_vdi import AmbientOcclusion, InvalidVolumeError, Volume, reference, render_volume
+from pyvista_vdi import AmbientOcclusion, InvalidVolumeError, Volume, render_volume
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.chunked import ChunkedArray
 

@@ -7,8 +7,10 @@ from dataclasses import replace
 import march_ways
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
+from reference.generate import medium_at
 
 from pyvista_vdi import (
     Light,
@@ -16,10 +18,8 @@ from pyvista_vdi import (
     Shading,
     TransferFunction,
     Volume,
-    reference,
 )
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.reference.generate import medium_at
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import Variant
 

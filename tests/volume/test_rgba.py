@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 
-from pyvista_vdi import InvalidVolumeError, Shading, TransferFunction, Volume, reference
+from pyvista_vdi import InvalidVolumeError, Shading, TransferFunction, Volume
 
 WINDOW = (7, 6)
 

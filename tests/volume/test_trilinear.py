@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import reference
 import strategies
 from drawing import raycast_volume
+from reference.generate import classify, medium_at
 
-from pyvista_vdi import reference
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.reference.generate import classify, medium_at
 
 SHAPE = (5, 6, 7)  # z, y, x
 TOP = np.prod(np.array(SHAPE) - 1.0)

@@ -101,15 +101,3 @@ def test_what_draws_colours_refuses_values_by_name(default_runtime):
     )
     with pytest.raises(InvalidVDIError, match="version 9"):
         vdi_from_image(image)
-
-
-def test_several_ranks_refuse_values_by_name(default_runtime, monkeypatch):
-    ranks = pytest.importorskip("pyvista_vdi.extensions.large.vtk_ranks")
-    keeping = ranks.RanksVDISource()
-    keeping.TakeSettings(source())
-    keeping.SetInputDataObject(soft_ball(12))
-    assert keeping.GetVDI().equals(source().GetVDI())
-    request = keeping.GetCurrentRequest()
-    monkeypatch.setattr(ranks, "communicator", lambda: "of several")
-    with pytest.raises(UnsupportedError, match="one rank"):
-        keeping.MakeVDI(request)

@@ -8,8 +8,8 @@ import pyvista as pv
 from plugin_scenes import LOOKS, opaque_sphere, shown, soft_ball
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.vtk_pipeline.drawing import driver, images
 from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
+from pyvista_vdi.vtk_pipeline.drawing import images
 from pyvista_vdi.vtk_pipeline.drawing import texture as texture_module
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkTextureObject
@@ -89,14 +89,6 @@ def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
     plotter.render_window.Render()
     plotter.render()
     assert counts == before
-
-
-def test_the_volumes_of_the_scene_are_looked_for_once_a_frame(plotter, monkeypatch):
-    plotter.show(auto_close=False)
-    found = Counts()
-    found.watch(monkeypatch, driver, "volumes")
-    plotter.render()
-    assert found == {"volumes": 1}
 
 
 def test_what_moves_allocates_nothing(plotter, counts):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import subprocess
 import sys
 
@@ -18,7 +19,8 @@ def drawn(frames, folder):
     """Draw frames in a process of its own: nothing that other tests let go of is in its memory."""
     path = folder / "long_load.json"
     command = [sys.executable, long_load.__file__, "--frames", str(frames), "--json", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}  # where the reference is
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=env)
     assert path.is_file(), done.stderr
     found = json.loads(path.read_text())
     samples = {name: [Sample(**each) for each in found[name]] for name in ("samples", "between")}

@@ -21,7 +21,12 @@ from watched_windows import on_screen
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.drawing import overlap
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
-from pyvista_vdi.vtk_pipeline.vtk import vtkMultiVolume, vtkOpenGLGPUVolumeRayCastMapper, vtkVolume
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkAssembly,
+    vtkMultiVolume,
+    vtkOpenGLGPUVolumeRayCastMapper,
+    vtkVolume,
+)
 
 pytestmark = pytest.mark.gl
 
@@ -88,6 +93,18 @@ def one_cropped(plotter, actors):
     actors[1].mapper.CroppingOn()
 
 
+def one_inverted(plotter, actors):
+    actors[1].mapper.SetFinalColorWindow(-1.0)
+
+
+def one_in_an_assembly(plotter, actors):
+    plotter.remove_actor(actors[1], render=False)
+    actors[1].user_matrix, assembly = np.eye(4), vtkAssembly()
+    assembly.AddPart(actors[1])
+    assembly.SetPosition(BALLS[1][1])
+    plotter.add_actor(assembly, reset_camera=False)
+
+
 def eye_in_both(plotter, actors):
     plotter.camera_position = ((0.8, 0.3, 0.2), (-1.0, 0.0, -0.2), (0, 0, 1))
     plotter.renderer.ResetCameraClippingRange()
@@ -112,7 +129,10 @@ def sheared(plotter, actors):
 @pytest.mark.filterwarnings("ignore:coverage='bounds'")
 @pytest.mark.parametrize(
     "scene",
-    [meshes, one_cropped, eye_in_both, anti_aliased, right_eye, sheared],
+    [
+        *(meshes, one_cropped, one_inverted, one_in_an_assembly),
+        *(eye_in_both, anti_aliased, right_eye, sheared),
+    ],
     ids=lambda scene: scene.__name__,
 )
 def test_the_order_of_adding_changes_nothing(scene, raycasts):
@@ -121,6 +141,19 @@ def test_the_order_of_adding_changes_nothing(scene, raycasts):
     assert np.array_equal(first, second)
     alone = draw((1,), lambda plotter, actors: scene(plotter, {0: None, **actors}))
     assert np.abs(first - alone).max() > 40  # the other one is there
+
+
+def test_window_and_level_change_the_colours_of_one():
+    def other_table(plotter, actors):
+        values = actors[1].mapper.lookup_table.values.copy()
+        values[:, :3] = 255 - values[:, :3]
+        actors[1].mapper.lookup_table.values = values
+
+    assert np.abs(draw((0, 1), one_inverted) - draw((0, 1), other_table)).max() <= 2
+
+
+def test_an_assembly_and_what_is_beside_it_are_merged():
+    assert np.abs(draw((0, 1), one_in_an_assembly) - draw((0, 1))).max() <= 1
 
 
 def test_any_order_of_three(raycasts):
@@ -272,11 +305,12 @@ def test_several_renderers_and_one_actor_in_two(raycasts):
     for actor in reversed(actors):
         plotter.add_actor(actor)
     plotter.link_views()
-    image = shown(plotter)
+    images = shown(plotter), tiled_picture(plotter)[::2, ::2].astype(int)
     plotter.close()
-    left, right = image[2:-2, 2:118], image[2:-2, 122:238]
-    assert np.abs(left - image[2, 2]).max() > 40
-    assert np.abs(left - right).max() <= 1
+    for image in images:  # half of the tiles show nothing of a renderer
+        left, right = image[2:-2, 2:118], image[2:-2, 122:238]
+        assert np.abs(left - image[2, 2]).max() > 40
+        assert np.abs(left - right).max() <= 1
 
 
 def test_previews_are_of_one_size():

@@ -338,12 +338,11 @@ DRIVING = {
     "vtk_pipeline/filters": {"algorithm", "source", "source_settings", "temporal", "view"},
     "plotting": {
         "actor",
+        "add_transfer_function_editor",
         "component",
-        "edited_property",
         "progress",
         "refinement",
         "registration",
-        "transfer_function_editor",
     },
 }
 

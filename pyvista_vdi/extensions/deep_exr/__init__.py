@@ -1,4 +1,4 @@
-"""VDIs as OpenEXR deep images, exact or as other programs take them."""
+"""VDIs as OpenEXR deep images."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ EXTENSION = Extension(
         FileFormat(
             ".exr",
             "pyvista_vdi.extensions.deep_exr.files",
-            read_options=("camera", "thickness", "linear"),
-            write_options=("exact", "linear"),
-            compressions=("zips", "none"),
+            read_options=("camera", "thickness"),
+            needs='the package OpenEXR (pip install "pyvista-vdi[exr]")',
         ),
     )
 )

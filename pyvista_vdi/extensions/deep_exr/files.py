@@ -1,487 +1,210 @@
-"""VDIs as OpenEXR deep scan line images, both ways; ``docs/files.md`` describes the files.
+"""VDIs as OpenEXR deep scan lines, by the package OpenEXR; ``docs/files.md`` describes the files.
 
-Everybody's channels (Z, ZBack, A, R, G, B) are written in float32. What they lose is written
-beside them as corrections, the differences of bit patterns from what a reader computes; they are
-small whole numbers and compress to little. Whoever changes the standard channels changes the VDI.
+The channels are everybody's, Z, ZBack, A, R, G and B, and the optical depth, which opacities near 1
+do not tell. The view, bounds and metadata are in an attribute of ours.
 """
 
 from __future__ import annotations
 
-import os
-import struct
-from collections.abc import Collection, Iterator
+from io import BytesIO
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
+import OpenEXR
 from numpy.typing import NDArray
 
-from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import InvalidCameraError, VDIError, VDIFileError, warn_external
-from pyvista_vdi.extensions.deep_exr.corrections import (
-    COLOR_BITS,
-    DEPTH_BITS,
-    OURS,
-    STANDARD,
-    channel_names,
-    corrected,
-    correction,
-    exact_colors,
-    is_correction,
-    relative,
-    straight,
-    whole_numbers,
-)
-from pyvista_vdi.extensions.deep_exr.layout import (
-    DeepImage,
-    OtherFormError,
-    matrix_attribute,
-    read_image,
-    write_image,
-)
-from pyvista_vdi.extensions.deep_exr.linear_light import COLOR_SPACE, to_display, to_linear
-from pyvista_vdi.extensions.deep_exr.record import (
-    ATTRIBUTE,
-    COUNTS,
-    Record,
-    checksums_of,
-    parsed_record,
-    record_text,
-)
+from pyvista_vdi.errors import VDIError, VDIFileError, warn_external
 from pyvista_vdi.extensions.deep_exr.samples import media
-from pyvista_vdi.extensions.deep_exr.view import (
-    bounds_of_lists,
-    camera_from_matrices,
-    view_matrices,
-)
-from pyvista_vdi.io.progress import Progress
+from pyvista_vdi.extensions.deep_exr.view import bounds_of_lists, camera_of, view_matrices
+from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file.description import describe, from_json, number, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import whole_file
 
-#: The name that a file's name ends in.
-SUFFIX = ".exr"
-
-#: x_min, y_min, x_max and y_max of pixels, y downwards, both ends included.
-Box = tuple[int, int, int, int]
-
-#: How samples may be compressed when they are written.
-COMPRESSIONS = ("zips", "none")
-
-#: Samples whose checksums are taken at a time.
-_PART = 2**18
-
-#: How far a matrix of the header may be from the one that was written, relative to its largest
-#: entry: programs keep them in float32, some as text of seven digits.
-_SAME_MATRIX = 1e-5
+#: The header's attribute with what a VDI has beside its samples, JSON, and its version.
+ATTRIBUTE, VERSION = "pyvistaVDI", 3
 
 
-def write(
-    vdi: VDI,
-    path: str | os.PathLike[str],
-    *,
-    compression: str = "zips",
-    level: int = 1,
-    exact: bool = True,
-    linear: bool = False,
-    progress: Progress | None = None,
-) -> Path:
-    """Write a VDI as an OpenEXR deep scan line image: see :func:`pyvista_vdi.io.write`.
-
-    Parameters
-    ----------
-    vdi, path
-        As there; the name ends in ``.exr``.
-    compression : {"zips", "none"}
-        ``"zips"`` is zlib, one scan line at a time.
-    level : int
-        zlib's effort, 1 to 9.
-    exact : bool
-        Also write the channel ``tau`` and the corrections with which the file reads back to the
-        last bit. Without them it has the standard channels alone, and optical depths above about
-        ten come back rounded (see ``docs/files.md``).
-    linear : bool
-        Write colours as linear light (sRGB's curve undone), which compositing programs take them
-        for, instead of as a display takes them. The file says so, and reading it gives back the
-        VDI's colours.
-    progress : callable, optional
-        As for :func:`pyvista_vdi.io.write`.
-    """
-    offset = _depth_offset(vdi)
-    names = channel_names(exact, offset)
-
-    def encoded(first: int, last: int) -> dict[str, NDArray[Any]]:
-        channels = _encoded(vdi, slice(first, last), offset, linear)
-        return {name: channels[name] for name in names}
-
-    def parts() -> Iterator[dict[str, NDArray[Any]]]:
-        for first in range(0, max(vdi.n_supersegments, 1), _PART):
-            yield encoded(first, first + _PART)
-
-    checksums = checksums_of(vdi.counts, parts())
-    with whole_file(path) as stream:
-        write_image(
-            stream,
-            vdi.counts,
-            {name: np.uint32 if is_correction(name) else np.float32 for name in names},
-            encoded,
-            _attributes(vdi, offset, record_text(vdi, offset, exact, linear, checksums), linear),
-            compression=compression,
-            level=level,
-            progress=progress,
-        )
-    return Path(os.path.realpath(path))
-
-
-def read(
-    path: str | os.PathLike[str],
-    *,
-    camera: Any = None,
-    thickness: float | None = None,
-    linear: bool | None = None,
-    progress: Progress | None = None,
-) -> VDI:
-    """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`.
-
-    Parameters
-    ----------
-    path : path-like
-        A file that :func:`write` wrote, or another program.
-    camera : Camera or vtkCamera or pyvista.Camera, optional
-        The view that the image shows, where the file does not say it, or instead of what it says.
-    thickness : float, optional
-        World units: given to samples that have none, such as those of surfaces.
-    linear : bool, optional
-        Whether the colours are linear light, to be shown by sRGB's curve; by default what the
-        file says where it is one of ours, and of others no.
-    progress : callable, optional
-        As for :func:`pyvista_vdi.io.write`.
-
-    Warns
-    -----
-    VDIWarning
-        If one of our files was changed by another program, colours are outside 0 to 1, or the
-        file has more deep parts than the one that is read.
-    """
-    with np.errstate(invalid="ignore"):  # a signalling NaN is refused as any other
-        return _File(path, progress).vdi(camera, thickness, linear)
-
-
-def read_info(path: str | os.PathLike[str]) -> FileInfo:
-    """Return what a file says about itself; of a foreign one all samples are read for it."""
-    with np.errstate(invalid="ignore"):
-        return _File(path).info()
-
-
-def _depth_offset(vdi: VDI) -> float:
-    """Return what is added to front and back for Z, which the standard wants not to be negative.
-
-    In parallel projection depths may be: then the eye is moved back.
-    """
-    if not vdi.camera.parallel_projection or not vdi.n_supersegments:
-        return vdi.depth_origin
-    nearest = float(vdi.front.min()) + vdi.depth_origin
-    return vdi.depth_origin - min(nearest, 0.0)
-
-
-def _attributes(vdi: VDI, offset: float, record: str, linear: bool) -> dict[str, tuple[str, bytes]]:
-    to_camera, to_ndc = view_matrices(vdi.camera, vdi.window_size, offset - vdi.depth_origin)
-    half = vdi.camera.half_extent(vdi.window_size)
-    center = [c * h for c, h in zip(vdi.camera.window_center, half, strict=True)]
-    return {
-        ATTRIBUTE: ("string", record.encode("ascii")),
-        "screenWindowCenter": ("v2f", struct.pack("<2f", *center)),
-        "screenWindowWidth": ("float", struct.pack("<f", 2 * half[0])),
-        "software": ("string", f"pyvista-vdi {__version__}".encode()),
-        "worldToCamera": matrix_attribute(to_camera),
-        "worldToNDC": matrix_attribute(to_ndc),
-        **(COLOR_SPACE if linear else {}),
+def write(vdi: VDI, path: Any, *, progress: Progress | None = None) -> Path:
+    """Write a VDI as OpenEXR deep scan lines: see :func:`pyvista_vdi.io.write`."""
+    # Depths may not be negative, which they are in some parallel views: move the eye back
+    depths = [depth.astype(np.float64) + vdi.depth_origin for depth in (vdi.front, vdi.back)]
+    shift = 0.0 - float(depths[0].min(initial=0.0)) if vdi.camera.parallel_projection else 0.0
+    front, back = (np.maximum(depth + shift, 0).astype(np.float32) for depth in depths)
+    back = np.maximum(back, np.nextafter(front, np.float32(np.inf)))  # as thin as float32 has it
+    alpha = opacity(vdi.optical_depth)
+    channels: dict[str, Any] = {"Z": front, "ZBack": back, "A": alpha, "tau": vdi.optical_depth}
+    channels |= {name: vdi.color[:, k] * alpha for k, name in enumerate("RGB")}
+    record = describe(vdi, VERSION) | {"depth_shift": shift, "depths": _ends(front, back)}
+    header = {
+        "type": OpenEXR.deepscanline,
+        "compression": OpenEXR.ZIPS_COMPRESSION,
+        "software": record["written_by"],
+        ATTRIBUTE: to_json(record),
+        **view_matrices(vdi.camera, vdi.window_size, shift),
     }
+    image = OpenEXR.File(header, {name: _pixels(vdi, array) for name, array in channels.items()})
+    content = BytesIO()  # the package does not say why a disk does not take a file
+    image.write(content)
+    Pieces(progress, 1)()
+    with whole_file(path) as stream:
+        stream.write(content.getbuffer())
+    return Path(path).resolve()
 
 
-def _encoded(vdi: VDI, part: slice, offset: float, linear: bool) -> dict[str, NDArray[Any]]:
-    """Return all channels that a file may have."""
-    front, back, tau = vdi.front[part], vdi.back[part], vdi.optical_depth[part]
-    alpha = opacity(tau).astype(np.float32)
-    channels: dict[str, NDArray[Any]]
-    channels = {"A": alpha, "Z": _depth(front, offset), "ZBack": _depth(back, offset), "tau": tau}
-    for i, (name, bits) in enumerate(zip("RGB", COLOR_BITS, strict=True)):
-        shown = vdi.color[part, i]
-        light = (to_linear(shown) * alpha).astype(np.float32) if linear else shown * alpha
-        channels[name] = light
-        channels[bits] = correction(shown, straight(light, alpha, linear))
-    for name, bits, exactly in zip(("Z", "ZBack"), DEPTH_BITS, (front, back), strict=True):
-        channels[bits] = correction(exactly, relative(channels[name], offset))
-    return channels
+def read(path: Any, *, progress: Progress | None = None, **options: Any) -> VDI:
+    """Read a VDI from an OpenEXR deep image: see :func:`pyvista_vdi.read`."""
+    vdi, _ = _vdi(path, **options)
+    Pieces(progress, 1)()
+    return vdi
 
 
-def _depth(relative: NDArray[np.float32], offset: float) -> NDArray[np.float32]:
-    if offset == 0:
-        return relative
-    # The nearest may come out as -0.0 or a rounding below 0, the farthest beyond float32
-    with np.errstate(over="ignore"):
-        return np.maximum(relative.astype(np.float64) + offset, 0).astype(np.float32)
+def read_info(path: Any) -> FileInfo:
+    """Return what a file says about itself; all samples are read for it."""
+    vdi, header = _vdi(path)
+    return FileInfo(
+        path=Path(path),
+        format_version=VERSION,
+        written_by=str(header.get("software", "")),
+        camera=vdi.camera,
+        window_size=vdi.window_size,
+        n_supersegments=vdi.n_supersegments,
+        bounds=vdi.bounds,
+        depth_origin=vdi.depth_origin,
+        metadata=vdi.metadata,
+        codec=f"OpenEXR {header['compression'].name.removesuffix('_COMPRESSION').lower()}",
+        file_bytes=Path(path).stat().st_size,
+        memory_bytes=vdi.nbytes,
+    )
 
 
-class _File:
-    """A deep image that has been read; says what it holds."""
-
-    def __init__(self, path: str | os.PathLike[str], progress: Progress | None = None) -> None:
-        try:
-            self._path = Path(path)
-        except TypeError as error:
-            raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
-        self._image = self._read_image(progress)
-        self._record = self._read_record()
-        self._changed = self._record.changed(self._image) if self._record else ()
-
-    def vdi(self, camera: Any, thickness: float | None, linear: bool | None) -> VDI:
-        """Return the VDI: ours exactly, or what the standard channels say."""
-        record, frame = self._record, self._image.display_window
-        if camera is None:
-            frame = self._frame()
-        asked = camera is not None or thickness is not None
-        if record is not None and record.exact and not asked and linear in (None, record.linear):
-            if not self._changed and self._keeps_view(record):
-                return self._exact_vdi(record)
-            self._warn_of_changes()
-        return self._standard_vdi(frame, camera, thickness, linear)
-
-    def info(self) -> FileInfo:
-        """Return what the file says."""
-        record = self._record
-        vdi = self.vdi(None, None, None)
-        return FileInfo(
-            path=self._path,
-            format_version=record.version if record else 2,
-            written_by=str(self._image.attributes.get("software", "")),
-            camera=vdi.camera,
-            window_size=vdi.window_size,
-            n_supersegments=vdi.n_supersegments,
-            bounds=vdi.bounds,
-            depth_origin=vdi.depth_origin,
-            metadata=vdi.metadata,
-            codec=f"OpenEXR {self._image.compression}",
-            file_bytes=self._path.stat().st_size,
-            memory_bytes=vdi.nbytes,
-        )
-
-    def _read_image(self, progress: Progress | None) -> DeepImage:
-        wanted = {*STANDARD, *OURS}
-        try:
-            image = read_image(self._path, wanted.__contains__, progress)
-        except OtherFormError as error:
-            from pyvista_vdi.extensions.deep_exr.package import read_by_package
-
-            image = read_by_package(self._path, wanted, str(error))
-        missing = [name for name in ("Z", "A", "R", "G", "B") if name not in image.channel_types]
-        if missing:
-            raise VDIFileError(
-                f"{self._path} has no channel {', '.join(missing)}; it has "
-                f"{', '.join(image.channel_types)}: a VDI needs Z, ZBack, A, R, G and B"
-                f"{_layer_remedy(missing, image.channel_types)}"
-            )
-        for name in STANDARD:
-            kind = image.channel_types.get(name)
-            if kind is not None and kind.kind != "f" and len(image.channels["Z"]):
-                raise VDIFileError(
-                    f"{self._path} holds no VDI: its channel {name} is of type {kind}, and must be "
-                    "float32 or float16; convert it: oiiotool in.exr -d float -o out.exr"
-                )
-        if image.channel_types.get("tau", np.dtype("f4")).kind != "f":
-            del image.channels["tau"]  # another's channel of that name
-        return image
-
-    def _read_record(self) -> Record | None:
-        text = self._image.attributes.get(ATTRIBUTE)
-        if text is None:
-            return None
-        try:
-            return parsed_record(text, self._path)
-        except VDIFileError:
-            raise
-        except ValueError as error:
-            self._refuse(f"its attribute {ATTRIBUTE} is incomplete or wrong: {error}")
-
-    def _frame(self) -> Box:
-        """Return the pixels of the view; both windows of a file of ours are alike."""
-        data, display, record = self._image.data_window, self._image.display_window, self._record
-        if record is None:
-            return display
-        whole = [box for box in (display, data) if _size(box) == record.window_size]
-        if not whole:
-            raise VDIFileError(
-                f"{self._path} was cut or resized after pyvista-vdi wrote it: its display window "
-                f"is {_text(_size(display))}, and its view is of {_text(record.window_size)} "
-                "lists; give the view that it shows: read(..., camera=...)"
-            )
-        if len(whole) == 2 and data != display:
-            raise VDIFileError(
-                f"{self._path} was moved after pyvista-vdi wrote it: its data window begins at "
-                f"{data[:2]}, its display window at {display[:2]}; no view shows it so: move it "
-                "back, or give a view: read(..., camera=...)"
-            )
-        return whole[0]
-
-    def _keeps_view(self, record: Record) -> bool:
-        """Whether the header's matrices, where it has them, are those of the record's view."""
-        shift = record.depth_offset - record.depth_origin
-        written = view_matrices(record.camera, record.window_size, shift)
-        for name, matrix in zip(("worldToCamera", "worldToNDC"), written, strict=True):
-            found, size = self._matrix(name), np.abs(matrix[:, :3]).max()
-            if found is not None and not np.allclose(
-                found, matrix, rtol=_SAME_MATRIX, atol=_SAME_MATRIX * size
-            ):
-                return False
-        return True
-
-    def _warn_of_changes(self) -> None:
-        """Name what was changed: where that is the standard channels, ours follow."""
-        what: tuple[str, ...] = self._changed or ("its matrices",)
-        if COUNTS in what:
-            what = ("the number of samples",)
-        elif set(what) & set(STANDARD):
-            what = tuple(name for name in what if name in STANDARD)
-        warn_external(
-            f"{self._path} was changed after pyvista-vdi wrote it ({', '.join(what)}): its "
-            "standard channels are read, as those of any program's files"
-        )
-
-    def _exact_vdi(self, record: Record) -> VDI:
-        channels = self._image.channels
-        front, back = (relative(channels[n], record.depth_offset) for n in ("Z", "ZBack"))
-        if record.depth_offset:
-            front, back = (
-                corrected(depth, whole_numbers(channels[bits]))
-                for depth, bits in zip((front, back), DEPTH_BITS, strict=True)
-            )
-        return self._checked_vdi(
-            record.camera,
-            _offsets(self._image.counts),
-            (front, back, exact_colors(channels, record.linear), channels["tau"]),
-            record.bounds,
-            record.window_size,
-            depth_origin=record.depth_origin,
-            metadata=record.metadata,
-        )
-
-    def _standard_vdi(
-        self, frame: Box, camera: Any, thickness: float | None, linear: bool | None
-    ) -> VDI:
-        samples = media(*self._samples_in(frame), thickness, str(self._path))
-        width, height = size = _size(frame)
-        counts = np.bincount(samples.lists, minlength=width * height).reshape(height, width)
-        starts = _offsets(counts).astype(np.int64)
-        filled = np.flatnonzero(np.diff(starts))
-        nearest = samples.front[starts[filled]].astype(np.float64)
-        farthest = samples.back[starts[filled + 1] - 1].astype(np.float64)
-        record, shift = self._record, 0.0
-        bounds: Any = None
-        if camera is None and record is not None and self._keeps_view(record):
-            view, shift = record.camera, record.depth_offset - record.depth_origin
-            if thickness is None and not {COUNTS, "Z", "ZBack"}.intersection(self._changed):
-                bounds = record.bounds
-        else:
-            view = self._view(camera, size, nearest, farthest)
-        if bounds is None:
-            bounds = bounds_of_lists(view, size, counts, nearest - shift, farthest - shift)
-        if linear is None:
-            linear = record is not None and record.linear
-        # What the record says of how the VDI was made is of the samples that were written
-        kept = record is not None and not {COUNTS, *STANDARD}.intersection(self._changed)
-        return self._checked_vdi(
-            view,
-            _offsets(counts),
-            (
-                samples.front,
-                samples.back,
-                to_display(samples.color).clip(0, 1) if linear else samples.color,
-                samples.optical_depth,
-            ),
-            bounds,
-            size,
-            depth_origin=-shift,
-            metadata=record.metadata if record and kept else {"read_from": self._path.name},
-        )
-
-    def _samples_in(self, frame: Box) -> tuple[NDArray[np.int64], dict[str, NDArray[Any]]]:
-        """Return each sample's list, and the channels, of pixels in the frame."""
-        image = self._image
-        channels = {n: a for n, a in image.channels.items() if not is_correction(n)}
-        width, height = _size(frame)
-        rows, columns = image.counts.shape
-        # Lists count rows from the bottom, y of both windows runs downwards
-        x = np.arange(columns) + (image.data_window[0] - frame[0])
-        y = np.arange(rows) + (frame[3] - image.data_window[3])
-        inside = ((y >= 0) & (y < height))[:, None] & ((x >= 0) & (x < width))
-        pixels = y[:, None] * width + x
-        lists = np.repeat(pixels.ravel(), image.counts.ravel())
-        if inside.all():
-            return lists, channels
-        kept = np.repeat(inside.ravel(), image.counts.ravel())
-        return lists[kept], {name: array[kept] for name, array in channels.items()}
-
-    def _view(self, camera: Any, size: tuple[int, int], nearest: Any, farthest: Any) -> Camera:
-        if camera is not None:
-            return Camera.from_any(camera)
-        middle = (nearest.min() + farthest.max()) / 2 if len(nearest) else 1.0
-        try:
-            return camera_from_matrices(
-                self._matrix("worldToCamera"), self._matrix("worldToNDC"), size, middle
-            )
-        except InvalidCameraError as error:
-            raise VDIFileError(
-                f"{self._path} does not say from where its image is seen: {error}; give the view: "
-                "read(..., camera=...)"
-            ) from error
-
-    def _matrix(self, name: str) -> NDArray[np.float64] | None:
-        """Return a matrix of the header for column vectors."""
-        matrix = self._image.attributes.get(name)
-        return matrix.T if isinstance(matrix, np.ndarray) else None
-
-    def _checked_vdi(
-        self,
-        view: Camera,
-        offsets: Any,
-        arrays: tuple[Any, ...],
-        bounds: Any,
-        size: tuple[int, int],
-        **options: Any,
-    ) -> VDI:
-        front, back, color, tau = arrays
-        try:
-            return VDI(view, size, offsets, front, back, color, tau, bounds, **options)
-        except VDIError as error:
-            self._refuse(f"it holds no valid VDI: {error}")
-
-    def _refuse(self, why: str) -> NoReturn:
+def _deep_image(path: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Return the header of a file's deep image, and the pixels of its channels."""
+    try:
+        with Path(path).open("rb"):  # whose error has a reason
+            pass
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            deep = [
+                (dict(part.header), {name: each.pixels for name, each in part.channels.items()})
+                for part in file.parts
+                if part.header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile)
+            ]
+    except (OSError, TypeError, RuntimeError, ValueError, LookupError, MemoryError) as error:
         raise VDIFileError(
-            f"{self._path} is damaged: {why}; copy it from its source again, or write it anew"
+            f"{path} cannot be read: {getattr(error, 'strerror', None) or error}; check its name, "
+            "and whether it is an OpenEXR file and whole"
+        ) from error
+    if len(deep) != 1:
+        raise VDIFileError(
+            f"{path} has {len(deep)} deep images that can be read, and a VDI is one: write a flat "
+            "image, which says nothing about depth, as a deep one; take one of several out by "
+            "oiiotool in.exr --subimage 0 -o out.exr"
         )
+    return deep[0]
 
 
-def _size(box: Box) -> tuple[int, int]:
-    return box[2] - box[0] + 1, box[3] - box[1] + 1
+def _vdi(path: Any, camera: Any = None, thickness: Any = None) -> tuple[VDI, dict[str, Any]]:
+    """Return the VDI and the header of a file."""
+    header, pixels = _deep_image(path)
+    record, display = _record(header, path), np.array(header["displayWindow"])
+    size = tuple((np.ptp(display, axis=0) + 1).tolist())
+    lists, channels = _samples_in(header, pixels, size, path)
+    samples = media(lists, channels, thickness, str(path))
+    counts = np.bincount(samples.lists, minlength=size[0] * size[1]).reshape(size[::-1])
+
+    # Take the view of ours, and bounds and metadata where the samples are those that were written
+    ends, shift = _ends(channels["Z"], channels.get("ZBack", channels["Z"])), 0.0
+    written = bool(record) and record["samples"] == (len(lists), ends)
+    if camera is not None:
+        view = Camera.from_any(camera)
+    elif record:
+        moved = np.ptp(header["dataWindow"] - display, axis=0) == 0
+        if size != record["size"] or (moved.all() and (header["dataWindow"] != display).any()):
+            raise VDIFileError(
+                f"{path} was cut, resized or moved after pyvista-vdi wrote it: its view is of "
+                f"{record['size']} lists; give the view that it shows: read(..., camera=...)"
+            )
+        view, shift = record["camera"], record["shift"]
+    else:
+        view = camera_of(header, size, sum(ends) / 2, path)
+    if record and not written:
+        warn_external(
+            f"{path} was changed after pyvista-vdi wrote it: its bounds are those of its samples, "
+            "and its metadata are left out"
+        )
+    bounds: Any = record.get("bounds")
+    if camera is not None or not written:
+        bounds = bounds_of_lists(view, counts, _ends(samples.front - shift, samples.back - shift))
+    metadata = record["metadata"] if written else {"read_from": Path(path).name}
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    try:
+        about: dict[str, Any] = {"depth_origin": -shift, "metadata": metadata}
+        return VDI(view, size, offsets, *samples[1:], bounds, **about), header
+    except VDIError as error:
+        raise VDIFileError(f"{path} holds no valid VDI: {error}; write it anew") from error
 
 
-def _text(size: tuple[int, int]) -> str:
-    return f"{size[0]} x {size[1]}"
+def _record(header: dict[str, Any], path: Any) -> dict[str, Any]:
+    """Return what our attribute says, checked; nothing where there is no such attribute."""
+    if ATTRIBUTE not in header:
+        return {}
+    try:
+        entries = from_json(header[ATTRIBUTE])
+        if entries["version"] != VERSION:
+            warn_external(
+                f"{path} is of version {entries['version']} of pyvista-vdi's images, and is read "
+                f"as any program's: this release knows version {VERSION}"
+            )
+            return {}
+        return {
+            "camera": Camera.from_dict(entries["camera"]),
+            "size": tuple(entries["window_size"]),
+            "bounds": tuple(number(bound) for bound in entries["bounds"]),
+            "shift": number(entries["depth_shift"]),
+            "samples": (entries["n_supersegments"], entries["depths"]),
+            "metadata": dict(entries["metadata"]),
+        }
+    except (VDIError, LookupError, TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise VDIFileError(
+            f"{path} is damaged: its attribute {ATTRIBUTE} is wrong ({error!r}); write it anew"
+        ) from error
 
 
-def _layer_remedy(missing: list[str], names: Collection[str]) -> str:
-    """Return how to take the channels of a layer, where one has those that are missing."""
-    layers = {name.rpartition(".")[0] for name in names} - {""}
-    for layer in sorted(layers):
-        if all(f"{layer}.{name}" in names for name in missing):
-            renamed = ",".join(f"{n}={layer}.{n}" for n in STANDARD if f"{layer}.{n}" in names)
-            return f"; take those of its layer {layer}: oiiotool in.exr --ch {renamed} -o out.exr"
-    return ""
+def _pixels(vdi: VDI, array: NDArray[Any]) -> NDArray[Any]:
+    """Return each list's values as the package has them: arrays by row and column, from the top."""
+    width, height = vdi.window_size
+    values, offsets = array.astype(np.float32), vdi.offsets.astype(np.int64)
+    pixels = np.full(width * height, None)
+    pixels[0] = values[:0]  # which says the type where all lists are empty
+    for k in np.flatnonzero(np.diff(offsets)):
+        pixels[k] = values[offsets[k] : offsets[k + 1]]
+    return np.ascontiguousarray(pixels.reshape(height, width)[::-1])
 
 
-def _offsets(counts: NDArray[Any]) -> NDArray[np.uint64]:
-    offsets = np.zeros(counts.size + 1, np.uint64)
-    np.cumsum(counts.ravel(), out=offsets[1:])
-    return offsets
+def _samples_in(header: Any, pixels: Any, size: Any, path: Any) -> tuple[Any, dict[str, Any]]:
+    """Return each sample's list, and the channels, of the pixels in the display window."""
+    names = [name for name in ("Z", "ZBack", "A", "R", "G", "B", "tau") if name in pixels]
+    if not {"Z", "A", "R", "G", "B"} <= {*names}:
+        raise VDIFileError(
+            f"{path} has the channels {', '.join(pixels)}, and a VDI needs Z, ZBack, A, R, G and B"
+        )
+    # Lists count rows from the bottom, y of both windows runs downwards
+    (left, top), (right, bottom) = header["dataWindow"]
+    (first, _), (_, last) = header["displayWindow"]
+    x, y = np.arange(left, right + 1) - first, last - np.arange(top, bottom + 1)[::-1]
+    inside = ((y >= 0) & (y < size[1]))[:, None] & ((x >= 0) & (x < size[0]))
+    channels: dict[str, Any] = {}
+    for name in names:
+        chosen = pixels[name][::-1][inside]
+        lengths = [0 if p is None else len(p) for p in chosen]
+        channels[name] = np.concatenate([np.empty(0, "f2"), *(p for p in chosen if p is not None)])
+    return np.repeat((y[:, None] * size[0] + x)[inside], lengths), channels
+
+
+def _ends(front: NDArray[Any], back: NDArray[Any]) -> list[float]:
+    """Return the nearest front and the farthest back of samples, 0 and 0 where there are none."""
+    return [float(front.min()), float(back.max())] if len(front) else [0.0, 0.0]

@@ -2,33 +2,29 @@
 
 The standard's frames (https://openexr.com/en/latest/StandardAttributes.html): camera space has x to
 the right, y up and z forward, as our view space; NDC is (0, 0) at the upper left and (1, 1) at the
-lower right corner of the display window. Its matrices multiply row vectors; here they are
-transposed, for columns.
+lower right corner of the display window. Its matrices multiply row vectors.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidCameraError
+from pyvista_vdi.errors import InvalidCameraError, VDIFileError
 from pyvista_vdi.model.camera import Camera
 
-Matrix = NDArray[np.float64]
-
-#: How far two numbers of a foreign matrix may be from agreeing: it is made of float32, and the
-#: eye's distance from the world's origin may have cost digits.
+#: How far two numbers of a matrix may be from agreeing: it is made of float32, and the eye's
+#: distance from the world's origin may have cost digits.
 _TOLERANCE = 1e-3
 
 
 def view_matrices(
     camera: Camera, window_size: tuple[int, int], depth_shift: float
-) -> tuple[Matrix, Matrix]:
-    """Return worldToCamera and worldToNDC for column vectors, float64 (4, 4) each.
+) -> dict[str, NDArray[np.float32]]:
+    """Return the matrices of a view by the names of their attributes, float32 (4, 4).
 
     ``depth_shift``: world units by which the eye is moved back, for parallel projections.
     """
@@ -36,131 +32,70 @@ def view_matrices(
     to_camera[2, 3] += depth_shift
     # x = (u + 1) / 2, y = (1 - v) / 2, both times the denominator d
     to_ndc = np.array([[0.5, 0, 0, 0.5], [0, -0.5, 0, 0.5], [0, 0, 1, 0], [0, 0, 0, 1]])
-    return to_camera, to_ndc @ camera.viewport_matrix(window_size) @ to_camera
+    to_ndc = to_ndc @ camera.viewport_matrix(window_size) @ to_camera
+    matrices = {"worldToCamera": to_camera, "worldToNDC": to_ndc}
+    return {name: np.ascontiguousarray(m.T, np.float32) for name, m in matrices.items()}
 
 
-def camera_from_matrices(
-    to_camera: Any, to_ndc: Any, window_size: tuple[int, int], depth: float
+def camera_of(
+    header: dict[str, Any], window_size: tuple[int, int], depth: float, path: Any
 ) -> Camera:
-    """Return the view that a foreign file's matrices for column vectors describe.
+    """Return the view that a header's matrices describe; VDIFileError where they describe none.
 
-    ``to_ndc`` says all of a perspective view; a parallel one needs both. ``depth`` is that of
-    the focal point, about which the view is turned.
+    ``depth`` is that of the focal point, about which the view is turned.
     """
-    if to_ndc is None:
-        raise InvalidCameraError("the attribute worldToNDC is missing")
-    if not np.isfinite(to_ndc).all() or not (to_camera is None or np.isfinite(to_camera).all()):
-        raise InvalidCameraError("worldToNDC or worldToCamera are not finite")
-    x, y, d = to_ndc[[0, 1, 3]]
-    across, upwards = 2 * x - d, d - 2 * y  # (u, v) times the denominator d
-    parallel = np.linalg.norm(d[:3]) <= 1e-6 * np.linalg.norm(across[:3])
-    if parallel:
-        right, up, forward, eye, half, center = _parallel_view(across, upwards, d, to_camera)
-    else:
-        right, up, forward, eye, half, center = _perspective_view(across, upwards, d, to_camera)
-    _check_axes(right, up, forward)
-    aspect = window_size[0] / window_size[1]
-    if not abs(half[0] / (half[1] * aspect) - 1) < _TOLERANCE:
-        raise InvalidCameraError(
-            f"worldToNDC has a viewport of {half[0] / half[1]:.6g} to 1, but the display window "
-            f"is {window_size[0]} x {window_size[1]}: its pixels are not square"
+    try:
+        to_camera, to_ndc = (np.array(header[n], float).T for n in ("worldToCamera", "worldToNDC"))
+        x, y, _, d = to_ndc @ np.linalg.inv(to_camera)
+        # Of camera space: (u, v) of the viewport times the denominator, depth or constant
+        u, v = 2 * x - d, d - 2 * y
+        parallel = bool(abs(d[2]) <= 1e-6 * abs(u[0]))
+        of_d = 3 if parallel else 2
+        half, axes = d[of_d] / v[1], to_camera[:3, :3]
+        eye = -axes.T @ to_camera[:3, 3]
+        view = Camera(
+            eye,
+            eye + axes[2] * (depth or 1.0),
+            axes[1],
+            view_angle=30.0 if parallel else 2 * math.degrees(math.atan(half)),
+            parallel_projection=parallel,
+            parallel_scale=half if parallel else 1.0,
+            window_center=-np.array((u[of_d], v[of_d])) / d[of_d],
         )
-    return Camera(
-        eye,
-        eye + forward * (depth if depth > 0 else 1.0),
-        up,
-        view_angle=30.0 if parallel else 2 * math.degrees(math.atan(half[1])),
-        parallel_projection=parallel,
-        parallel_scale=half[1] if parallel else 1.0,
-        window_center=center,
-    )
+        # A camera has right angles, no mirror and square pixels: then its matrices are the same
+        made = view_matrices(view, window_size, 0.0)
+        again = np.vstack([made["worldToCamera"].T[:3, :3], made["worldToNDC"].T[[0, 1, 3], :3]])
+        found = np.vstack([axes, to_ndc[[0, 1, 3], :3] / d[of_d]])
+        if not np.allclose(found, again, atol=_TOLERANCE * np.abs(again).max()):
+            raise InvalidCameraError("they shear, scale or mirror, or pixels are not square")
+    except (LookupError, ValueError, InvalidCameraError) as error:
+        raise VDIFileError(
+            f"{path} does not say from where its image is seen, by worldToCamera and worldToNDC "
+            f"({error!r}): give the view: read(..., camera=...)"
+        ) from error
+    return view
 
 
 def bounds_of_lists(
-    camera: Camera,
-    window_size: tuple[int, int],
-    counts: NDArray[Any],
-    nearest: NDArray[np.float64],
-    farthest: NDArray[np.float64],
+    camera: Camera, counts: NDArray[Any], depths: list[float]
 ) -> NDArray[np.float64]:
-    """Return axis-aligned bounds of everything in the lists, in the model frame; float64 (6,).
+    """Return axis-aligned bounds of the lists that are not empty, in the model frame; float64 (6,).
 
-    ``nearest`` and ``farthest``: view depth of the first front and the last back of every list
-    that is not empty.
+    ``counts``: supersegments of each list, (H, W). ``depths``: view depth of the nearest front and
+    the farthest back.
     """
-    width, height = window_size
-    rows, columns = np.nonzero(counts)
     to_model = np.linalg.inv(camera.model_to_view)
-    if len(rows) == 0:
+    if not counts.any():
         return np.repeat(to_model[:3, 3], 2)
-    origin, direction = camera.ray_coefficients(window_size)
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for right, top, depth in itertools.product((0, 1), (0, 1), (nearest, farthest)):
-        u, v = 2 * (columns + right) / width - 1, 2 * (rows + top) / height - 1
-        corner = np.stack([np.ones_like(u), u, v], axis=1)
-        points = (corner @ origin + depth[:, None] * (corner @ direction)) @ to_model[:3, :3].T
-        points += to_model[:3, 3]
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+    rows, columns = (np.flatnonzero(counts.any(axis=axis)) for axis in (1, 0))
+    u, v = (
+        2 * np.array((filled[0], filled[-1] + 1)) / n - 1
+        for filled, n in ((columns, counts.shape[1]), (rows, counts.shape[0]))
+    )
+    corners = np.array([(1, a, b) for a in u for b in v])
+    origin, direction = camera.ray_coefficients(counts.shape[::-1])
+    points = np.concatenate([corners @ origin + z * (corners @ direction) for z in depths])
+    points = points @ to_model[:3, :3].T + to_model[:3, 3]
+    low, high = points.min(axis=0), points.max(axis=0)
     margin = 1e-6 * np.linalg.norm(high - low)  # far above the rounding of these products
     return np.stack([low - margin, high + margin], axis=1).ravel()
-
-
-def _perspective_view(
-    across: Matrix, upwards: Matrix, d: Matrix, to_camera: Any
-) -> tuple[Matrix, Matrix, Matrix, Matrix, tuple[float, float], tuple[float, float]]:
-    """Return right, up, forward, eye, half extents and window centre.
-
-    d is view depth but for a factor, u d is right / t_x - c_x forward, and so on: all three vanish
-    at the eye.
-    """
-    rows = np.stack([across, upwards, d]) / np.linalg.norm(d[:3])
-    if to_camera is not None and rows[2, :3] @ to_camera[2, :3] < 0:
-        rows = -rows  # a projective matrix means the same with its sign changed
-    try:
-        eye = np.linalg.solve(rows[:, :3], -rows[:, 3])
-    except np.linalg.LinAlgError as error:
-        raise InvalidCameraError("worldToNDC has no eye: it flattens space") from error
-    forward = rows[2, :3]
-    center = (-float(rows[0, :3] @ forward), -float(rows[1, :3] @ forward))
-    right, half_width = _direction(rows[0, :3] + center[0] * forward)
-    up, half_height = _direction(rows[1, :3] + center[1] * forward)
-    return right, up, forward, eye, (half_width, half_height), center
-
-
-def _parallel_view(
-    across: Matrix, upwards: Matrix, d: Matrix, to_camera: Any
-) -> tuple[Matrix, Matrix, Matrix, Matrix, tuple[float, float], tuple[float, float]]:
-    """Return the same; the window centre is part of the eye's place."""
-    if to_camera is None:
-        raise InvalidCameraError(
-            "worldToNDC describes a parallel projection, whose depths only the attribute "
-            "worldToCamera explains, which is missing"
-        )
-    if d[3] == 0:
-        raise InvalidCameraError("worldToNDC has no viewport: its last column is 0")
-    right, half_width = _direction(across[:3] / d[3])
-    up, half_height = _direction(upwards[:3] / d[3])
-    forward, _ = _direction(to_camera[2, :3])
-    eye = -(
-        right * (across[3] / d[3] * half_width)
-        + up * (upwards[3] / d[3] * half_height)
-        + forward * (to_camera[2, 3] / np.linalg.norm(to_camera[2, :3]))
-    )
-    return right, up, forward, eye, (half_width, half_height), (0.0, 0.0)
-
-
-def _direction(gradient: Matrix) -> tuple[Matrix, float]:
-    """Return the unit vector, and the length along which the coordinate grows by 1."""
-    length = float(np.linalg.norm(gradient))
-    if not length > 0:
-        raise InvalidCameraError("worldToNDC or worldToCamera flatten space")
-    return gradient / length, 1 / length
-
-
-def _check_axes(right: Matrix, up: Matrix, forward: Matrix) -> None:
-    if not np.allclose(np.cross(right, forward), up, atol=_TOLERANCE):
-        raise InvalidCameraError(
-            "worldToNDC describes no view of ours: its right, up and forward directions "
-            f"{right.round(4).tolist()}, {up.round(4).tolist()} and {forward.round(4).tolist()} "
-            "are not at right angles, or the picture is mirrored"
-        )

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Geometry, Grid
@@ -35,6 +34,24 @@ Indices = tuple[int, int, int]
 Ends = tuple[float, float]
 Offset = tuple[int, int, int]
 Values = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Read:
+    """A box of an array, read when it is called."""
+
+    array: Any
+    box: tuple[slice, ...]  # of its points (z, y, x)
+
+    def __call__(self) -> Values:
+        """Read it."""
+        values: Values = self.array[self.box]
+        return values
+
+    @property
+    def points(self) -> int:
+        """How many points it reads."""
+        return math.prod(part.stop - part.start for part in self.box)
 
 
 @dataclass(frozen=True)
@@ -123,37 +140,6 @@ class Blocks:
     def own(self, block: Indices) -> tuple[slice, ...]:
         """Return where a block's own points lie in the grid, (z, y, x)."""
         return tuple(slice(cuts[k], cuts[k + 1]) for cuts, k in zip(self.cuts, block, strict=True))
-
-    def ranges(self, values: Values) -> Ranges:
-        """Return the least and the largest scalar of each of a block's chunks, NaN left out."""
-        counts = [-(-n // chunk) for n, chunk in zip(values.shape, self.chunks, strict=False)]
-        low, high = np.empty(counts), np.empty(counts)
-        for at in np.ndindex(*counts):
-            box = tuple(slice(k * n, (k + 1) * n) for k, n in zip(at, self.chunks, strict=True))
-            low[at], high[at] = ends_of(values[box])
-        return low, high
-
-    def _chunks_of(self, block: Indices) -> tuple[slice, ...]:
-        parts = zip(self.own(block), self.chunks, strict=True)
-        return tuple(slice(part.start // chunk, -(-part.stop // chunk)) for part, chunk in parts)
-
-    def of_chunks(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> dict[Indices, Ends]:
-        """Return the least and the largest scalar of each block, of those of all chunks."""
-        return {
-            block: (
-                float(np.fmin.reduce(low[self._chunks_of(block)], axis=None)),
-                float(np.fmax.reduce(high[self._chunks_of(block)], axis=None)),
-            )
-            for block in self
-        }
-
-    def to_chunks(self, ranges: Mapping[Indices, Ranges]) -> Ranges:
-        """Return the least and the largest scalar of each chunk, of those of all blocks."""
-        shape = [-(-cuts[-1] // n) for cuts, n in zip(self.cuts, self.chunks, strict=True)]
-        low, high = np.full(shape, np.nan), np.full(shape, np.nan)
-        for block, (of_low, of_high) in ranges.items():
-            low[self._chunks_of(block)], high[self._chunks_of(block)] = of_low, of_high
-        return low, high
 
     def neighbours(self, block: Indices, halo: Halo) -> dict[Offset, Indices]:
         """Return the neighbours of which a block needs points, by where they lie."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,12 +22,11 @@ from pyvista_vdi.errors import (
     NoDeviceError,
     VDIFileError,
 )
-from pyvista_vdi.extensions.large.blocks import Indices, Values
+from pyvista_vdi.extensions.large.blocks import Indices, Read, Values
 from pyvista_vdi.extensions.large.passes import Opacities, Piece, Rows, Seen, Task
-from pyvista_vdi.extensions.large.reading import Read
 from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.ray_forms import Rectangle
-from pyvista_vdi.model.store_identity import StoreIdentity, check_once, identity_of
+from pyvista_vdi.model.store_identity import Digests, check_digests, digests_of
 
 #: Errors that keep their type where they say which block they are of.
 _OURS = (DeviceMemoryError, InvalidVolumeError, NoDeviceError, VDIFileError)
@@ -34,10 +34,10 @@ _OURS = (DeviceMemoryError, InvalidVolumeError, NoDeviceError, VDIFileError)
 _one_block = threading.Lock()
 
 
-def wrong_with(identity: StoreIdentity) -> str | None:
+def wrong_with(digests: Digests) -> str | None:
     """Return what is wrong with a worker's files, if anything is."""
     try:
-        identity.check()
+        check_digests(digests)
     except InvalidVolumeError as error:
         return str(error)
     return None
@@ -59,14 +59,12 @@ class Sent:
     Dask waits for ever where arguments cannot be unpickled, as arrays of files that are not there.
     """
 
-    def __init__(self, array: ChunkedArray, identity: StoreIdentity | None, run: str) -> None:
+    def __init__(self, array: ChunkedArray, digests: Digests, run: str) -> None:
         self.dtype, self._array = array.dtype, dumps(array)
-        self._identity, self._run = identity, run
+        self._digests, self._run = digests, run
 
     def __getitem__(self, box: tuple[slice, ...]) -> Values:
-        if self._identity is not None:
-            check_once(self._identity, self._run)
-            self._identity.check_chunks(box)
+        _check_once(self._digests, self._run)
         try:
             array: ChunkedArray = loads(self._array)
         except Exception as error:
@@ -77,11 +75,17 @@ class Sent:
         return array[box]
 
 
-def identities_in(lazy: Any) -> list[StoreIdentity]:
+@functools.lru_cache(maxsize=64)
+def _check_once(digests: Digests, run: str) -> None:
+    """Check a worker's files, once for a run: it may have joined after all were asked."""
+    check_digests(digests)
+
+
+def digests_in(lazy: Any) -> Digests:
     """Return what tells the files of arrays in a Dask graph from others."""
     layers = getattr(lazy.dask, "layers", {}).values()
-    found = (identity_of(value) for layer in layers if len(layer) == 1 for value in layer.values())
-    return [identity for identity in found if identity is not None]
+    arrays = [value for layer in layers if len(layer) == 1 for value in layer.values()]
+    return tuple(pair for array in arrays for pair in digests_of(array))
 
 
 def read(task: Task, block: Indices, read: Read) -> Values:

@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, Indices
+from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, Indices, Read
 from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task, light_entering
-from pyvista_vdi.extensions.large.reading import Plan
 from pyvista_vdi.generation.generate import made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
-from pyvista_vdi.model.chunked import ChunkedArray, Ranges
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.vdi import VDI
@@ -95,26 +93,6 @@ def chunks_of(volume: Volume, chunks: Sequence[int] | None) -> Sequence[int]:
     raise InvalidArgumentError(f"the volume {volume.name!r} is not chunked: give chunks")
 
 
-def known_ranges(volume: Volume, task: Task) -> Ranges | None:
-    """Return the least and the largest scalar of each chunk, if they are known."""
-    array = _with_ranges(volume, task)
-    return None if array is None else array.ranges()
-
-
-def keep_ranges(volume: Volume, task: Task, seen: Mapping[Indices, Seen]) -> None:
-    """Keep what the first pass has found beside the store, so that nothing unseen is read again."""
-    array = _with_ranges(volume, task)
-    if array is not None:
-        ranges = {block: found.ranges for block, found in seen.items()}
-        array.keep_ranges(*task.blocks.to_chunks(ranges))
-
-
-def _with_ranges(volume: Volume, task: Task) -> ChunkedArray | None:
-    """Return the volume's array if its chunks are the task's: ranges are kept of no others."""
-    array = volume.chunks
-    return array if array is not None and array.chunks == task.blocks.chunks else None
-
-
 def generate_chunked(
     request: GenerationRequest,
     *,
@@ -132,15 +110,11 @@ def generate_chunked(
     windows = blocks.windows(task.camera, task.size)
     report(progress, 0.0)
     seen: dict[Indices, Seen] = {}
-    known = known_ranges(volume, task)
-    order = task.to_read(windows, known)
-    reading = Plan.of(task, volume.array, known)
+    order = task.to_read(windows)
     for k, block in enumerate(order):
         window = windows.get(block, NOWHERE)
-        seen[block] = task.first_pass(block, reading.read(block)(), window, device)
+        seen[block] = task.first_pass(block, volume.array[blocks.own(block)], window, device)
         report(progress, 0.4 * (k + 1) / len(order))
-    if known is None and len(seen) == len(blocks):
-        keep_ranges(volume, task, seen)
     ambient = (
         task.ambient([each.opacities for each in seen.values()], device) if task.occlusion else None
     )
@@ -151,13 +125,13 @@ def generate_chunked(
             offset: halo.from_slabs(seen[other].slabs, offset)
             for offset, other in blocks.neighbours(block, halo).items()
         }
-        values = blocks.with_halo(reading.read(block)(), parts, halo)
+        values = blocks.with_halo(volume.array[blocks.own(block)], parts, halo)
         pieces.append(task.second_pass(block, values, windows[block], light, device, ambient))
         report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
     rows = task.merge(0, task.size[1], pieces, device)
     report(progress, 1.0)
     counted = {
-        "points_read": sum(reading.read(block).points for block in [*order, *entering]),
+        "points_read": sum(Read(volume.array, blocks.own(b)).points for b in [*order, *entering]),
         "runs_merged": sum(len(piece.runs) for piece in pieces),
     }
     return vdi_of(task, request, [rows], get_runtime(device).info.name, counted)

@@ -25,22 +25,18 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.extensions.large import dask_tasks as work
-from pyvista_vdi.extensions.large.blocks import Indices, ends_of
+from pyvista_vdi.extensions.large.blocks import Indices, Read
 from pyvista_vdi.extensions.large.generate import (
     NOWHERE,
     balanced,
     chunks_of,
-    keep_ranges,
-    known_ranges,
     task_of,
     vdi_of,
 )
-from pyvista_vdi.extensions.large.passes import Rows, Seen, Task, light_entering
-from pyvista_vdi.extensions.large.reading import Plan, Read
+from pyvista_vdi.extensions.large.passes import Rows, Task, light_entering
 from pyvista_vdi.generation.generate import Progress, report
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.ray_forms import Rectangle
-from pyvista_vdi.model.store_identity import StoreIdentity
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 
@@ -116,21 +112,14 @@ class _Run:
         task, blocks, halo = self._task, self._task.blocks, self._task.halo
         report(self._progress, 0.0)
         windows = blocks.windows(task.camera, task.size)
-        known = known_ranges(self._volume, task)
-        order = task.to_read(windows, known)
-        chunks = self._volume.chunks
-        lazy = chunks is not None and chunks.lazy is not None  # Dask knows what it computes
-        reading = Plan.of(task, self._sent, None if lazy else known)
-        reads = {block: reading.read(block) for block in order}
+        order = task.to_read(windows)
+        reads = {block: Read(self._sent, blocks.own(block)) for block in order}
         values = self._values(reads)
         in_window = [windows.get(block, NOWHERE) for block in order]
         first = self._mapped(
             "first-pass", order, self._bound(work.first_pass), order, values.values(), in_window
         )
         seen = self._gathered("seen", first, work.without_slabs, _SHARES[0])
-        if known is None and len(seen) == len(blocks):
-            self._check_ranges(seen)
-            keep_ranges(self._volume, task, seen)
         entering = light_entering(task, windows, seen)
         ambient: list[Any] = [None] * len(entering)
         if task.occlusion is not None:
@@ -181,18 +170,9 @@ class _Run:
         array = self._volume.chunks
         if array is None:
             return self._volume.array
-        if array.lazy is not None:
-            for identity in work.identities_in(array.lazy):
-                self._require_files(identity)
-            return array
-        own = array.identity()
-        if own is not None:
-            self._require_files(own)
-        return work.Sent(array, own, self._token)
-
-    def _require_files(self, identity: StoreIdentity) -> None:
+        digests = array.digests() if array.lazy is None else work.digests_in(array.lazy)
         answers = self._client.run(
-            work.wrong_with, identity, workers=self._workers, on_error="return"
+            work.wrong_with, digests, workers=self._workers, on_error="return"
         )
         failed = {at: error for at, error in answers.items() if error is not None}
         if failed:
@@ -201,31 +181,7 @@ class _Run:
                 f"{len(failed)} of {len(answers)} workers do not read what this process does; "
                 f"worker {at}: {error}"
             )
-
-    def _check_ranges(self, seen: Mapping[Indices, Seen]) -> None:
-        """Read the chunks of the widest and the narrowest range here, too, before all are kept."""
-        array, blocks = self._volume.chunks, self._task.blocks
-        if array is None or array.lazy is not None:
-            return
-        widths = {block: found.ranges[1] - found.ranges[0] for block, found in seen.items()}
-        for choose in (np.nanmax, np.nanmin):
-            known = {at: choose(width) for at, width in widths.items() if np.isfinite(width).any()}
-            if not known:
-                return
-            block = max(known, key=lambda at: known[at] if choose is np.nanmax else -known[at])
-            low, high = seen[block].ranges
-            at = np.unravel_index(np.nanargmax(widths[block] == known[block]), low.shape)
-            box = tuple(
-                slice(part.start + k * n, min(part.start + (k + 1) * n, part.stop))
-                for part, k, n in zip(blocks.own(block), at, blocks.chunks, strict=True)
-            )
-            here = ends_of(array[box])
-            if here != (low[at], high[at]):
-                raise InvalidVolumeError(
-                    f"{work.named(self._task, block)}: the workers read values from {low[at]} to "
-                    f"{high[at]} where this process reads {here[0]} to {here[1]} in "
-                    f"{array.source}: all must have the same files, which stay as they are"
-                )
+        return array if array.lazy is not None else work.Sent(array, digests, self._token)
 
     def _bound(self, function: Callable[..., Any]) -> Callable[..., Any]:
         return partial(function, self._task, self._device)

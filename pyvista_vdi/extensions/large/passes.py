@@ -31,7 +31,6 @@ from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.chunked import Ranges
 from pyvista_vdi.model.float32_limits import held_unit_distance
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
 from pyvista_vdi.model.ray_forms import Rectangle
@@ -60,7 +59,6 @@ class Seen(NamedTuple):
     #: Least and largest scalar of each slab, and by ``None`` of all its own points; NaN left out,
     #: and where there is nothing else
     ends: dict[tuple[int, int] | None, Ends]
-    ranges: Ranges  # least and largest scalar of each of its chunks, float64
     #: Where there is ambient occlusion: the first node along x, y and z, and what the block has of
     #: the opacities of nodes from it on, float32 (nz, ny, nx); ``None`` where that is nothing
     opacities: Opacities | None = None
@@ -151,7 +149,7 @@ class Task:
         slabs = self.halo.slabs(values)
         ends: dict[tuple[int, int] | None, Ends] = {None: ends_of(values)}
         ends.update((side, ends_of(slab)) for side, slab in slabs.items())
-        seen = Seen(None, slabs, ends, self.blocks.ranges(values))
+        seen = Seen(None, slabs, ends)
         occlusion = self.occlusion
         if not (window.pixels or occlusion) or not self.may_be_visible(*seen.ends[None]):
             return seen
@@ -262,22 +260,16 @@ class Task:
         low, high = zip(*ends, strict=True)
         return bool(self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)))
 
-    def to_read(self, windows: Mapping[Indices, Rectangle], ranges: Ranges | None) -> list[Indices]:
+    def to_read(self, windows: Mapping[Indices, Rectangle]) -> list[Indices]:
         """Return the blocks that the first pass must read, in the order in which V_O sees them.
 
-        ``ranges``: least and largest scalar of each chunk, where they are known. A block in the
-        window that may be visible needs its neighbours' points; no others are read.
+        A block in the window needs its neighbours' points; no others are read.
         """
-        of_blocks = None if ranges is None else self.blocks.of_chunks(*ranges)
-        wanted = set()
-        # What hides light from what is seen may itself be out of sight
-        for block in windows if self.occlusion is None else self.blocks:
-            around = [block, *self.blocks.neighbours(block, self.halo).values()]
-            if of_blocks is not None:
-                low, high = zip(*(of_blocks[other] for other in around), strict=True)
-                if not self.may_be_visible(np.fmin.reduce(low), np.fmax.reduce(high)):
-                    continue
-            wanted.update(around)
+        if self.occlusion is not None:  # what hides light from what is seen may be out of sight
+            return self.blocks.in_order(self.camera)
+        wanted = set(windows)
+        for block in windows:
+            wanted.update(self.blocks.neighbours(block, self.halo).values())
         return [block for block in self.blocks.in_order(self.camera) if block in wanted]
 
     def _volume(self, values: Values) -> Volume:

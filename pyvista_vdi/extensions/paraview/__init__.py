@@ -14,5 +14,5 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.paraview.cli:paraview",
         ),
     ),
-    requires=("large", "series"),  # of which ranks and files with times are made
+    requires=("series",),  # of which files with times are made
 )

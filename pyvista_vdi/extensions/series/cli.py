@@ -47,9 +47,8 @@ from pyvista_vdi.model.standard_cases import WINDOW_SIZE
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
-#: Options of ``convert`` that are for deep images of other programs, and for those that it writes.
-OF_READ_IMAGES = ("camera_json", "thickness", "from_linear")
-OF_WRITTEN_IMAGES = ("standard_channels", "linear")
+#: Options of ``convert`` that are for deep images of other programs.
+OF_READ_IMAGES = ("camera_json", "thickness")
 
 
 def series(options: argparse.Namespace) -> int:
@@ -171,7 +170,6 @@ def convert_several(options: argparse.Namespace, read: Callable[[str], Any], kin
     colors = found is not None and found.suffix not in (kind.suffix, ".vdi")
     vdis = with_look(options, read(options.file), options.file, colors=colors)
     if together:
-        refuse(options, OF_WRITTEN_IMAGES, f"writing .exr, and not {target.suffix}")
         with measuring("converting") as bar:
             vdis.save(target, progress=part(bar, 0.0, 1.0, "writing"), **arguments)
         say_written([target])

@@ -95,6 +95,12 @@ class Player:
         self._begin(index % n)
 
     @property
+    def decoded(self) -> list[VDI]:
+        """The steps that are ready."""
+        with self._lock:
+            return list(self._ready.values())
+
+    @property
     def time(self) -> float:
         """Time of the step that is shown."""
         return self.series.times[self.step]

@@ -113,7 +113,7 @@ class VDISeries(VDICollection):
         if isinstance(index, slice):
             chosen = range(len(self))[index]
             return VDISeries(Called(self._steps.__getitem__, chosen), self.times[index])
-        return self._steps[range(len(self))[index]]
+        return self._steps[self._place(index, "steps")]
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISeries:
         return VDISeries(mapped(function, self), self.times)

@@ -60,6 +60,10 @@ class SeriesInput(Input):
         other.player.step, other.prop = self.player.step, self.prop
         return other
 
+    def on_devices(self) -> list[Any]:
+        """Return the steps that are decoded, and what was classified of that which is shown."""
+        return [self._vdi, *self.player.decoded]
+
     def rest(self) -> None:
         """Pause, and leave no thread."""
         self.player.close()

@@ -42,7 +42,7 @@ class SeriesWriter:
         The generating view V_O of volumes; not needed where VDIs are appended.
     window_size : (int, int), optional
         Width and height in pixels, likewise.
-    precision : {"8-byte", "16-byte", "exact"}
+    precision : {"8-byte", "exact"}
         Of the supersegments, see :meth:`VDI.with_precision`.
     compression : {"zstd", "lz4", "deflate", "none"}
         As for :meth:`VDI.save`.

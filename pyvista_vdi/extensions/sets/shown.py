@@ -73,6 +73,11 @@ class SetInput(Input):
         other.prop = self.prop
         return other
 
+    def on_devices(self) -> list[Any]:
+        """Return the VDIs that are decoded, and what was classified of those that are drawn."""
+        with self._lock:
+            return [self._vdi, *self._ready.values(), *(one.last() for one in self._kept.values())]
+
     def rest(self) -> None:
         """Leave no thread; the next frame may begin anew."""
         self._decoder.clear()
@@ -103,7 +108,7 @@ class SetInput(Input):
             drawn = dict(self._weights)
             self._kept = {k: one for k, one in self._kept.items() if k in drawn}
             kept = self._kept[i] = DeferredInput(vdi, self.prop)
-        return kept.vdi()
+        return as_vdi(kept.vdi())
 
     def _at(self, i: int) -> VDI:
         with self._lock:

@@ -149,7 +149,7 @@ class VDISet(VDICollection):
     def __getitem__(self, index: int | slice) -> VDI | list[VDI]:
         if isinstance(index, slice):
             return [self[i] for i in range(len(self))[index]]
-        return self._views[range(len(self))[index]]
+        return self._views[self._place(index, "VDIs")]
 
     @property
     def blend(self) -> float:

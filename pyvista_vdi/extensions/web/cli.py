@@ -49,7 +49,6 @@ def serve(options: argparse.Namespace) -> int:
         sample_distance=options.sample_distance,
         ambient_occlusion=ambient_occlusion(options),
         memory_limit=options.memory_limit,
-        regenerate_below=options.regenerate_below,
         device=options.device,
         announce=lambda line: print(line, flush=True),
         **arguments,
@@ -72,8 +71,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     declare.option(group, "--allow-host", names, "NAME", action="append", default=[])
     text = "most lists of a VDI (default: 1280x720)"
     declare.option(group, "--lists", text, "WxH", declare.parse_size, default=(1280, 720))
-    below = "estimated SSIM below which a view gets a VDI of its own (default: 0.95)"
-    declare.option(group, "--regenerate-below", below, "SSIM", declare.parse_number, default=0.95)
     declare.classification(parser)
     declare.occlusion(parser)
     group = parser.add_argument_group("limits")

@@ -7,12 +7,10 @@ ends the connection that it came by.
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
 from typing import Any
-
-import numpy as np
 
 from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model.camera import Camera
@@ -22,8 +20,6 @@ from pyvista_vdi.model.view import View
 MAX_MESSAGE = 16 * 1024
 #: Longest edge of a client's picture, pixels.
 MAX_PICTURE_EDGE = 8192
-#: Most clipping planes, as many as VTK's mappers take.
-MAX_PLANES = 6
 #: Most opacities of a mapping that is given by numbers.
 MAX_OPACITIES = 64
 #: Numbers are no larger than this, and lenses no smaller than its inverse: forms of rays are
@@ -49,18 +45,8 @@ class Wish:
     """What a client wants to see: the last that it has said of everything."""
 
     view: View | None = None  # its camera, and the size of its picture; ``None`` before it has said
-    moving: bool = False  # whether the view is about to change
     look: Look = Look()  # the transfer function
     step: int = 0  # of the time steps
-    #: Clipping planes: origin and normal of each, world coordinates
-    planes: tuple[tuple[float, ...], ...] = ()
-    #: How many messages the client had said by then. Equal wishes may differ in it
-    said: int = field(default=0, compare=False)
-
-    @property
-    def content(self) -> tuple[Look, int]:
-        """What a VDI is made of; a change of it needs another VDI, whatever the view."""
-        return self.look, self.step
 
 
 @dataclass(frozen=True)
@@ -68,51 +54,50 @@ class Offer:
     """What clients may choose from."""
 
     steps: int = 1  # how many time steps there are
-    #: Names of colour maps and of opacity mappings; empty where the look is fixed
-    cmaps: tuple[str, ...] = ()
-    #: Names of colour maps and of opacity mappings; empty where the look is fixed
-    opacities: tuple[str, ...] = ()
+    cmaps: tuple[str, ...] = ()  # names of colour maps; empty where the look is fixed
+    opacities: tuple[str, ...] = ()  # likewise, of opacity mappings
 
 
 def wish_after(text: str, wish: Wish, offer: Offer) -> Wish:
     """Return what a client wants after a message of its."""
     try:
-        message = json.loads(text, parse_constant=_refuse_constant)
+        message = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise BadMessageError(f"the message is no JSON: {error}") from None
-    if not isinstance(message, dict):
-        raise BadMessageError("a message is an object")
-    kind = message.pop("type", None)
-    read = _READERS.get(kind) if isinstance(kind, str) else None
-    if read is None:
-        raise BadMessageError(f"type must be one of {', '.join(_READERS)}; got {kind!r:.40}")
-    return replace(read(message, wish, offer), said=wish.said + 1)
+    kind = message.pop("type", None) if isinstance(message, dict) else None
+    if kind == "view":
+        _only(message, {"camera", "size"})
+        return replace(wish, view=_view(message))
+    if kind == "look":
+        _only(message, set(), {"cmap", "opacity", "clim"})
+        return replace(wish, look=_look(message, offer))
+    if kind == "time":
+        _only(message, {"step"})
+        return replace(wish, step=_whole("step", message["step"], 0, offer.steps - 1))
+    raise BadMessageError(f"a message is an object of type view, look or time; got {kind!r:.40}")
 
 
-def _view(message: dict[str, Any], wish: Wish, offer: Offer) -> Wish:
-    _only(message, {"camera", "size"}, {"moving"})
-    state, moving = message["camera"], message.get("moving", False)
-    if not isinstance(moving, bool):
-        raise BadMessageError("moving must be true or false")
-    size = tuple(_whole("size", edge, 1, MAX_PICTURE_EDGE) for edge in _items("size", message, 2))
+def _view(message: dict[str, Any]) -> View:
+    state, size = message["camera"], message["size"]
+    if not isinstance(size, list) or len(size) != 2:
+        raise BadMessageError("size must be a list of 2 numbers")
+    width, height = (_whole("size", edge, 1, MAX_PICTURE_EDGE) for edge in size)
     if not isinstance(state, dict):
         raise BadMessageError("camera must be an object")
     _only(state, {"position", "focal_point", "view_up"}, {"view_angle", "parallel_scale"})
-    vectors = {n: _vector(n, state, 3) for n in ("position", "focal_point", "view_up")}
-    lens: dict[str, Any] = {
-        n: _number(n, state[n], 1 / _LARGEST)
-        for n in ("view_angle", "parallel_scale")
-        if n in state
+    lenses = ("view_angle", "parallel_scale")
+    values: dict[str, Any] = {
+        name: _number(name, value, 1 / _LARGEST) if name in lenses else _vector(name, value, 3)
+        for name, value in state.items()
     }
     try:
-        camera = Camera(**vectors, **lens, parallel_projection="parallel_scale" in lens)
+        camera = Camera(**values, parallel_projection="parallel_scale" in values)
     except InvalidCameraError as error:
         raise BadMessageError(str(error)) from None
-    return replace(wish, view=View(camera, (size[0], size[1])), moving=moving)
+    return View(camera, (width, height))
 
 
-def _look(message: dict[str, Any], wish: Wish, offer: Offer) -> Wish:
-    _only(message, set(), {"cmap", "opacity", "clim"})
+def _look(message: dict[str, Any], offer: Offer) -> Look:
     if not offer.cmaps:
         raise BadMessageError("the look is fixed")
     cmap, opacity, clim = (message.get(name) for name in ("cmap", "opacity", "clim"))
@@ -125,58 +110,31 @@ def _look(message: dict[str, Any], wish: Wish, offer: Offer) -> Wish:
             f"opacity must be one of the names that hello lists, or 2 to {MAX_OPACITIES} numbers"
         )
     if clim is not None:
-        clim = _vector("clim", message, 2)
+        clim = _vector("clim", clim, 2)
         if not clim[0] < clim[1]:
             raise BadMessageError("clim must be two numbers, the smaller first")
-    return replace(wish, look=Look(cmap, opacity, clim))
+    return Look(cmap, opacity, clim)
 
 
-def _clip(message: dict[str, Any], wish: Wish, offer: Offer) -> Wish:
-    _only(message, {"planes"})
-    given = message["planes"]
-    if not isinstance(given, list) or len(given) > MAX_PLANES:
-        raise BadMessageError(f"planes must be a list of at most {MAX_PLANES}")
-    planes = tuple(_vector("planes", {"planes": plane}, 6) for plane in given)
-    if any(np.linalg.norm(plane[3:]) < 1 / _LARGEST for plane in planes):
-        raise BadMessageError("a plane's normal is not zero")
-    return replace(wish, planes=planes)
-
-
-def _time(message: dict[str, Any], wish: Wish, offer: Offer) -> Wish:
-    _only(message, {"step"})
-    return replace(wish, step=_whole("step", message["step"], 0, offer.steps - 1))
-
-
-_READERS = {"view": _view, "look": _look, "clip": _clip, "time": _time}
-
-
-def _refuse_constant(name: str) -> None:
-    raise ValueError(f"{name} is no number")
-
-
-def _only(message: Mapping[str, Any], needed: set[str], more: set[str] | None = None) -> None:
-    names = set(message)
-    if not needed <= names or names - needed - (more or set()):
+def _only(
+    message: Mapping[str, Any], needed: AbstractSet[str], more: AbstractSet[str] = frozenset()
+) -> None:
+    if not needed <= set(message) <= needed | more:
         raise BadMessageError(
-            f"a message has {sorted(names)!r:.80} in place of {sorted(needed | (more or set()))}"
+            f"a message has {sorted(message)!r:.80} in place of {sorted(needed | more)}"
         )
 
 
-def _items(name: str, message: Mapping[str, Any], length: int) -> Sequence[Any]:
-    values = message[name]
+def _vector(name: str, values: Any, length: int) -> Any:
     if not isinstance(values, list) or len(values) != length:
         raise BadMessageError(f"{name} must be a list of {length} numbers")
-    return values
-
-
-def _vector(name: str, message: Mapping[str, Any], length: int) -> Any:
-    return tuple(_number(name, value) for value in _items(name, message, length))
+    return tuple(_number(name, value) for value in values)
 
 
 def _number(name: str, value: Any, low: float = -_LARGEST, high: float = _LARGEST) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise BadMessageError(f"{name} must be numbers")
-    if not low <= value <= high or not math.isfinite(value):
+    if not low <= value <= high:  # nor NaN
         raise BadMessageError(f"{name} must be from {low:g} to {high:g}")
     return float(value)
 

@@ -412,7 +412,8 @@ def _view_of(vdi: VDI, background: Sequence[float]) -> View:
     behind = check_background(background)
     percents = " ".join(f"{100 * channel:g}%" for channel in behind)
     still = np.rint(over_background(_from_generating_view(vdi), background) * 255)
-    return View(None, f"rgb({percents})", still.astype(np.uint8), vdi.picture_size)
+    size = vdi.window_size if "screen" in vdi.metadata else vdi.picture_size  # of that view
+    return View(None, f"rgb({percents})", still.astype(np.uint8), size)
 
 
 def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:

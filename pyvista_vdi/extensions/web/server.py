@@ -8,32 +8,28 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-import functools
 import hmac
 import inspect
 import ipaddress
 import json
 import logging
 import secrets
-import socket
 import threading
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from urllib.parse import SplitResult, quote, urlsplit
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
 from pyvista_vdi.extensions.web.camera import viewer_camera
-from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, wish_after
+from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, Wish, wish_after
+from pyvista_vdi.extensions.web.placing import encoded
 from pyvista_vdi.extensions.web.served_page import served_page
-from pyvista_vdi.extensions.web.session import Client
-from pyvista_vdi.extensions.web.source import Made, Source
+from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.render_options import checked_bound
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
-from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web
@@ -43,7 +39,7 @@ except ImportError as error:
     ) from error
 
 #: Version of what is said on the socket.
-PROTOCOL = 1
+PROTOCOL = 2
 #: Where a server listens unless it is told.
 HOST, PORT = "127.0.0.1", 8765
 #: Most lists of a VDI unless told otherwise.
@@ -53,7 +49,7 @@ LISTS = 1280 * 720
 LONGEST = 8
 #: Most clients at once; the next is told so.
 MAX_CLIENTS = 256
-#: Bytes of one message of a VDI. Between two of them a transfer can be given up.
+#: Bytes of one message of a VDI: what a slow line takes in less than STALLED.
 CHUNK = 64 * 1024
 #: Seconds for which a client may take nothing of what it is sent before it is dropped.
 STALLED = 30.0
@@ -61,14 +57,29 @@ STALLED = 30.0
 _HEARTBEAT = 20.0
 #: Seconds that a client has to answer a goodbye.
 _GOODBYE = 3.0
-#: Threads in which stages run: while one packs and compresses, the device works for the other.
+#: Threads in which VDIs are made: while one packs and compresses, the device works for the other.
 _THREADS = 2
 
 _log = logging.getLogger(__name__)
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-#: Sends one message to a client.
-_Put = Callable[[str | bytes], Awaitable[None]]
+
+
+class _Client:
+    """What a server knows of one connection."""
+
+    def __init__(self) -> None:
+        self.wish = Wish()  # the last
+        self.wished = asyncio.Event()  # that another wish has come
+        self.left = asyncio.Event()
+        self.cancelled = threading.Event()  # what is being made for it
+
+    def hear(self, wish: Wish) -> None:
+        """Take note of what the client wants now; what is made of another wish is given up."""
+        if wish != self.wish:
+            self.wish = wish
+            self.cancelled.set()
+            self.wished.set()
 
 
 class Server:
@@ -90,7 +101,6 @@ class Server:
         port: int = PORT,
         token: str | None = None,
         hosts: Sequence[str] = (),
-        below: float = REGENERATE_BELOW,
         max_clients: int = MAX_CLIENTS,
         stalled: float = STALLED,
     ) -> None:
@@ -101,11 +111,10 @@ class Server:
             )
         self.token = secrets.token_urlsafe(16) if token is None else token
         self.host, self.port = host, port
-        self.clients: set[Client] = set()
+        self.clients: set[_Client] = set()
         self._source = source
         # As browsers write names, in small letters
         self._hosts = {name.lower() for name in ("localhost", host, *hosts) if name}
-        self._below = below
         self._max_clients = max_clients
         self._stalled = stalled
         self._threads = ThreadPoolExecutor(_THREADS, "pyvista-vdi serve")
@@ -236,26 +245,25 @@ class Server:
                 text="this address is a WebSocket's: open the server's page\n",
                 headers={"Upgrade": "websocket", "Sec-WebSocket-Version": "13"},
             )
-        client = Client(self._source, self._threads, self._below)
+        client = _Client()
         self.clients.add(client)
         try:
             await connection.prepare(request)
-            _keep_queue_short(request.transport)
-            put = functools.partial(self._put, connection, request.transport)
-            await self._talk(client, connection, put)
+            await self._talk(client, connection, request.transport)
         finally:
             self.clients.discard(client)
-            client.close()
+            client.cancelled.set()
             if request.transport is not None and not connection.closed:
                 request.transport.abort()  # also where it takes nothing that it is sent
         return connection
 
-    async def _talk(self, client: Client, connection: web.WebSocketResponse, put: _Put) -> None:
+    async def _talk(
+        self, client: _Client, connection: web.WebSocketResponse, transport: Any
+    ) -> None:
         """Hear a client, make and send what it asks for, until one of these ends."""
         doing: tuple[Awaitable[Any], ...] = (
             self._hear(client, connection),
-            self._send(client, put),
-            client.work(),
+            self._answer(client, connection, transport),
             client.left.wait(),
         )
         tasks = [asyncio.ensure_future(one) for one in doing]
@@ -279,50 +287,47 @@ class Server:
             closing = connection.close(code=code, message=reason.encode("ascii", "replace")[:120])
             await asyncio.wait_for(closing, _GOODBYE)
 
-    async def _hear(self, client: Client, connection: web.WebSocketResponse) -> None:
+    async def _hear(self, client: _Client, connection: web.WebSocketResponse) -> None:
         async for message in connection:
             if message.type is not WSMsgType.TEXT:
                 raise BadMessageError("messages are text")
             client.hear(wish_after(message.data, client.wish, self._source.offer))
 
-    async def _send(self, client: Client, put: _Put) -> None:
-        await put(json.dumps(self._hello()))
+    async def _answer(
+        self, client: _Client, connection: web.WebSocketResponse, transport: Any
+    ) -> None:
+        """Make and send a VDI of the last wish, and of what is wished meanwhile the last again."""
+
+        async def tell(**entries: Any) -> None:
+            await self._put(connection, transport, json.dumps(entries))
+
+        await tell(**self._hello())
         while True:
-            await client.news.wait()
-            client.news.clear()
-            for kind in ("status", "error"):  # in this order: a page shows the last
-                note = client.notes.pop(kind, None)
-                if note is not None:
-                    await put(json.dumps(note))
-            await self._send_picture(client, put)
-            file = client.next_file()
-            if file is not None:
-                await self._send_file(client, put, *file)
-
-    async def _send_picture(self, client: Client, put: _Put) -> None:
-        picture = client.next_picture()
-        if picture is not None:
-            wish, file = picture
-            await put(json.dumps({"type": "picture", "said": wish.said, "bytes": len(file)}))
+            await client.wished.wait()
+            client.wished.clear()
+            wish, client.cancelled = client.wish, threading.Event()
+            if wish.view is None:
+                continue
+            await tell(type="status", doing="vdi")
+            try:
+                lists, file = await asyncio.get_running_loop().run_in_executor(
+                    self._threads, self._made, wish, client.cancelled.is_set
+                )
+            except Cancelled:
+                continue
+            except VDIError as error:
+                await tell(type="status", doing=None)
+                await tell(type="error", message=str(error))
+                continue
             if file:
-                await put(file)
+                await tell(type="vdi", bytes=len(file), lists=lists, step=wish.step)
+                for first in range(0, len(file), CHUNK):
+                    await self._put(connection, transport, file[first : first + CHUNK])
+            await tell(type="status", doing=None)
 
-    async def _send_file(self, client: Client, put: _Put, made: Made, file: bytes) -> None:
-        head = {
-            "type": "vdi",
-            "level": made.level,
-            "bytes": len(file),
-            "lists": list(made.window_size),
-            "step": made.wish.step,
-        }
-        await put(json.dumps(head))
-        for first in range(0, len(file), CHUNK):
-            if client.is_outdone(made):
-                client.given_up(made)
-                return
-            await self._send_picture(client, put)
-            await put(file[first : first + CHUNK])
-        client.sent(made)
+    def _made(self, wish: Wish, cancelled: Callable[[], bool]) -> tuple[tuple[int, int], bytes]:
+        vdi = self._source.make(wish, cancelled)
+        return ((0, 0), b"") if vdi is None else (vdi.window_size, encoded(vdi, coarse=True))
 
     async def _put(
         self, connection: web.WebSocketResponse, transport: Any, data: str | bytes
@@ -365,7 +370,6 @@ def serve(
     sample_distance: float | None = None,
     ambient_occlusion: OcclusionLike | None = None,
     memory_limit: MemoryLike | None = None,
-    regenerate_below: float = REGENERATE_BELOW,
     max_clients: int = MAX_CLIENTS,
     device: DeviceLike | None = None,
     announce: Callable[[str], object] | None = print,
@@ -374,9 +378,8 @@ def serve(
 ) -> Server:
     """Serve VDIs of a volume to web pages, which draw them at their own rate.
 
-    A page draws the VDI that it has. When that one's picture of the page's view is estimated to be
-    too far from the volume's, the server makes another of what is in view, first a coarse one.
-    Colour map, opacity, range, clipping plane and time step can be changed in the page.
+    A page draws the VDI that it has. Where its view rests the server makes another, of what is in
+    view. Colour map, opacity, range and time step can be changed in the page.
 
     Parameters
     ----------
@@ -396,9 +399,6 @@ def serve(
         Most lists of a VDI; fewer where fewer of the page's pixels show the volume.
     max_supersegments, sample_distance, ambient_occlusion, memory_limit
         As for :func:`pyvista_vdi.generate`; shorter lists by default, which are sent sooner.
-    regenerate_below : float
-        Estimated SSIM below which a page's view gets a VDI of its own; while it moves, twice the
-        error is borne.
     max_clients : int
         Most pages at once.
     device : str, int or device, optional
@@ -438,7 +438,6 @@ def serve(
         port=port,
         token=token,
         hosts=hosts,
-        below=checked_bound(regenerate_below),
         max_clients=max_clients,
     ).start()
     if announce is not None:
@@ -469,14 +468,6 @@ def _place(url: str) -> SplitResult:
 
 def _refused(why: str) -> web.Response:
     return web.Response(status=403, text=f"{why}\n")
-
-
-def _keep_queue_short(transport: asyncio.BaseTransport | None) -> None:
-    """Limit what the system holds unsent, so that pictures given up are never sent."""
-    connected = None if transport is None else transport.get_extra_info("socket")
-    if connected is not None and hasattr(socket, "TCP_NOTSENT_LOWAT"):
-        with contextlib.suppress(OSError):
-            connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, CHUNK)
 
 
 def _cannot_listen(error: Exception, host: str, port: int) -> Exception:

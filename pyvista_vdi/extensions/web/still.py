@@ -15,11 +15,8 @@ from pyvista_vdi.api import render
 from pyvista_vdi.errors import NoDeviceError
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.io import to_bytes
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 
-#: How long a WebP file is packed, 0 to 100 and 0 to 6: by (0, 0) 1.2 to 2.6 times as long in a half
-#: to a tenth of the time, by (20, 2) a hundredth shorter.
-_EFFORT = {"quality": 0, "method": 1}
 #: Longest edge of a picture that is kept in a saved notebook, pixels.
 _EDGE = 800
 
@@ -71,9 +68,10 @@ def still(
 
     Its longer edge has at most ``longest`` pixels.
     """
-    share = min(1, longest / max(vdi.picture_size))
-    size = [max(1, round(edge * share)) for edge in vdi.picture_size]
-    camera = viewer_camera(vdi.camera, vdi.picture_size) if camera is None else camera
+    own, own_size = picture_view(vdi)
+    share = min(1, longest / max(own_size))
+    size = [max(1, round(edge * share)) for edge in own_size]
+    camera = viewer_camera(own, own_size) if camera is None else camera
     try:
         return png(picture(vdi, camera, size, background, clipping_planes))
     except NoDeviceError:
@@ -107,12 +105,3 @@ def stand_in(picture: str, key: str, model_id: str) -> None:
     if shell is not None and hasattr(shell, "kernel"):
         script = _STAND_IN.format(picture=picture, key=key, model_id=model_id)
         shell.display_pub.publish({"application/javascript": script})
-
-
-def webp(image: NDArray[np.float32]) -> bytes:
-    """Return a picture, premultiplied RGBA, float32 (H, W, 4), as a lossless WebP file: 8 bits."""
-    from PIL import Image
-
-    stream = io.BytesIO()
-    Image.fromarray(to_bytes(image)).save(stream, format="webp", lossless=True, **_EFFORT)
-    return stream.getvalue()

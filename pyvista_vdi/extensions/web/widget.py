@@ -26,7 +26,7 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import checked_planes
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, picture_view
 
 try:
     import anywidget
@@ -183,7 +183,7 @@ class VDIWidget(anywidget.AnyWidget):
         The first view; by default the VDI's own.
     background : str or (float, float, float), optional
         ``"white"``, ``"#204060"`` or RGB from 0 to 1; by default the page shows through.
-    precision : {"8-byte", "16-byte", "exact"}, optional
+    precision : {"8-byte", "exact"}, optional
         What a supersegment of a VDI takes on its way to the browser, see
         :meth:`pyvista_vdi.VDI.with_precision`; by default 8 bytes, or what it has where lists are
         too long for that. Series and sets take 8 bytes.
@@ -259,7 +259,7 @@ class VDIWidget(anywidget.AnyWidget):
             _file=self._encoded(shown),
             _picture_size=_size_of(shown),
             _key=secrets.token_hex(8),
-            camera=shown.camera if camera is None else camera,
+            camera=picture_view(shown)[0] if camera is None else camera,
             time=shown.times[0] if isinstance(shown, VDISeries) else None,
             background=background,
             controls=controls,

@@ -5,8 +5,7 @@ zarr and h5py are optional, and imported where a store of theirs is opened.
 
 from __future__ import annotations
 
-from pyvista_vdi.io.stores.arrays import array_store
-from pyvista_vdi.io.stores.hdf5 import arrays_in
+from pyvista_vdi.io.stores.hdf5 import names_in
 from pyvista_vdi.io.stores.opening import is_store, open_store, open_volume
 from pyvista_vdi.io.stores.record import Level, Store, StoredVolume
 
@@ -14,9 +13,8 @@ __all__ = [
     "Level",
     "Store",
     "StoredVolume",
-    "array_store",
-    "arrays_in",
     "is_store",
+    "names_in",
     "open_store",
     "open_volume",
 ]

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
-from pyvista_vdi.io.coordinates import attributes_of
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.io.stores.record import AXES, Level, Store
 from pyvista_vdi.model.volume import Grid
 
@@ -38,8 +37,14 @@ def array_store(path: str, named: tuple[str, Any], kind: str) -> Store:
     name, array = named
     axes, are_named = _axis_names(array)
     check_axes(f"{path}::{name}", axes)
-    attributes = attributes_of(array, axes)
-    unit, spacing = attributes.get("unit of length", ""), attributes.get("spacing")
+    attributes = dict(array.attrs)
+    unit, spacing = "", attributes.get("spacing", attributes.get("element_size_um"))
+    scales = [len(dimension) for dimension in getattr(array, "dims", ())]
+    if spacing is None and (any(scales) or "_ARRAY_DIMENSIONS" in attributes):
+        warn_external(
+            f"{path}::{name} has axes with coordinates, which are not read: points are taken as 1 "
+            "apart; give read_volume or pyvista_vdi.Volume(array) spacing= and origin="
+        )
     if "element_size_um" in attributes:
         unit, spacing = "micrometer", attributes["element_size_um"]
     try:

@@ -13,7 +13,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.io.stores.hdf5 import open_hdf5
 from pyvista_vdi.io.stores.record import StoredVolume, chosen_level
 from pyvista_vdi.io.stores.zarr import open_zarr
-from pyvista_vdi.model.chunk_ranges import ZARR_FILES
+from pyvista_vdi.model.store_identity import ZARR_FILES
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.model.whole_file import as_path
 

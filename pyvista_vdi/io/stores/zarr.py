@@ -21,7 +21,7 @@ def open_zarr(path: str, inner: str) -> Store:
         import zarr
     except ImportError as error:
         raise MissingDependencyError(
-            f"{path} needs zarr ({error}): pip install 'pyvista-vdi[zarr]'"
+            f"{path} needs zarr ({error}): pip install 'pyvista-vdi[files]'"
         ) from error
     if int(zarr.__version__.split(".")[0]) < 3 and (Path(path) / "zarr.json").exists():
         raise UnsupportedError(

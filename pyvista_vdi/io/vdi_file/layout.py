@@ -17,7 +17,7 @@ import numpy as np
 FORMAT_VERSION, LEAST_VERSION = 4, 2
 
 #: What is written for each precision: version 3 only where version 2 has no place for it.
-_VERSION_OF = {"exact": 2, "16-byte": 3, "8-byte": 3}
+_VERSION_OF = {"exact": 2, "8-byte": 3}
 
 #: The codec of version 4, which browsers decode by themselves, and the version of no other.
 DEFLATE = "deflate"
@@ -127,10 +127,9 @@ def layouts(
     f4, kind = np.dtype("<f4"), "difference" if filtered else "none"
     depth = np.dtype("<u4") if filtered else f4
     depths = {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")}
-    color = np.dtype("<u4") if precision == "16-byte" else f4
     return {
         "counts": counts_layout,
         **depths,
-        "color": Layout(color, () if precision == "16-byte" else (3,), n, "none", rows),
+        "color": Layout(f4, (3,), n, "none", rows),
         "optical_depth": Layout(f4, (), n, "none", rows),
     }

@@ -44,8 +44,7 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.packing import (
-    Packed16,
-    Packing,
+    Packed8,
     check_precision,
     colors_of_differences,
     packed_8,
@@ -177,7 +176,7 @@ class _OpenFile:
             packed = self._packed()
             with workers() as pool:
                 counts = pool.submit(self._decoded_counts, packed.pop("counts"))
-                packing: Packing | None = None
+                packing: Packed8 | None = None
                 if info.precision == "8-byte":
                     stored = self._decoded_codes(packed, pool, progress)
                     offsets = counts.result()
@@ -186,9 +185,6 @@ class _OpenFile:
                 else:
                     media = self._decoded_media(packed, pool, progress)
                     offsets = counts.result()
-                    if info.precision == "16-byte":
-                        packing = Packed16(media["color"].view(np.uint32).reshape(-1))
-                        media.update(packing.media(np.diff(offsets).astype(np.int64)))
             vdi = VDI(
                 info.camera,
                 info.window_size,
@@ -290,8 +286,13 @@ class _OpenFile:
             if d["chunk_rows"] != CHUNK_ROWS:
                 self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {CHUNK_ROWS}")
             n_lists = window_size[0] * window_size[1]
+            if d.get("precision") == "16-byte":
+                raise VDIFileError(
+                    f"{self._path} has supersegments of 16 bytes, which are no longer read: "
+                    "generate it again, with the precision '8-byte' or 'exact'"
+                )
             precision = check_precision(d["precision"]) if d["version"] >= 3 else "exact"
-            packed_bytes = {"exact": 0, "16-byte": 4 * n, "8-byte": 8 * n + 6 * n_lists}
+            packed_bytes = {"exact": 0, "8-byte": 8 * n + 6 * n_lists}
             return FileInfo(
                 path=self._path,
                 format_version=d["version"],

@@ -33,7 +33,6 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
     Packed8,
-    Packed16,
     channel_differences,
     gaps_and_thicknesses,
 )
@@ -60,7 +59,7 @@ def write(
     percent smaller, ``"deflate"`` is for pages: browsers decode it, and draw a coarse level that it
     begins with while they read the rest. ``"none"`` leaves plain little-endian arrays. ``level``:
     effort of the compressor, 1 to 9; 9 for lz4, 6 for deflate and 1 for zstd by default. Higher
-    levels are slower to write, not to read. ``precision`` ("exact", "16-byte", "8-byte"): bytes of
+    levels are slower to write, not to read. ``precision`` ("exact", "8-byte"): bytes of
     a supersegment before they are compressed, as for :meth:`pyvista_vdi.VDI.with_precision`; the
     VDI's own by default. ``progress``: as for :func:`pyvista_vdi.io.write`.
     """
@@ -186,6 +185,4 @@ def _encoder(
 
         return differences
     array = counts if name == "counts" else getattr(vdi, name)
-    if isinstance(vdi.packing, Packed16) and name == "color":
-        array = vdi.packing.color
     return lambda first, last: np.ascontiguousarray(array[first:last], dtype=layout.dtype)

@@ -5,6 +5,6 @@
 
 from __future__ import annotations
 
-from pyvista_vdi.io.volumes.read import list_volumes, needs_pyvista, read_volume
+from pyvista_vdi.io.volumes.read import list_volumes, read_volume
 
-__all__ = ["list_volumes", "needs_pyvista", "read_volume"]
+__all__ = ["list_volumes", "read_volume"]

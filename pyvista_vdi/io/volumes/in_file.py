@@ -1,100 +1,87 @@
-"""A volume in a file, as an adapter finds it, and the :class:`Volume` that is made of it."""
+"""A volume in a file, as a format's function finds it, and the :class:`Volume` made of it."""
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.volume import Volume
 
-#: The command line's names of choices.
-_OPTIONS = {"time": "time-index", "channel": "channel"}
+#: What to do with what is not read.
+REMEDY = "read it by its own library, and give pyvista_vdi.Volume(array, spacing=, origin=)"
+
+
+def head_of(file: Path) -> bytes:
+    """Return a file's first bytes, unpacked where it is compressed by gzip."""
+    with file.open("rb") as stream:
+        head = stream.read(4096)
+    if not head.startswith(b"\x1f\x8b"):
+        return head
+    try:
+        return zlib.decompressobj(wbits=31).decompress(head, 4096)
+    except zlib.error:
+        return b""
 
 
 class Lazy:
-    """An array of which the shape and the type are known, and which a function reads.
+    """An array of which the shape and the type are known, and which is read where it is indexed."""
 
-    ``read`` is called with nothing, or with the index where it reads parts.
-    """
+    def __init__(self, shape: Sequence[int], dtype: Any, read: Callable[[], NDArray[Any]]) -> None:
+        self.shape, self.dtype, self._read = tuple(shape), np.dtype(dtype), read
 
-    def __init__(
-        self,
-        shape: Sequence[int],
-        dtype: DTypeLike,
-        read: Callable[..., Any],
-        *,
-        in_parts: bool = False,
-    ) -> None:
-        self.shape, self.dtype = tuple(int(n) for n in shape), np.dtype(dtype)
-        self._read, self._in_parts = read, in_parts
-
-    def __getitem__(self, index: Any) -> Any:
-        """Read it, and return a part."""
-        return self._read(index) if self._in_parts else np.asarray(self._read())[index]
+    def __getitem__(self, index: Any) -> NDArray[Any]:
+        return self._read()[index]
 
 
 def stack(
-    files: Sequence[Path], read: Callable[[Path], NDArray[Any]], *, mixed: bool = False
+    slices: Sequence[Any], read: Callable[[Any], NDArray[Any]], *, mixed: bool = False
 ) -> Lazy:
-    """Return slices, a file each, as an array along z; slices of another size are refused.
+    """Return slices of one size as an array along z, of one type unless they are ``mixed``."""
+    first = read(slices[0])
 
-    ``mixed``: slices may be of several types, and the array is of one that holds all.
-    """
-    first = read(files[0])
-
-    def all_of_them() -> NDArray[Any]:
-        array = np.empty((len(files), *first.shape), first.dtype)
-        for i, file in enumerate(files):
-            one = read(file)
+    def read_all() -> NDArray[Any]:
+        array = np.empty((len(slices), *first.shape), first.dtype)
+        for i, name in enumerate(slices):
+            one = read(name)
             if one.shape != first.shape or (one.dtype != first.dtype and not mixed):
                 raise InvalidVolumeError(
-                    f"{file} is {form(one)}, and {files[0].name} is {form(first)}: the slices of a "
-                    "volume have one size and one type"
+                    f"{name} has {one.shape} pixels of type {one.dtype}, and {slices[0]} "
+                    f"{first.shape} of {first.dtype}: the slices of a volume have one size and type"
                 )
             array = array.astype(np.promote_types(array.dtype, one.dtype), copy=False)
             array[i] = one
         return array
 
-    return Lazy((len(files), *first.shape), first.dtype, all_of_them)
-
-
-def form(picture: NDArray[Any]) -> str:
-    """Return a picture's size and type for people."""
-    return f"{' x '.join(map(str, picture.shape))} {picture.dtype}"
+    return Lazy((len(slices), *first.shape), first.dtype, read_all)
 
 
 @dataclass(frozen=True, eq=False)
 class VolumeInFile:
-    """A volume in a file: what the file says of it; its voxels are not read.
+    """A volume in a file, and what the file says of it.
 
     Attributes
     ----------
     array : array_like
-        With ``shape`` and ``dtype``; reads what it is indexed by.
+        Whatever has ``shape`` and ``dtype`` and can be indexed.
     axes : str
         A letter for each of its axes: ``x``, ``y``, ``z``, ``t`` (time), ``c`` (channel) or ``s``
         (components of colours); others must have one point.
     to_world : numpy.ndarray
         Point index (x, y, z) to the file's coordinates, float64 (4, 4).
-    name : str
-        What it is called in the file; empty where the file does not say.
-    unit : str
-        Of lengths; empty where the file does not say.
+    name, unit : str
+        What it is called, and the unit of lengths; empty where the file does not say.
     channels : tuple of str
         Their names, where they are known.
-    level : int
-        Of detail; 0 is the finest.
-    meant : bool
-        Whether the file says that it is the one to show.
-    taken : callable, optional
-        Makes the volume, where the array is not all there is.
+    meant, volume : bool, callable
+        Whether the file says that it is the one to show; what makes it, if not the array.
     """
 
     array: Any
@@ -103,18 +90,14 @@ class VolumeInFile:
     name: str = ""
     unit: str = ""
     channels: tuple[str, ...] = ()
-    level: int = 0
     meant: bool = False
-    taken: Callable[[], Volume] | None = None
-
-    def along(self, axis: str) -> int:
-        """Return the number of points along an axis: 1 where it has none of that letter."""
-        return int(self.array.shape[self.axes.index(axis)]) if axis in self.axes else 1
+    volume: Callable[[], Volume] | None = None
 
     @property
-    def dimensions(self) -> tuple[int, int, int]:
+    def dimensions(self) -> tuple[int, ...]:
         """Number of points along x, y and z."""
-        return self.along("x"), self.along("y"), self.along("z")
+        along = dict(zip(self.axes, self.array.shape, strict=True))
+        return tuple(int(along.get(axis, 1)) for axis in "xyz")
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -122,99 +105,77 @@ class VolumeInFile:
         return np.dtype(self.array.dtype)
 
     @property
-    def spacing(self) -> tuple[float, float, float]:
+    def spacing(self) -> tuple[float, ...]:
         """Distance of points along x, y and z."""
-        x, y, z = np.linalg.norm(self.to_world[:3, :3], axis=0).tolist()
-        return x, y, z
+        return tuple(np.linalg.norm(self.to_world[:3, :3], axis=0).tolist())
 
     def __str__(self) -> str:
-        size = " x ".join(map(str, self.dimensions))
-        more = [f"{self.along('t')} times"] if self.along("t") > 1 else []
-        if (n := self.along("c")) > 1:
-            more += [f"{n} channels" + (f" ({', '.join(self.channels)})" if self.channels else "")]
-        spacing = ", ".join(f"{n:g}" for n in self.spacing)
-        more += [f"spacing {spacing} {self.unit}".strip()]
+        along, said = dict(zip(self.axes, self.array.shape, strict=True)), ", ".join(self.channels)
+        more = [f"{along['t']} times"] if "t" in along else []
+        if "c" in along:
+            more.append(f"{along['c']} channels" + (f" ({said})" if said else ""))
+        more.append(f"spacing {', '.join(f'{n:g}' for n in self.spacing)} {self.unit}".strip())
         named = f"{self.name!r}: " if self.name else ""
-        return f"{named}{size} {self.dtype}, {', '.join(more)}"
+        return f"{named}{' x '.join(map(str, self.dimensions))} {self.dtype}, {', '.join(more)}"
+
+
+def chosen(
+    file: Path, what: str, names: Sequence[Any], asked: Any, how: str, listed: str = ""
+) -> int:
+    """Return the number of what is asked for by a name or a number, or of the only one."""
+    if not names:
+        raise InvalidVolumeError(f"{file} holds no {what} of three axes")
+    count = len(names)
+    numbered = f"0 to {count - 1}" if isinstance(names, range) else ", ".join(names)
+    said = f"{file} holds {count} {what}s, {listed or numbered}"
+    if asked is None and count == 1:
+        return 0
+    if asked is None:
+        raise UnsupportedError(f"{said}, and a volume is one: choose one by {how}")
+    if asked in names:
+        return names.index(asked)
+    if isinstance(asked, bool | str) or not 0 <= asked < count:
+        raise InvalidArgumentError(f"{file} has no {what} {asked!r}: it holds {listed or numbered}")
+    return int(asked)
 
 
 def volume_of(
-    found: VolumeInFile,
-    file: Path,
-    channel: int | str | None,
-    time: int | None,
-    spacing: Sequence[float] | None,
-    origin: Sequence[float] | None,
+    found: VolumeInFile, file: Path, channel: int | str | None, time: int | None
 ) -> Volume:
-    """Read a volume that a file holds: of one time, one channel, placed as asked for."""
-    if found.taken is not None:
-        for name, value in (("channel", channel), ("time", time)):
-            if value is not None:
-                raise InvalidArgumentError(f"{file} has no {name}s: leave {name}= out")
-        return placed(found.taken(), spacing, origin)
-    # Index what is not along x, y and z
-    chosen = {"t": _chosen(file, "time", found.along("t"), time, ())}
-    if found.along("c") > 1 or "s" not in found.axes or channel is None:
-        chosen["c"] = _chosen(file, "channel", found.along("c"), channel, found.channels)
-    else:
-        names = ("red", "green", "blue", "alpha")[: found.along("s")]
-        chosen["s"] = _chosen(file, "channel", found.along("s"), channel, names)
-    for axis, n in zip(found.axes, found.array.shape, strict=True):
-        if axis not in "xyztcs" and n != 1:
-            raise UnsupportedError(
-                f"{file} has {n} points along an axis {axis!r}, which is neither x, y, z, time nor "
-                f"channel: write one of them to a file of its own"
-            )
-    kept = [a for a in found.axes if a in "zyx" or (a == "s" and a not in chosen)]
-    if sorted(set(kept) & set("xyz")) != ["x", "y", "z"]:
+    """Read a volume that a file holds: of one time and one channel."""
+    axes, shape = found.axes, tuple(found.array.shape)
+    if channel is not None and "c" not in axes:  # of colours one component
+        axes = axes.replace("s", "c")
+    count = dict(zip(axes, shape, strict=True))
+    times, channels = range(count.get("t", 1)), found.channels or range(count.get("c", 1))
+    at = {
+        "t": chosen(file, "time", times, time, "time=0 (--time-index 0)"),
+        "c": chosen(file, "channel", channels, channel, "channel=0 (--channel 0)"),
+    }
+    kept = "".join(axis for axis in axes if axis in "zyxs")
+    if sorted(kept.replace("s", "")) != ["x", "y", "z"] or any(
+        n > 1 for axis, n in count.items() if axis not in "zyxstc"
+    ):
         raise InvalidVolumeError(
-            f"{file} has the axes {', '.join(found.axes)}, of shape {tuple(found.array.shape)}: a "
-            "volume has three"
+            f"{file} has the axes {', '.join(axes)}, of shape {shape}: a volume has three, and "
+            f"beside them times and channels; {REMEDY}"
         )
-    index = tuple(slice(None) if a in kept else chosen.get(a, 0) for a in found.axes)
-    count = np.prod([found.along(a) for a in kept], dtype=object)
-    require_free_memory(count * found.dtype.itemsize, f"the volume in {file}", "take less")
-    values = found.array[index]
-    if isinstance(values, np.ndarray):
-        order = [kept.index(a) for a in ("z", "y", "x", "s") if a in kept]
-        values = values.transpose(order)
-    if values.ndim == 4:
-        values = _grey(values, file)
+    if found.volume is not None:
+        return found.volume()
+    points = np.prod([count[axis] for axis in kept], dtype=object)
+    require_free_memory(points * found.dtype.itemsize, f"the volume in {file}", "take less")
+    values = found.array[tuple(slice(None) if a in kept else at.get(a, 0) for a in axes)]
+    if isinstance(values, np.memmap):  # a file that shrinks under a map kills the process
+        values = np.array(values)
+    values = values.transpose([kept.index(a) for a in "zyxs" if a in kept])
+    values = _grey(values, file) if values.ndim == 4 else values
     # Place it by its map from point index to world coordinates
-    steps = found.to_world[:3, :3]
-    lengths = np.linalg.norm(steps, axis=0)
-    cell = abs(np.linalg.det(steps))
-    if not (np.isfinite(found.to_world).all() and cell > 1e-9 * np.prod(lengths) > 0):
-        raise InvalidVolumeError(
-            f"{file} states an orientation that cannot be inverted: {found.to_world[:3].tolist()}"
-        )
-    names = found.channels
-    at = chosen.get("c", 0)
-    name = names[at] if len(names) > at else found.name or "values"
-    volume = Volume(values, lengths, found.to_world[:3, 3], steps / lengths, name=name)
+    lengths = np.linalg.norm(found.to_world[:3, :3], axis=0)
+    turn = found.to_world[:3, :3] / np.where(lengths > 0, lengths, 1.0)
+    name = found.channels[at["c"]] if found.channels else found.name or "values"
+    volume = Volume(values, lengths, found.to_world[:3, 3], turn, name=name)
     volume.unit = found.unit
-    return placed(volume, spacing, origin)
-
-
-def _chosen(
-    file: Path, what: str, count: int, asked: int | str | None, names: tuple[str, ...]
-) -> int:
-    """Return the number of a time or a channel that is asked for, or of the only one."""
-    said = f"{count} {what}s, {', '.join(names) if names else f'0 to {count - 1}'}"
-    if asked is None:
-        if count > 1:
-            raise UnsupportedError(
-                f"{file} holds {said}, and a volume is one: choose one by {what}=0 "
-                f"(--{_OPTIONS[what]} 0)"
-            )
-        return 0
-    if isinstance(asked, str):
-        if asked not in names:
-            raise InvalidArgumentError(f"{file} has no {what} {asked!r}: it holds {said}")
-        return names.index(asked)
-    if isinstance(asked, bool) or not isinstance(asked, int | np.integer) or not 0 <= asked < count:
-        raise InvalidArgumentError(f"{file} holds {said}; got {what}={asked!r}")
-    return int(asked)
+    return volume
 
 
 def placed(
@@ -231,23 +192,21 @@ def placed(
         name=volume.name,
         blanked=volume.blanked,
     )
-    other.unit = volume.unit
+    other.unit = volume.unit if spacing is None else ""  # another spacing may be in another
     return other
 
 
 def _grey(array: NDArray[Any], file: Path) -> NDArray[Any]:
     """Return scalars where colours are all grey and opaque, as many programs write them."""
-    if array.shape[3] == 1:
-        return np.ascontiguousarray(array[..., 0])
-    n_colors = array.shape[3] - 1 + array.shape[3] % 2  # without opacity
+    components = array.shape[3]
+    colors = array[..., : components - 1 + components % 2]
     most = 1 if array.dtype.kind == "f" else np.iinfo(array.dtype).max
-    opaque = n_colors == array.shape[3] or bool((array[..., -1] == most).all())
-    if opaque and all((array[..., 0] == array[..., i]).all() for i in range(1, n_colors)):
+    if (colors == array[..., :1]).all() and (components % 2 or (array[..., -1] == most).all()):
         return np.ascontiguousarray(array[..., 0])
-    if array.shape[3] == 4 and array.dtype == np.uint8:
+    if components == 4 and array.dtype == np.uint8:
         return array
     raise UnsupportedError(
-        f"the voxels of {file} are coloured, {array.shape[3]} components of type {array.dtype}: "
+        f"the voxels of {file} are coloured, {components} components of type {array.dtype}: "
         "choose one by channel=0, or write them as grey values, or as 8-bit RGBA whose fourth "
         "component is the opacity"
     )

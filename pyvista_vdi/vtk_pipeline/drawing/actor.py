@@ -14,7 +14,7 @@ from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
 from pyvista_vdi.vtk_pipeline.drawing.shader import VDIShaderProperty, show_image
-from pyvista_vdi.vtk_pipeline.filters.view import as_array
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
 
@@ -24,7 +24,7 @@ class VDIActorMethods(PlayingMethods):
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
     def _become_vdi_actor(self: Any) -> None:
-        """Install the shader; to be called once, from ``__init__``."""
+        """Install a shader of its own."""
         super().SetShaderProperty(VDIShaderProperty())  # type: ignore[misc]
         show_image(self)
 
@@ -47,6 +47,13 @@ class VDIActorMethods(PlayingMethods):
         if isinstance(old, VDIMapperMethods) and old is not mapper:
             old.driver.leave_actor(self)
         super().SetMapper(mapper)  # type: ignore[misc]
+        # VTK keeps no more than its own part of a mapper, so this observer, which is never called,
+        # keeps the rest. The shader property is what VTK frees last of an actor: so the mapper goes
+        # after its actor, by Python, and not within VTK's collection, whose lock threads wait for.
+        shader = self.GetShaderProperty()
+        shader.RemoveObservers("UserEvent")
+        if mapper is not None:
+            shader.AddObserver("UserEvent", lambda *_: mapper)
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Show what another actor shows, by a copy of its mapper, which is of one actor.
@@ -66,6 +73,7 @@ class VDIActorMethods(PlayingMethods):
                 copied.ShallowCopy(mapper)
         self.SetMapper(copied)
         super().ShallowCopy(other)  # type: ignore[misc]
+        self._become_vdi_actor()  # VTK has it share the other one's shader
         self.SetMapper(copied)
 
     def NewInstance(self) -> VDIActorMethods:
@@ -74,11 +82,18 @@ class VDIActorMethods(PlayingMethods):
 
     @property
     def vdi(self: Any) -> VDI | None:
-        """The VDI; ``None`` before the first frame.
+        """The VDI, made now where there is none or its data, look or light have changed.
 
-        Where pictures were drawn by the volume itself it is made now, of the first one's view
-        unless a camera was given, and waited for. Another one that is set is shown from the next
-        frame on, and takes the place of what made the one before: a volume, which is let go of.
+        It is of the view that the first picture had; before that, of the view that it would have
+        now; where a camera was given, of that. Making it is waited for. ``None`` where the mapper
+        has no input, or where nothing shows the actor and nobody has said a view. Another one that
+        is set is shown from the next frame on, and takes the place of what made the one before: a
+        volume, which is let go of.
+
+        Raises
+        ------
+        VDIError
+            What generating raises.
         """
         mapper = self.GetMapper()
         return None if mapper is None else mapper.driver.vdi_asked_for()  # type: ignore[no-any-return]
@@ -102,8 +117,7 @@ class VDIActorMethods(PlayingMethods):
         Of a series they are those of the step that is shown.
         """
         mapper = self.GetMapper()
-        shown = None if mapper is None else mapper.driver.input
-        return None if shown is None else shown.deferred  # type: ignore[no-any-return]
+        return None if mapper is None else mapper.driver.values_asked_for()  # type: ignore[no-any-return]
 
     @property
     def vdi_set(self: Any) -> VDICollection | None:
@@ -250,15 +264,20 @@ class VDIActorMethods(PlayingMethods):
         mapper.driver.retry()
         matrix = as_array(self.GetMatrix())
         renderer, shown = mapper.driver.renderer(), mapper.driver.input
+        shown.note_scene(mapper.driver.renderers(), matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
-            shown.take_camera(renderer, matrix)
+            shown.take_camera(self.camera_to_come(renderer), matrix)
         if window_size is not None:
             source.SetWindowSize(window_size)
         elif renderer is not None and min(renderer.GetSize()) > 0:
-            shown.take_size(renderer)
+            shown.take_size(size_of(renderer))
         return source.GetVDI()  # type: ignore[no-any-return]
+
+    def camera_to_come(self, renderer: Any) -> Any:
+        """Return the ``vtkCamera`` of a renderer's next picture."""
+        return camera_to_come(renderer)
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

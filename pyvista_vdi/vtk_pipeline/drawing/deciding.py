@@ -6,6 +6,7 @@ VDI comes from, the workers behind the frames and the user's own functions.
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import weakref
@@ -28,9 +29,9 @@ from pyvista_vdi.vtk_pipeline.drawing.volume_picture import (
     VolumePictures,
     prepared,
 )
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.inputs import ROUNDING, Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
-from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.filters.view import View, size_of
 from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.vtk_pipeline.interaction.behind import Behind, Estimators
 from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
@@ -41,12 +42,19 @@ _log = logging.getLogger(__name__)
 
 #: Views that a VDI is made to serve, degrees from V_O, where its metadata do not say.
 _VIEW_CONE = 60.0
-#: What two equal sizes of pixels differ by at most.
-_ROUNDING = 1e-6
 
+
+#: By which VDIs are known: no other one has had the number.
+_numbers: weakref.WeakKeyDictionary[VDI, int] = weakref.WeakKeyDictionary()
+_next_number = itertools.count(1)
 
 #: What a frame can show.
 Shown: TypeAlias = VDI | VolumePicture | None
+
+
+def number_of(vdi: VDI) -> int:
+    """Return the number that a VDI is known by."""
+    return _numbers.get(vdi) or _numbers.setdefault(vdi, next(_next_number))
 
 
 class Deciding:
@@ -61,8 +69,6 @@ class Deciding:
         self._window: Callable[[], Window | None] = lambda: None  # of the last frame
         self._volumes = VolumePictures()
         self._request: tuple[Any, Request] | None = None  # what the next VDI is made of, and when
-        self._numbered: Callable[[], VDI | None] = lambda: None
-        self._number = 0
         self._options = RenderOptions()  # how the last frame's VDI is drawn
         self._sighted: Frame | None = None  # the VDI made last, in the frame that is decided
         self._behind, self._estimators = Behind(), Estimators()
@@ -118,8 +124,9 @@ class Deciding:
         source, settings = self.input, self.state.settings
         if source is None:
             return None
+        source.note_scene(self.renderers(), frame.model_transform)
         if settings.automatic_view:
-            source.set_view_if_missing(frame.renderer, frame.model_transform)
+            source.set_view_if_missing(*_seen_from(frame))
         try:
             if isinstance(source, SourceInput):
                 seen = self.tell(self._asked(source, frame, joint=joint), frame)
@@ -134,14 +141,7 @@ class Deciding:
             return None if seen is None else frame.showing(seen, seen.number)
         if sighted is not None and sighted.vdi is seen and settings is self.state.settings:
             return sighted
-        return frame.showing(seen, self._number_of(seen))
-
-    def _number_of(self, vdi: VDI) -> int:
-        """Return the number of a VDI, another one than that of the VDI before."""
-        if self._numbered() is not vdi:
-            self._numbered = weakref.ref(vdi)
-            self._number += 1
-        return self._number
+        return frame.showing(seen, number_of(seen))
 
     def _asked(self, source: SourceInput, frame: Frame, *, joint: bool) -> fs.FrameAsked:
         """Look at all that decides what the frame of a volume shows."""
@@ -179,12 +179,10 @@ class Deciding:
         """
         if self._request is not None:
             of, known = self._request
-            lit = known.transfer_function.shading is not None
-            if of == stamp and (not lit or known.options.lights == source.source.GetLights()):
+            if of == stamp:
                 return known, None
-        has_view = source.source.GetCamera() is not None and source.source.GetWindowSize()
         try:
-            request = source.source.MakeRequest(None if has_view else view)
+            request = source.source.MakeRequest(None if source.has_view else view)
         except (Cancelled, InvalidVolumeError):
             raise
         except Exception as error:  # what is shown can still be drawn
@@ -197,11 +195,11 @@ class Deciding:
         vdi, made = source.last(), source.source.GetCurrentRequest()
         if vdi is None or made is None or frame.view is None:
             return None
-        number = self._number_of(vdi)
+        number = number_of(vdi)
         shown, view = frame.showing(vdi, number), frame.view
         self._options, self._sighted = shown.world_options(), shown
         detail = covered = 1.0
-        if self.state.settings.draw == "auto":  # else nobody asks
+        if self.state.settings.draw != "vdi":  # else nobody asks
             detail = magnification(vdi, frame.camera, frame.full_size)
             covered = coverage(vdi, view.camera, view.size)
         of = (shown.angle, detail, covered, shown.covered, self._options)
@@ -216,7 +214,7 @@ class Deciding:
         if isinstance(vdi, VDI):
             cone = vdi.metadata.get("view_cone")
             seen = fs.Sight(
-                self._number_of(vdi),
+                number_of(vdi),
                 vdi.bounds,
                 angle=angle_from_generating_view(vdi, view.camera),
                 magnification=magnification(vdi, frame.camera, frame.full_size),
@@ -308,20 +306,10 @@ class Deciding:
 
         The source keeps it unless the frame is a tile.
         """
-        view = frame.view
-        assert view is not None
-        wanted, whole = source.source.MakeRequest(view), frame.full_size == view.size
-        camera, size = (view.camera, view.size) if whole else (frame.camera, frame.size)
-        generating, lists = wanted.generating
-        # What covers all of a volume that is near has larger lists than the picture has pixels
-        pixels = math.prod(
-            high / low
-            for high, low in zip(
-                generating.half_extent(lists), camera.half_extent(size), strict=True
-            )
-        )
-        if not whole or pixels * math.prod(size) > math.prod(lists) * (1 + _ROUNDING):
-            wanted = replace(wanted, generating=(camera, size))
+        assert frame.view is not None
+        whole = frame.full_size == frame.view.size
+        tile = None if whole else (frame.camera, frame.size)
+        wanted = source.exact_request(frame.view, tile)
         vdi = source.source.MakeVDI(wanted)
         if whole:
             source.source.TakeVDI(vdi, wanted)
@@ -353,10 +341,10 @@ class Deciding:
             case "forget view" if source is not None:
                 source.forget_view()
             case "take view" if isinstance(source, SourceInput) and frame is not None:
-                source.take_camera(frame.renderer, frame.model_transform)
-                source.take_size(frame.renderer)
+                source.take_camera(frame.renderer.GetActiveCamera(), frame.model_transform)
+                source.take_size(size_of(frame.renderer))
             case "follow view" if isinstance(source, SourceInput) and frame is not None:
-                source.follow_if_changed(frame.renderer, frame.model_transform)
+                source.follow_if_changed(*_seen_from(frame))
             case "take" if isinstance(source, SourceInput):
                 vdi, request = self._behind.vdi, self._behind.request
                 if vdi is not None and request is not None:
@@ -389,9 +377,9 @@ class Deciding:
         vdi, made = self._made()
         assert vdi is not None and made is not None  # noqa: PT018
         assert frame is not None and frame.view is not None  # noqa: PT018
-        of, options = (self._number_of(vdi), frame.view), self._options
+        of, options = (number_of(vdi), frame.view), self._options
         detail = magnification(vdi, frame.camera, frame.full_size)
-        if made.screen == frame.view and detail <= 1 + _ROUNDING:
+        if made.screen == frame.view and detail <= 1 + ROUNDING:
             return fs.Estimate(*of, ssim=1.0, options=options)
         runtime, background = get_runtime(made.device), frame.renderer.GetBackground()
         try:
@@ -427,7 +415,7 @@ class Deciding:
             self.tell(event)
         vdi, made = self._made()
         if not self._swapped and self.state.behind and self.input is not None:
-            of = None if vdi is None or made is None else (self._number_of(vdi), vdi.bounds, made)
+            of = None if vdi is None or made is None else (number_of(vdi), vdi.bounds, made)
             seen = None if of is None else fs.Sight(*of, options=self._options)
             self.tell(fs.TimePassed(now(), seen, self.input.stamp()))
         return self._swapped
@@ -459,3 +447,8 @@ class Deciding:
             self._timer.stop()
         if swapped or self.texts.are_behind(self._behind.progress):
             window.render()
+
+
+def _seen_from(frame: Frame) -> tuple[Any, tuple[int, int], Any]:
+    """Return what a renderer sees an actor by: its camera, its size and the actor's matrix."""
+    return frame.renderer.GetActiveCamera(), size_of(frame.renderer), frame.model_transform

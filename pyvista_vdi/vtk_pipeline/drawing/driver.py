@@ -13,6 +13,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
 from pyvista_vdi.model.coverage import coverage
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.decide import placeholder_share, ssim_of
@@ -22,23 +23,25 @@ from pyvista_vdi.quality.records import replace
 from pyvista_vdi.quality.render_mode import seconds_per_pixel
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick
-from pyvista_vdi.vtk_pipeline.drawing import passes
+from pyvista_vdi.raycasting.prepared import release_from_devices
 from pyvista_vdi.vtk_pipeline.drawing.box import Box
-from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding
+from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding, number_of
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
-from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, consumers, viewport, volumes
+from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Matrix, consumers, viewport
 from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Images
-from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, touch
+from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, overlapped
+from pyvista_vdi.vtk_pipeline.drawing.refused import effects_without
 from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor, shown_box
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
 from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
 from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window, now
-from pyvista_vdi.vtk_pipeline.vtk import vtkVolume, vtkWeakReference, weakly
+from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference, weakly
 
 #: What is said where another volume has the mapper.
 _BEHIND_ANOTHER = (
@@ -113,8 +116,15 @@ class Driver(Deciding):
         return self.box.image
 
     def release(self) -> None:
-        """Free the texture and the images kept, and end what goes on; a frame begins anew."""
+        """Free textures, images and what devices hold, and end what goes on; a frame begins anew.
+
+        What lit the last frame stays.
+        """
+        held = [] if self.input is None else self.input.on_devices()
+        if isinstance(self.input, SourceInput):
+            self.input.keep_lights(self.renderers())
         super().release()
+        release_from_devices(held)
         self._texture.release()
         self._no_depth.release()
         self._selection.release()
@@ -138,6 +148,9 @@ class Driver(Deciding):
             if actor is not None:  # whose shader the copy has
                 place_image(actor, 0, (0, 0), (1, 1))
             return
+        origin, size = viewport(renderer)
+        if min(size) == 0:  # beside the tile of a picture that is drawn
+            return
         # VTK asks for four where the actor's property says that they are dependent
         components = 1 if actor.GetProperty().GetIndependentComponents() else 4
         if self.box.components != components:
@@ -148,10 +161,11 @@ class Driver(Deciding):
         if renderer.GetSelector() is not None:
             self._select(mapper, renderer)
             return
-        occluded = peeled = False
-        if renderer.GetPass() is not None or renderer.GetUseDepthPeelingForVolumes():
-            occluded, peeled = passes.tell_effects(renderer, self._warnings.warn)
-        self._selection.leave(actor, occluded=occluded, peeled=peeled)
+        effects = effects_without(renderer)
+        for text in effects.values():
+            self._warnings.warn(text)
+        peeled = "vtkDualDepthPeelingPass" in effects
+        self._selection.leave(actor, occluded="vtkSSAOPass" in effects, peeled=peeled)
         with suppress(VDIError):  # which what is drawn says
             self.box.Update()
         drawn = self._last = self._guarded(self._paint, mapper, renderer) or self._last
@@ -159,7 +173,6 @@ class Driver(Deciding):
         if window.GetInteractor() is not None:
             of_window.listen(window.GetInteractor(), Grabbing)
         unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
-        origin, size = viewport(renderer)
         place_image(actor, unit, origin, size)
         if drawn.smooth:
             self._scissor.narrow(window, shown_box(drawn.image, origin, size))
@@ -178,11 +191,11 @@ class Driver(Deciding):
 
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image."""
-        frame, others = self._frame(mapper, renderer)
+        frame = self._showing(Frame.current(renderer, self._actor(), mapper))
         if frame is None:
             return self._last
-        if others and frame.volume is None:  # which has no lists to be merged by
-            part = self.window.shared(Overlaps).part(frame, _frames)
+        if frame.volume is None:  # which has no lists to be merged by
+            part = self.window.shared(Overlaps).part(frame)
             if part is not None:
                 return part
         window = self.window
@@ -202,23 +215,37 @@ class Driver(Deciding):
         frame = (frame if size == frame.full_size else few).coarser(size)
         return (self._images.get(frame) if frame.preview else None) or self._raycast(frame)
 
-    def _frame(self, mapper: Any, renderer: Any) -> tuple[Frame | None, bool]:
-        """Return the frame of what it shows, ``None`` if that is nothing, and if others do, too."""
-        frame = Frame.current(renderer, self._actor(), mapper)
-        window = Window.of(renderer.GetRenderWindow())
+    def _showing(self, frame: Frame) -> Frame | None:
+        """Return the frame of what is to be seen, ``None`` if that is nothing."""
+        window = Window.of(frame.renderer.GetRenderWindow())
         self._window, self._view = weakref.ref(window), frame.view
-        window.join(self, renderer)
-        shown = volumes(renderer)
-        others = len(shown) > 1
-        if others and any(p.GetMapper() is mapper and p is not frame.actor for p in shown):
+        if any(
+            v.mapper is frame.mapper and v.driver is None for v in window.shown_in(frame.renderer)
+        ):
             self._warnings.warn(_BEHIND_ANOTHER)
-        seen = self.decided(frame, joint=others and self._overlapped(frame, shown))
+        seen = self.decided(frame, joint=overlapped(frame))
         if seen is not None:
             self.box.place(seen.bounds)
             if seen.volume is None and seen.number != self._counted:
                 self._counted = seen.number
                 self._generation += 1
-        return seen, others
+            seen = self._lit_and_blended(seen)
+        return seen
+
+    def _lit_and_blended(self, frame: Frame) -> Frame:
+        """Return the frame with the view whose light falls on it, and what it is blended of."""
+        volume, settings = frame.volume, self.state.settings
+        if volume is not None:
+            # In a window the VDI's light, so that nothing jumps
+            by_vdi = settings.draw != "volume" and self.window.watched_behind(settings)
+            if volume.placeholder or by_vdi or not volume.shaded or frame.view is None:
+                return frame
+            return replace(frame, lit_from=frame.view.camera)
+        parts = [] if self.input is None else self.input.parts()
+        if len(parts) < 2 or parts[0][0] is not frame.vdi:
+            return frame
+        blend = tuple((number_of(vdi), weight) for vdi, weight in parts)
+        return replace(frame, parts=tuple(parts), blend=blend)
 
     def preview_size(self, frame: Frame) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
@@ -247,17 +274,9 @@ class Driver(Deciding):
 
     def _raycast(self, frame: Frame) -> Drawn:
         """Return the image, and tell what it took."""
-        lit_from, parts, volume, window = None, [], frame.volume, self.window
-        if volume is not None and not volume.placeholder and frame.view is not None:
-            # In a window the VDI's light, so that nothing jumps
-            settings = self.state.settings
-            if settings.draw == "volume" or not window.watched_behind(settings):
-                lit_from = frame.view.camera
-        elif self.input is not None:
-            parts = self.input.parts()
-            parts = parts if len(parts) > 1 and parts[0][0] is frame.vdi else []
+        volume, window = frame.volume, self.window
         before = now()
-        drawn = self._images.raycast(frame, self.device, parts, lit_from)
+        drawn = self._images.raycast(frame, self.device)
         seconds = now() - before
         if volume is not None and volume.placeholder:
             self.tell(PlaceholderTook(math.prod(frame.size), seconds))
@@ -326,7 +345,7 @@ class Driver(Deciding):
         player = None if self.input is None else self.input.player
         shown = None if vdi is None or view is None else (vdi, view.camera, view.size)
         wide, high = last.full_size or (0, 0)
-        number = self._number if vdi is not None and self._numbered() is vdi else None
+        number = None if vdi is None else number_of(vdi)
         return VDIStatus(
             mode="none" if last.full_size is None else "preview" if last.preview else "full",
             samples=last.samples,
@@ -354,18 +373,63 @@ class Driver(Deciding):
         return swapped
 
     def vdi_asked_for(self) -> VDI | None:
-        """Return the VDI, made now where pictures have been drawn without one or of other data.
+        """Return the VDI, made now where there is none, or of what is no longer so.
 
-        It is of the view that the first picture had, or that somebody chose; ``None`` before.
+        It is of the view that the first picture had, or that somebody chose; before the first
+        picture, of the view that this would have now. ``None`` without an input, or a view.
+        """
+        source, seen = self.input, self._look_for_view()
+        if not isinstance(source, SourceInput):
+            if source is None or (source.last() is not None and source.prop is None):
+                return None if source is None else source.last()
+            return source.vdi()  # in the colours that its property has by now
+        if source.has_view:
+            self.tell(VDIAsked(source.last() is not None, source.stamp()))
+        elif seen is not None and self.state.settings.automatic_view:
+            return source.of_view(source.view_for(*seen))
+        return source.last()
+
+    def vdi_of_view(self, renderer: Any, matrix: Matrix) -> VDI | None:
+        """Return a VDI of exactly what a renderer shows of an actor of that matrix, (4, 4).
+
+        It is made beside the one that is there; without the volume, or where nobody but
+        ``actor.regenerate()`` may make another, it is that one.
         """
         source = self.input
-        if source is not None and source.deferred is not None and source.last() is not None:
-            return source.vdi()  # in the colours that its property has by now
-        if not isinstance(source, SourceInput):
-            return None if source is None else source.last()
-        if source.source.GetCamera() is not None and source.source.GetWindowSize() is not None:
-            self.tell(VDIAsked(source.last() is not None, source.stamp()))
-        return source.last()
+        if not isinstance(source, SourceInput) or self.state.settings.regenerate == "never":
+            return self.vdi_asked_for()
+        source.note_scene(self.renderers(), matrix)
+        wanted = source.exact_request(renderer_view(renderer, matrix))
+        made = source.source.GetCurrentRequest()
+        same = made is not None and made.key == wanted.key
+        return source.last() if same else source.source.MakeVDI(wanted)
+
+    def values_asked_for(self) -> DeferredVDI | None:
+        """Return the values that are classified, made now if they are not.
+
+        ``None`` where there are none, or no view to make them of.
+        """
+        if self.input is None:
+            return None
+        self._look_for_view()
+        return self.input.deferred
+
+    def _look_for_view(self) -> tuple[Any, tuple[int, int], Any] | None:
+        """Look at the scene between frames; return what the next picture sees the actor by."""
+        source, actor, renderer = self.input, self._actor(), self.renderer()
+        if source is None or actor is None:
+            return None
+        matrix = as_array(actor.GetMatrix())
+        source.note_scene(self.renderers(), matrix)
+        if renderer is None:
+            return None
+        seen = actor.camera_to_come(renderer), size_of(renderer), matrix
+        if isinstance(source, SourceInput):
+            return seen
+        source.set_view_if_missing(*seen)
+        if source.last() is None:
+            source.look(camera_of(seen[0], matrix), self.device, None)
+        return seen
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
         """Return a VDI that has all of what a view shows; without the volume, that which is there.
@@ -380,7 +444,7 @@ class Driver(Deciding):
 
     def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
         """Return what of an actor's VDI a renderer shows at a place of the window, in pixels."""
-        kept = None if self.input is None else self.input.deferred
+        kept = self.values_asked_for()
         return self._selection.pick(actor, renderer, x, y, self._first_hit, kept)
 
     @property
@@ -400,41 +464,28 @@ class Driver(Deciding):
                 self._last = self._paint(mapper, renderer)
                 vdi = self.vdi_to_pick(frame)
             if vdi is not None:
-                seen = frame.showing(vdi, self._number_of(vdi))
+                seen = frame.showing(vdi, number_of(vdi))
             selection.show(actor, renderer, seen, self.device, self._first_hit)
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             self._warnings.warn(f"the VDI cannot be picked: {type(error).__name__}: {error}", error)
             selection.show(actor, renderer, None, self.device, self._first_hit)
         self._no_depth.show(renderer.GetRenderWindow(), mapper)
 
-    def _overlapped(self, frame: Frame, shown: list[Any]) -> bool:
-        """Whether one of the volumes that are shown is ours and lies where this one does."""
-        rectangles: list[Any] = []
-        for prop in shown:
-            driver = getattr(prop.GetMapper(), "driver", None)
-            source = driver.input if isinstance(driver, Driver) else None
-            bounds = None if source is None or not prop.GetVisibility() else source.bounds()
-            if bounds is not None:
-                rectangle = Frame.current(frame.renderer, prop, None).rectangle(bounds)
-                rectangles.insert(0 if driver is self else len(rectangles), rectangle)
-        return any(touch(rectangles[0], other) for other in rectangles[1:])
-
-    def beside(self, mapper: Any, renderer: Any) -> Frame | None:
+    def beside(self, mapper: Any, renderer: Any, matrix: Matrix) -> Frame | None:
         """Return the VDI as it is to be seen beside another one; ``None`` if it is not.
 
         Never raises. What is out of the picture is not brought up to date.
         """
-        return self._guarded(self._frame_in_picture, mapper, renderer)  # type: ignore[no-any-return]
 
-    def _frame_in_picture(self, mapper: Any, renderer: Any) -> Frame | None:
-        actor = self._actor()
-        bounds = None if self.input is None else self.input.bounds()
-        if actor is None or bounds is None:
-            return None
-        if Frame.current(renderer, actor, mapper).rectangle(bounds) is None:
-            return None
-        frame, _ = self._frame(mapper, renderer)
-        return None if frame is None or frame.volume is not None else frame
+        def in_picture(mapper: Any, renderer: Any) -> Frame | None:
+            bounds = None if self.input is None else self.input.bounds()
+            frame = Frame.current(renderer, self._actor(), mapper, matrix)
+            if bounds is None or frame.rectangle(bounds) is None:
+                return None
+            seen = self._showing(frame)
+            return None if seen is None or seen.volume is not None else seen
+
+        return self._guarded(in_picture, mapper, renderer)  # type: ignore[no-any-return]
 
     def renderer(self) -> Any:
         """Return the renderer that is drawing the actor; ``None`` if it has none."""
@@ -475,20 +526,3 @@ def _is_viewport(renderer: Any) -> bool:
     width, height, x, y = [0], [0], [0], [0]
     renderer.GetTiledSizeAndOrigin(width, height, x, y)
     return viewport(renderer) == ((x[0], y[0]), (width[0], height[0]))
-
-
-def _frames(own: Frame) -> list[Frame]:
-    """Return what the renderer shows of VDIs in this frame, in its order."""
-    frames = []
-    props = own.renderer.GetViewProps()
-    for i in range(props.GetNumberOfItems()):
-        prop = props.GetItemAsObject(i)
-        if prop is own.actor:
-            frames.append(own)
-            continue
-        mapper = prop.GetMapper() if isinstance(prop, vtkVolume) and prop.GetVisibility() else None
-        driver = getattr(mapper, "driver", None)
-        frame = driver.beside(mapper, own.renderer) if isinstance(driver, Driver) else None
-        if frame is not None:
-            frames.append(frame)
-    return frames

@@ -29,7 +29,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkFloatArray,
     vtkPixelBufferObject,
-    vtkPropCollection,
     vtkTextureObject,
 )
 
@@ -80,13 +79,16 @@ class Frame:
     angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
     effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
     few_lists: VDI | None = None  # raycast in place of the VDI in a preview: every second list
+    parts: tuple[tuple[VDI, float], ...] = ()  # what the picture is blended of, with weights
+    blend: tuple[tuple[int, float], ...] = ()  # the same by numbers
+    lit_from: Camera | None = None  # whose light falls on a shaded volume, in place of the VDI's
     bounds: tuple[float, ...] = ()  # of what is seen, model frame
     options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
     depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
 
     @classmethod
-    def current(cls, renderer: Any, actor: Any, mapper: Any) -> Frame:
-        """Read the frame that ``renderer`` is drawing."""
+    def current(cls, renderer: Any, actor: Any, mapper: Any, matrix: Matrix | None = None) -> Frame:
+        """Read the frame that ``renderer`` is drawing; ``matrix`` is where an actor stands."""
         (x, y), (width, height) = viewport(renderer)
         vtk_camera = renderer.GetActiveCamera()
         aspect = renderer.GetTiledAspectRatio()
@@ -96,14 +98,13 @@ class Frame:
         scale = np.linalg.norm(model_view[2, :3])  # of the camera's model transform
         to_view, lens = view_of(projection @ model_view, width / height, model_view[2] / scale)
         projection[:, 2] *= scale
-        matrix = as_array(actor.GetMatrix())
+        matrix = as_array(actor.GetMatrix()) if matrix is None else matrix
         camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=to_view @ matrix, **lens)
-        size, view = (width, height), None
-        if mapper is not None:
-            try:
-                view = renderer_view(renderer, matrix)
-            except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
-                view = View(camera, size)
+        size = (width, height)
+        try:
+            view = renderer_view(renderer, matrix)
+        except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
+            view = View(camera, size)
         of = (renderer, actor, mapper, size, view, matrix)
         return cls(size, (x, y), camera, to_view, projection[2:], *of)
 
@@ -141,7 +142,8 @@ class Frame:
     @property
     def key(self) -> Any:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
-        return (self.camera, self.size, self.full_size, self.options, self.few_lists is None)
+        of = (self.camera, self.size, self.full_size, self.options)
+        return (*of, self.lit_from, self.blend, self.few_lists is None)
 
     @property
     def preview(self) -> bool:
@@ -369,26 +371,6 @@ def consumers(prop: Any) -> Iterator[Any]:
             yield consumer
             if consumer.IsA("vtkProp"):
                 yield from consumers(consumer)
-
-
-def volumes(renderer: Any) -> list[Any]:
-    """Return a renderer's volumes, those in assemblies too.
-
-    ``vtkRenderer.GetVolumes`` would hold them until it is called again, and an assembly that is
-    asked for its volumes while it draws its parts loses its place among them.
-    """
-    found = vtkPropCollection()
-
-    def take(props: Any) -> None:
-        for i in range(props.GetNumberOfItems()):
-            prop = props.GetItemAsObject(i)
-            if hasattr(prop, "GetParts"):
-                take(prop.GetParts())
-            else:
-                prop.GetVolumes(found)
-
-    take(renderer.GetViewProps())
-    return [found.GetItemAsObject(i) for i in range(found.GetNumberOfItems())]
 
 
 def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:

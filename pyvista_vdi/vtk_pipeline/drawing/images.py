@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pyvista_vdi.device import aligned_empty
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Image, Recent, same_depth
@@ -33,14 +31,8 @@ class Images:
         drawn = self._kept.get(frame.key)
         return drawn if drawn is not None and same_depth(drawn.depth, frame.depth) else None
 
-    def raycast(
-        self, frame: Frame, device: object, parts: list[tuple[VDI, float]], lit_from: Camera | None
-    ) -> Drawn:
-        """Return the image, and keep it; the memory of one that goes is for the next raycast.
-
-        ``parts`` are the VDIs that it is blended of, with weights, if there are several, and
-        ``lit_from`` is the view whose light falls on a volume, in place of the VDI's.
-        """
+    def raycast(self, frame: Frame, device: object) -> Drawn:
+        """Return the image, and keep it; the memory of one that goes is for the next raycast."""
         width, height = frame.size
         # Fresh memory costs a page fault for every 4096 bytes that are written
         pixels, self._free = self._free, None
@@ -50,9 +42,9 @@ class Images:
         request = FrameRequest(frame.camera, frame.size, frame.options, frame.depth, device, out)
         seen = frame.few_lists or frame.vdi
         if frame.volume is not None:
-            image = frame.volume.picture(request, lit_from)
-        elif parts and frame.few_lists is None:
-            image = blended(parts, request)
+            image = frame.volume.picture(request, frame.lit_from)
+        elif frame.parts and frame.few_lists is None:
+            image = blended(frame.parts, request)
         else:
             assert seen is not None
             image = render_vdi(seen, request)

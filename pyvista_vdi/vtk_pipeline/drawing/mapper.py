@@ -8,8 +8,6 @@ and the fragment shader that ``VDIActor`` installs looks it up.
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -30,33 +28,7 @@ from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper, weakly
-
-#: What VTK objects need as long as they live, with these held weakly, until ordinary code or
-#: Python's garbage collector finds here that they are gone. Their attributes may not hold it:
-#: VTK's garbage collector deletes a mapper under a lock, and Python code that ran then, such as
-#: callbacks of weak references to what a driver holds, would let another thread take the
-#: interpreter and wait for that lock. And attributes that outlive their object let VTK end the
-#: process (vtkPythonUtil::FindObject lets go of them in the midst of a table that this changes).
-_kept: dict[int, tuple[Callable[[], Any], Any]] = {}
-
-
-def keep(thing: Any, owner: Any) -> None:
-    """Keep a thing until a VTK object is gone."""
-    let_go()
-    _kept[id(thing)] = weakly(owner), thing
-
-
-def let_go(*_: Any, thing: Any = None, owner: Any = None) -> None:
-    """Release what is kept for objects that are gone, and a thing kept for this one."""
-    if id(thing) in _kept and _kept[id(thing)][0]() is owner:
-        _kept.pop(id(thing))
-    while gone := [key for key, (held, _) in list(_kept.items()) if held() is None]:
-        for key in gone:  # a mapper, and then what is kept for it
-            _kept.pop(key, None)
-
-
-gc.callbacks.append(let_go)
+from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
 COARSEST = 4.0
@@ -83,7 +55,6 @@ class VDIMapperMethods(ArrayChoiceMethods):
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
         self._driver = Driver()
-        keep(self._driver, self)
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
@@ -253,8 +224,8 @@ class VDIMapperMethods(ArrayChoiceMethods):
             (``SetRegenerateBelow``): pictures depend on scene, view and the pictures before, never
             on time. ``"vdi"``: always the VDI. ``"volume"``: always the volume, by our volume
             raycaster; a VDI is made only when one is asked for. Volumes that overlap in the picture
-            are drawn by VDIs, ``"auto"`` off-screen by such as are of that view. In windows, a
-            volume that the device holds brick by brick is drawn by its VDI.
+            are drawn by VDIs, off-screen by such as are of that view. In windows, a volume that
+            the device holds brick by brick is drawn by its VDI.
 
         Raises
         ------

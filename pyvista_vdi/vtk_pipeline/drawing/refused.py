@@ -88,6 +88,37 @@ OF_SHADERS: Mapping[str, str] = {
     **{f"Set{stage}ShaderCode": _SHADER for stage in ("Vertex", "Fragment", "Geometry")},
 }
 
+#: Render passes that work on depths, of which a VDI, like every volume, writes none, or that draw
+#: meshes after it; and the volumes' own peeling. What of their effect cannot be had.
+_EFFECTS: Mapping[str, str] = {
+    "vtkSSAOPass": "screen-space ambient occlusion (enable_ssao) does not see the VDI, which is "
+    "as dark as what is behind it; ambient_occlusion= of add_vdi (VDISource.SetAmbientOcclusion) "
+    "is its own. VTK's error that volumes must be shaded is about its own mappers",
+    "vtkShadowMapPass": "shadows (enable_shadows) are drawn with their meshes after the VDI, as "
+    "after every volume: it is missing where a mesh is behind it, and casts no shadow",
+    "vtkDepthOfFieldPass": "depth of field (enable_depth_of_field) does not see the VDI, which is "
+    "as sharp as what is behind it",
+    "vtkDualDepthPeelingPass": "depth peeling of volumes (SetUseDepthPeelingForVolumes) cannot "
+    "take a VDI's picture apart: it is drawn over all that is translucent, as without; for "
+    "translucent meshes inside a volume draw that by VTK's own mapper (add_volume)",
+}
+
+
+def effects_without(renderer: Any) -> dict[str, str]:
+    """Return what a renderer's passes cannot do to a VDI, by the passes' classes."""
+    found, pending = set(), [renderer.GetPass()]
+    while pending:
+        each = pending.pop()
+        if each is not None:
+            found.add(each.GetClassName())
+            pending.append(each.GetDelegatePass() if hasattr(each, "GetDelegatePass") else None)
+            members: Any = each.GetPasses() if hasattr(each, "GetPasses") else None
+            count = 0 if members is None else members.GetNumberOfItems()
+            pending += [members.GetItemAsObject(i) for i in range(count)]
+    if renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes():
+        found.add("vtkDualDepthPeelingPass")
+    return {name: text for name, text in _EFFECTS.items() if name in found}
+
 
 def refusing(methods: Mapping[str, str]) -> Callable[[_Class], _Class]:
     """Return a decorator of classes whose methods of these names raise, and say why."""

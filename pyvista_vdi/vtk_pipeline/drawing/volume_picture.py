@@ -51,6 +51,8 @@ class VolumePicture:
         By which it is known.
     bounds : tuple of float
         The volume's, model frame.
+    shaded : bool
+        Whether it is lit.
     pictures : int
         How many were drawn.
 
@@ -67,6 +69,7 @@ class VolumePicture:
         self.placeholder = placeholder
         self.number = next(_numbers)
         self.bounds = request.volume.bounds
+        self.shaded = request.transfer_function.shading is not None
         self.pictures = 0
         volume, sampling = request.volume, request.options
         room = picture_room(

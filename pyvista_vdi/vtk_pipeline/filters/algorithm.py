@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from inspect import Parameter, Signature
-from operator import attrgetter
 from typing import Any
 
 from pyvista_vdi.errors import Cancelled, InvalidVDIError, VDIError
@@ -13,12 +11,6 @@ from pyvista_vdi.vtk_pipeline import vtk
 TIME_STEPS = vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS()
 TIME_RANGE = vtk.vtkStreamingDemandDrivenPipeline.TIME_RANGE()
 UPDATE_TIME_STEP = vtk.vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
-
-#: Docstrings of ``SetDevice`` and ``GetDevice``.
-DEVICE = (
-    "Choose the OpenCL device; ``None`` is the default one.",
-    "Return the device as it was set.",
-)
 
 
 class Algorithm(vtk.VTKPythonAlgorithmBase):
@@ -37,18 +29,22 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         super().__init__(**ports)
         self._error: BaseException | None = None
         self._python_waits = False
+        self._before: Any = None
 
     def SetInputDataObject(self, *args: Any) -> None:
         """Set the input (optionally after a port number, 0)."""
         for each in args:
             vtk.require_this_build(type(each))
         super().SetInputDataObject(*args)
+        self._before = None
 
     def SetInputConnection(self, *args: Any) -> None:
         """Set what makes the input, a port of another algorithm (optionally after a number)."""
         for each in args:
             vtk.require_this_build(type(each))
         super().SetInputConnection(*args)
+        # Of an algorithm in Python VTK holds no more than what is written in C++
+        self._before = None if args[-1] is None else args[-1].GetProducer()
 
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
@@ -116,49 +112,6 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         if getattr(self, attribute) != value:
             setattr(self, attribute, value)
             self.Modified()
-
-
-def accessors(
-    name: str,
-    attribute: str,
-    argument: str,
-    sets: str,
-    gets: str,
-    check: Callable[[Any], Any] = lambda value: value,
-) -> tuple[Any, Any]:
-    """Return VTK's pair of methods of a setting, ``Set<name>(<argument>)`` and ``Get<name>()``.
-
-    ``check`` returns the value that ``attribute`` keeps, or raises; ``sets`` and ``gets`` are the
-    methods' docstrings.
-    """
-
-    def set_value(self: Any, value: Any) -> None:
-        self._change(attribute, check(value))
-
-    return pair(name, argument, (set_value, sets), (attrgetter(attribute), gets))
-
-
-def pair(
-    name: str,
-    argument: str,
-    setter: tuple[Callable[[Any, Any], None], str],
-    getter: tuple[Callable[[Any], Any], str],
-) -> tuple[Any, Any]:
-    """Return two functions, each given with its docstring, as methods of these names."""
-    kind = Parameter.POSITIONAL_OR_KEYWORD
-    signature = Signature([Parameter("self", kind), Parameter(argument, kind)])
-
-    def set_it(*args: Any, **named: Any) -> None:
-        setter[0](*signature.bind(*args, **named).args)
-
-    def get_it(self: Any) -> Any:
-        return getter[0](self)
-
-    for method, verb, doc in ((set_it, "Set", setter[1]), (get_it, "Get", getter[1])):
-        method.__name__ = method.__qualname__ = verb + name
-        method.__doc__ = doc
-    set_it.__signature__ = signature  # type: ignore[attr-defined]
-    return set_it, get_it
 
 
 class Held:

@@ -35,6 +35,8 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
 COUNT = "count"
 #: Field array of the canonical form: everything that is not an array, as JSON.
 DESCRIPTION = "vdi"
+#: Point array of a uniform grid: what of a volume is blank, as :class:`Volume` has it.
+BLANKED = "blank octants"
 #: Version of the canonical form; readers refuse newer ones. The first is of colours alone.
 FORM_VERSION = 2
 
@@ -114,7 +116,8 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         It shares memory with the point array where that is contiguous and of a type that the
         kernels take; cell data become point data by ``vtkCellDataToPointData``, as
         ``Plotter.add_volume`` does. What its ghost arrays mark (hidden and duplicate points and
-        cells, ``vtkUniformGrid``'s blanking) is blank, as VTK's GPU mapper draws it.
+        cells, ``vtkUniformGrid``'s blanking) is blank, as VTK's GPU mapper draws it, and so is
+        what its point array ``blank octants`` marks.
 
     Raises
     ------
@@ -137,8 +140,7 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         )
     dimensions = image.GetDimensions()
     name = array.GetName() or "values"
-    points = image.GetPointData()
-    of_cells = all(points.GetArray(i) is not array for i in range(points.GetNumberOfArrays()))
+    of_cells = is_of_cells(image, array)
     if of_cells:
         if min(dimensions) < 2:
             raise InvalidVolumeError(
@@ -152,18 +154,28 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         to_points.SetInputData(cells)
         to_points.Update()
         array = to_points.GetOutput().GetPointData().GetScalars()
-    extent = image.GetExtent()
-    first: list[float] = [0.0, 0.0, 0.0]
-    image.TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first)
     direction = image.GetDirectionMatrix()
     return Volume(
         as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
         image.GetSpacing(),
-        first,
+        first_point(image),
         [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
         name=name,
         blanked=_blanked(image, of_cells),
     )
+
+
+def is_of_cells(data: Any, array: vtk.vtkDataArray) -> bool:
+    """Whether an array of a data set's is none of its points'."""
+    points = data.GetPointData()
+    return all(points.GetArray(i) is not array for i in range(points.GetNumberOfArrays()))
+
+
+def first_point(image: vtk.vtkImageData) -> list[float]:
+    """Return where the first point of an image lies, whatever its extent begins with."""
+    first: list[float] = [0.0, 0.0, 0.0]
+    image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
+    return first
 
 
 def ghosts_of(image: vtk.vtkImageData) -> dict[str, NDArray[np.uint8]]:
@@ -180,13 +192,15 @@ def ghosts_of(image: vtk.vtkImageData) -> dict[str, NDArray[np.uint8]]:
 
 
 def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
-    """Return the octants that VTK's GPU mapper leaves out, as a :class:`Volume` has them.
+    """Return the octants that are left out, as a :class:`Volume` has them.
 
-    Its texels are points, or cells where the scalars are theirs. It leaves out a sample where the
+    An array of the image's says which, and ghost arrays do as VTK's GPU mapper reads them: its
+    texels are points, or cells where the scalars are theirs, and it leaves out a sample where the
     texel that it lies in is marked, or the nearest one to it along an axis. Where texels are
     points, a marked cell is the point that it begins at.
     """
-    blanked = None
+    own = image.GetPointData().GetArray(BLANKED)
+    blanked = None if own is None else as_numpy(own).reshape(image.GetDimensions()[::-1])
     for kind, marks in ghosts_of(image).items():
         cells = kind == "cell" and of_cells
         texels = np.pad(marks > 0, (0, 1)) if kind == "cell" and not cells else marks > 0
@@ -222,9 +236,8 @@ def scalars_of(
         for kind, data in attributes.items()
     }
     named = (array.GetName() for found in arrays.values() for array in found)
-    names = [
-        name for name in dict.fromkeys(named) if name != vtk.vtkDataSetAttributes.GhostArrayName()
-    ]
+    marks = (vtk.vtkDataSetAttributes.GhostArrayName(), BLANKED)
+    names = [name for name in dict.fromkeys(named) if name not in marks]
     if name is None:
         # Active scalars: points first, whatever the preference, as pyvista's active_scalars
         for data in attributes.values():
@@ -262,11 +275,6 @@ def as_numpy(array: vtk.vtkDataArray) -> NDArray[Any]:
 
 def volume_to_image(volume: Volume, name: str | None = None) -> vtk.vtkImageData:
     """Return a volume as a grid that shares its memory; its scalars are the active ones."""
-    if volume.blanked is not None:
-        raise UnsupportedError(
-            f"the volume {volume.name!r} has blank octants, for which a vtkImageData has no place: "
-            "pass the grid that it was made of"
-        )
     image = vtk.vtkImageData()
     image.SetDimensions(volume.dimensions)
     image.SetSpacing(volume.spacing)
@@ -275,6 +283,8 @@ def volume_to_image(volume: Volume, name: str | None = None) -> vtk.vtkImageData
     # x runs fastest in VTK's point order, as it does in a C-ordered [z, y, x] array
     flat = volume.array.reshape((-1, 4) if volume.rgba else -1)
     image.GetPointData().SetScalars(to_vtk(volume.name if name is None else name, flat))
+    if volume.blanked is not None:
+        image.GetPointData().AddArray(to_vtk(BLANKED, volume.blanked.ravel()))
     return image
 
 

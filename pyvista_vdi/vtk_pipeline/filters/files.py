@@ -155,10 +155,10 @@ class VDIWriter(Algorithm):
         return self._path
 
     def SetPrecision(self, precision: str | None) -> None:
-        """Set what a supersegment takes: ``"exact"``, ``"16-byte"`` or ``"8-byte"``.
+        """Set what a supersegment takes: ``"exact"`` or ``"8-byte"``.
 
         By default, ``None``, steps of a ``.vdis`` take 8 bytes, and all else is exact, as with
-        :meth:`VDI.save`. ``.exr`` files are exact.
+        :meth:`VDI.save`. ``.exr`` files have float32.
         """
         self._change("_precision", None if precision is None else check_precision(precision))
 

@@ -14,7 +14,7 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_number, not_taken
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.model.vdi import VDI, picture_size
+from pyvista_vdi.model.vdi import VDI, picture_size, picture_view
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
@@ -170,10 +170,11 @@ class VDIToImage(Classifying):
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         vdi = self._classified(self._read(vtkImageData.GetData(inputs[0], 0)))
-        view = vdi.camera if self._camera is None else self._camera
+        own, own_size = picture_view(vdi)
+        view = own if self._camera is None else self._camera
         view = view.azimuth(self._azimuth) if self._azimuth else view
         view = view.elevation(self._elevation) if self._elevation else view
-        size = self._window_size or vdi.picture_size
+        size = self._window_size or own_size
         # Known only now, where another program's reader gives the VDI
         announce(outputs, size, SCALARS)
         ask_for_all([outputs])

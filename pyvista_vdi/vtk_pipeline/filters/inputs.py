@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError, warn_external
+from pyvista_vdi.generation.deferred import warn_of_range
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -20,9 +23,12 @@ from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
-from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
+from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
 from pyvista_vdi.vtk_pipeline.vtk import require_this_build
+
+#: What two equal sizes of pixels differ by at most.
+ROUNDING = 1e-6
 
 #: What of a transfer function no list of values can honour, and how a property has it.
 _OF_GRADIENTS = {"shading": "shading (shade = True)", "gradient_opacities": "gradient opacity"}
@@ -63,8 +69,17 @@ class Input:
         """Return something that changes whenever it is worth trying again."""
         return None if self._vdi is None else id(self._vdi)
 
-    def set_view_if_missing(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
-        """Take the frame's view as the generating view, if there is none yet."""
+    def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
+        """Note the renderers that show it, for their lights, and the actor's matrix, (4, 4)."""
+
+    def set_view_if_missing(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> None:
+        """Take the view of a frame as the generating view, if there is none yet."""
+
+    def on_devices(self) -> list[Any]:
+        """Return the VDIs, values and volumes that devices may hold because of this."""
+        return [self._vdi]
 
     def forget_view(self) -> None:
         """Wait for the view of another frame, where that of a frame was taken."""
@@ -121,6 +136,10 @@ class Input:
 class SourceInput(Input):
     """What a :class:`VDISource` makes."""
 
+    #: Whether it is lit by whatever renderer shows it, and stands where its actor does in the world
+    #: of a camera that was given: what ``add_vdi`` adds.
+    of_scene = False
+
     def __init__(self, source: VDISource) -> None:
         super().__init__()
         self.source = source
@@ -138,7 +157,7 @@ class SourceInput(Input):
 
     def _from(self, source: VDISource) -> SourceInput:
         other = SourceInput(source)
-        other._camera, other._size = self._camera, self._size
+        other._camera, other._size, other.of_scene = self._camera, self._size, self.of_scene
         return other
 
     def watch(self, changed: Callable[..., Any] | None) -> None:
@@ -187,25 +206,85 @@ class SourceInput(Input):
         """Return the newest time stamp of all that it depends on."""
         if self.source.GetNumberOfInputConnections(0) > 0:
             self.source.UpdateInput()
-        self.source.CheckLights()
         stamps = [self.source.GetMTime()]
         data = self.source.GetInputDataObject(0, 0)
         prop = self.source.GetVolumeProperty()
         stamps += [thing.GetMTime() for thing in (data, prop) if thing is not None]
         return max(stamps)
 
-    def set_view_if_missing(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
-        """Take the renderer's view, unless nothing can be drawn from it; this raises why not."""
+    def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
+        """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
+        source, lit_by = self.source, self.source.GetLitBy()
+        known = any(renderer is lit_by for renderer in renderers)
+        if self.of_scene and not known and (self.alone or lit_by is None):
+            source.SetLitBy(renderers[0] if renderers else None)
+        if self.alone:
+            source.SetPlace(model_transform)
+        source.CheckLights()
+
+    def keep_lights(self, closed: Sequence[Any]) -> None:
+        """Keep the lights of the renderer that lights it, if that is one of those that close."""
+        lit_by = self.source.GetLitBy()
+        if self.of_scene and any(renderer is lit_by for renderer in closed):
+            self.source.GetLights()
+            self.source.SetLitBy(None)
+
+    @property
+    def has_view(self) -> bool:
+        """Whether somebody, or a frame, has given a view to make the VDI of."""
+        return self.source.GetCamera() is not None and self.source.GetWindowSize() is not None
+
+    def set_view_if_missing(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> None:
+        """Take a renderer's view, unless nothing can be drawn from it; this raises why not."""
         source = self.source
-        if source.GetCamera() is not None and source.GetWindowSize() is not None:
-            return
-        seen = Camera.from_any(renderer.GetActiveCamera(), model_transform=model_transform)
-        view = View(source.GetCamera() or seen, source.GetWindowSize() or _size(renderer))
-        source.MakeRequest(view)
+        if not self.has_view:
+            source.MakeRequest(self.view_for(camera, size, model_transform))
         if source.GetCamera() is None:
-            self.take_camera(renderer, model_transform)
+            self.take_camera(camera, model_transform)
+        elif self.of_scene and self._camera is None and source.GetCurrentRequest() is None:
+            source.PlaceCamera(model_transform)  # one that was given with the volume
         if source.GetWindowSize() is None:
-            self.take_size(renderer)
+            self.take_size(size)
+
+    def view_for(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> View:
+        """Return the view that a VDI is made of where a renderer has this one."""
+        given = self.source.GetCamera()
+        if given is None:
+            given = camera_of(camera, model_transform)
+        elif self.of_scene:
+            given = given.replace(model_transform=model_transform)
+        return View(given, self.source.GetWindowSize() or size)
+
+    def of_view(self, view: View) -> VDI:
+        """Return the VDI of a view and of what there is now, made if it is another one.
+
+        The view of those to come stays.
+        """
+        source, wanted = self.source, self.source.MakeRequest(view)
+        made = source.GetCurrentRequest()
+        if made is None or made.key != wanted.key:
+            source.TakeVDI(source.MakeVDI(wanted), wanted, view=False)
+        return source.GetCurrentVDI()  # type: ignore[return-value]
+
+    def exact_request(
+        self, view: View, tile: tuple[Camera, tuple[int, int]] | None = None
+    ) -> Request:
+        """Return what a VDI of exactly a view's picture is made of, or of a tile of it.
+
+        What covers all of a volume that is near would have larger lists than that has pixels.
+        """
+        wanted = self.source.MakeRequest(view)
+        camera, size = tile or (view.camera, view.size)
+        generating, lists = wanted.generating
+        extents = zip(generating.half_extent(lists), camera.half_extent(size), strict=True)
+        pixels = math.prod(size) * math.prod(high / low for high, low in extents)
+        if tile is not None or pixels > math.prod(lists) * (1 + ROUNDING):
+            wanted = replace(wanted, generating=(camera, size))
+        return wanted
 
     def forget_view(self) -> None:
         """Wait for the view of another frame, where that of a frame was taken."""
@@ -215,18 +294,20 @@ class SourceInput(Input):
             self.source.SetWindowSize(None)
         self._camera = self._size = None
 
-    def take_camera(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
-        """Set the renderer's view as that of the next VDI."""
-        self.source.SetCamera(renderer.GetActiveCamera(), model_transform)
+    def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:
+        """Set a renderer's view as that of the next VDI."""
+        self.source.SetCamera(camera, model_transform)
         self._camera = self.source.GetCamera()
 
-    def take_size(self, renderer: Any) -> None:
-        """Set the renderer's window as that of the next VDI."""
-        self.source.SetWindowSize(_size(renderer))
+    def take_size(self, size: tuple[int, int]) -> None:
+        """Set a renderer's window as that of the next VDI."""
+        self.source.SetWindowSize(size)
         self._size = self.source.GetWindowSize()
 
-    def follow_if_changed(self, renderer: Any, model_transform: NDArray[np.float64]) -> None:
-        """Take the renderer's view if what the VDI was made of has changed since, the view apart.
+    def follow_if_changed(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> None:
+        """Take a renderer's view if what the VDI was made of has changed since, the view apart.
 
         What somebody has set, the camera or the window's size, stays.
         """
@@ -234,9 +315,14 @@ class SourceInput(Input):
         if made is None or self._camera is None or source.GetCamera() is not self._camera:
             return
         if source.MakeRequest().content != made.content:
-            self.take_camera(renderer, model_transform)
+            self.take_camera(camera, model_transform)
             if source.GetWindowSize() == self._size:
-                self.take_size(renderer)
+                self.take_size(size)
+
+    def on_devices(self) -> list[Any]:
+        """Return the VDI and the volume."""
+        made = self.source.GetCurrentRequest()
+        return [self.last(), None if made is None else made.volume]
 
 
 class ImageInput(Input):
@@ -279,20 +365,76 @@ class ImageInput(Input):
         return self._image.GetMTime()
 
 
+class LateValues:
+    """Values of a volume that are made once, of the first view that there is.
+
+    Then the volume is let go of.
+    """
+
+    def __init__(self, source: VDISource) -> None:
+        self._source: VDISource | None = source
+        self._made: DeferredVDI | None = None
+        self._bounds = source.GetInputBounds()
+
+    @property
+    def bounds(self) -> Any:
+        """The volume's, or those of what was made, model frame."""
+        return self._bounds if self._made is None else self._made.bounds
+
+    def take_view(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> None:
+        """Make them of this view, or of a camera that was given."""
+        if self._source is not None and self._source.GetWindowSize() is None:
+            if self._source.GetCamera() is None:
+                self._source.SetCamera(camera)
+            self._source.PlaceCamera(model_transform)
+            self._source.SetWindowSize(size)
+
+    def get(self) -> DeferredVDI | None:
+        """Return the values, made now if they are not yet; ``None`` without a view."""
+        source: Any = self._source
+        if source is not None and source.GetWindowSize() is not None:
+            made = source.GetVDI()
+            warn_of_range(made, source.GetVolume())
+            self._made, self._source = made, None
+        return self._made
+
+
 class DeferredInput(Input):
     """Values that a volume property classifies, anew when it has changed; no volume is needed."""
 
-    deferred: DeferredVDI
-
-    def __init__(self, deferred: DeferredVDI, prop: Any) -> None:
+    def __init__(self, values: DeferredVDI | LateValues, prop: Any) -> None:
         super().__init__()
-        self.deferred, self.prop = deferred, prop
+        self._values, self.prop = values, prop
         self._made_at: Any = None
         self._look: TransferFunction | None = None  # of the VDI that was made last
         self._left_out: list[str] = []
 
-    def vdi(self) -> VDI:
-        """Return the VDI that the property makes of the values now; warn of what it leaves out."""
+    @property
+    def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
+        """The values, made now if they are not yet; ``None`` without a view to make them of."""
+        return self._values.get() if isinstance(self._values, LateValues) else self._values
+
+    def set_view_if_missing(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> None:
+        """Take the view of a frame as that of the values, if there is none yet."""
+        if isinstance(self._values, LateValues):
+            self._values.take_view(camera, size, model_transform)
+
+    def on_devices(self) -> list[Any]:
+        """Return the VDI and its values."""
+        return [] if self._vdi is None else [self._vdi, self.deferred]
+
+    def vdi(self) -> VDI | None:
+        """Return the VDI that the property makes of the values now; warn of what it leaves out.
+
+        ``None`` where there are none yet, for there is no view.
+        """
+        values = self.deferred
+        if values is None:
+            return None
         stamp = self.stamp()
         if self._vdi is None or self._made_at != stamp:
             look = transfer_function_from_property(self.prop)
@@ -306,26 +448,21 @@ class DeferredInput(Input):
                 )
             self._left_out = asked
             if self._vdi is None or self._look != look:  # the time stamp alone says little
-                self._vdi, self._look = classify_on_device(self.deferred, look), look
+                self._vdi, self._look = classify_on_device(values, look), look
             self._made_at = stamp
         return self._vdi
 
     def classified_by(self, prop: Any) -> Input:
         """Return one of the same values: whoever shares this one keeps the property."""
-        return DeferredInput(self.deferred, prop)
+        return DeferredInput(self._values, prop)
 
     def bounds(self) -> tuple[float, ...]:
         """Return the bounds in the model frame."""
-        return self.deferred.bounds
+        return self._values.bounds
 
     def stamp(self) -> Any:
         """Return the time stamp of the property and its functions."""
         return self.prop.GetMTime()
-
-
-def _size(renderer: Any) -> tuple[int, int]:
-    width, height = renderer.GetSize()
-    return max(1, width), max(1, height)
 
 
 def input_of(data: Any) -> Input:
@@ -342,7 +479,7 @@ def input_of(data: Any) -> Input:
         image = ImageInput(data)
         image.vdi()  # refuse a damaged one now
         return image
-    show = registry.made_of("shown", data)
+    show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
     require_this_build(type(data))

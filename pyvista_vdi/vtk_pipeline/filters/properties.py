@@ -329,10 +329,9 @@ def _tabulate(
         beyond = (high - low) / SAMPLED_ENTRIES or 1e-6 * max(1.0, abs(low))
         low, high = low - beyond, high + beyond
     # Where chunks would have to be read for it, only if a table might not show all that there is
-    chunks = getattr(volume, "chunks", None)
     apart = min(np.diff(function.varying).min(initial=np.inf) for function in functions)
     plain = linear and apart >= 64 * (high - low) / SAMPLED_ENTRIES
-    if volume is not None and not (plain and chunks is not None and chunks.ranges() is None):
+    if volume is not None and not (plain and getattr(volume, "chunked", False)):
         least, largest = _data_range(volume)
         low, high = min(max(low, least), largest), max(min(high, largest), least)
     whole = nearest and volume is not None and volume.array.dtype.kind in "iu"

@@ -28,7 +28,7 @@ from pyvista_vdi.model.options import (
     QualityTarget,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, screen_metadata
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import warn_missed
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
@@ -78,13 +78,16 @@ class Request:
     @property
     def generation(self) -> GenerationRequest:
         """What is asked of whatever generates."""
+        metadata, screen = self.metadata, self.screen
+        if self.generating != (screen.camera, screen.size):
+            metadata = {**metadata, "screen": screen_metadata(screen.camera, screen.size)}
         return GenerationRequest(
             self.volume,
             self.transfer_function,
             *self.generating,
             self.options,
             self.device,
-            metadata=self.metadata,
+            metadata=metadata,
         )
 
 
@@ -131,13 +134,6 @@ class VDISource(SourceSettings):
         self.CheckLights()
         self._check_input()
         super().Update(*args)
-
-    def CheckLights(self) -> None:
-        """Be out of date if the renderer that lights the volume has other lights by now."""
-        made = self._request
-        lit = made is not None and made.transfer_function.shading is not None
-        if made is not None and lit and made.options.lights != self.GetLights():
-            self.Modified()
 
     def _check_input(self) -> None:
         """Be out of date if somebody has brought the input to another time, and this asks for none.
@@ -196,10 +192,14 @@ class VDISource(SourceSettings):
             warn=False,
         )
 
-    def TakeVDI(self, vdi: VDI, request: Request) -> None:
-        """Take a VDI that was made of a request elsewhere, as if it had been made here."""
-        self._window_size = request.screen.size
-        if not (self._track and self._given is not None):  # which goes on to be followed
+    def TakeVDI(self, vdi: VDI, request: Request, *, view: bool = True) -> None:
+        """Take a VDI that was made of a request elsewhere, as if it had been made here.
+
+        ``view``: its view becomes that of the VDIs to come.
+        """
+        if view:
+            self._window_size = request.screen.size
+        if view and not (self._track and self._given is not None):  # which goes on to be followed
             self._camera = request.screen.camera
         self._vdi, self._request = vdi, request
         self.Modified()  # the output is another
@@ -253,7 +253,7 @@ class VDISource(SourceSettings):
         if self.GetNumberOfInputConnections(0) == 0:
             return None
         data = self.UpdateInput()
-        if isinstance(data, vtkImageData) and self._holds_all(data):
+        if isinstance(data, vtkImageData):
             return tuple(data.GetBounds()) if data.GetNumberOfPoints() else None
         return self._known_bounds()
 
@@ -272,8 +272,8 @@ class VDISource(SourceSettings):
             camera = None  # RequestData says what is wrong with it
         if grid is not None and camera is not None and self._window_size is not None:
             _, (width, height) = self._view(grid, camera, self._window_size, warn=False)
-        self.picture_size = width, height
-        announce(outputs, self.picture_size)
+        self.picture_size = self._window_size or (width, height)
+        announce(outputs, (width, height))
         return 1
 
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
@@ -338,10 +338,15 @@ class VDISource(SourceSettings):
             table = self._table
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self._options, lights=lights)
+        # Where lights of the scene shine on it, the volume is lit where it stands now
+        placed = self._placed if lights.of_scene else None
+        screen = View(camera, window_size)
+        if placed is not None:
+            camera = camera.replace(model_transform=placed)
         return Request(
             volume,
             table,
-            View(camera, window_size),
+            screen,
             self._view(image, camera, window_size, warn=warn),
             options,
             self._deferral,
@@ -349,7 +354,7 @@ class VDISource(SourceSettings):
             self._device,
             {"scalars": volume.name, **self._metadata},
             (
-                *(self._volume_key, table, options, self._deferral),
+                *(self._volume_key, table, options, placed, self._deferral),
                 *(self._target, self._device, self._metadata),
             ),
         )
@@ -401,7 +406,7 @@ class VDISource(SourceSettings):
         data = self.GetInputDataObject(0, 0)
         if data is not None and not isinstance(data, vtkImageData):
             return None
-        if data is not None and data.GetNumberOfPoints() > 0 and self._holds_all(data):
+        if data is not None and data.GetNumberOfPoints() > 0:
             grid.CopyStructure(data)
             return grid
         if extent is None:
@@ -415,10 +420,6 @@ class VDISource(SourceSettings):
             if information.Has(key):
                 put(information.Get(key))
         return grid
-
-    def _holds_all(self, data: vtkImageData) -> bool:
-        """Whether the data at the input are all of it."""
-        return True
 
     def _advance(self, fraction: float) -> bool:
         self.UpdateProgress(fraction)

@@ -47,6 +47,7 @@ _PLAIN = (
     "_target",
     "_device",
     "_lights",
+    "_placed",
     "_progress",
     "_metadata",
 )
@@ -75,8 +76,9 @@ class SourceSettings(Classifying):
         self._deferral = Deferral()
         self._target: QualityTarget | None = None
         self._device: Any = None
-        self._lights: Lights | None = None
+        self._lights = Lights()  # of the renderer, as they were read last
         self._lit_by = vtkWeakReference()
+        self._placed: Any = None  # rows of the actor's matrix
         self._progress: Progress | None = None
         self._metadata: dict[str, Any] = {}
 
@@ -157,6 +159,13 @@ class SourceSettings(Classifying):
         self._change("_camera", view)
         self._watch_camera()
 
+    def PlaceCamera(self, model_transform: ArrayLike) -> None:
+        """Set where the volume stands in the world of the camera that was given, (4, 4)."""
+        if self._given is not None:
+            self._given.model_transform = model_transform
+        if self._camera is not None:
+            self._change("_camera", self._camera.replace(model_transform=model_transform))
+
     def GetCamera(self) -> Camera | None:
         """Return the generating view on the screen, before coverage widens it."""
         if self._track and self._given is not None and self._given.has_moved:
@@ -229,17 +238,48 @@ class SourceSettings(Classifying):
             camera do not. What is given as a list is copied now.
         """
         renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
-        fixed = None if lights is None or renderer is not None else Lights.from_any(lights)
         require_this_build(type(renderer))
-        if renderer is not self._lit_by.Get():
-            self._lit_by.Set(renderer)
-            self.Modified()
-        self._change("_lights", fixed)
+        self._lit_by.Set(renderer)
+        self._change("_lights", Lights.from_any(lights))
 
     def GetLights(self) -> Lights:
-        """Return what a shaded volume is lit by, as it is now."""
+        """Return what a shaded volume is lit by; of a renderer, as its lights are now."""
         renderer = self._lit_by.Get()
-        return Lights.from_any(self._lights if renderer is None else renderer)
+        lights = self._lights if renderer is None else Lights.from_any(renderer)
+        if lights != self._lights:
+            self._lights = lights
+            if self._is_shaded():
+                self.Modified()
+        return self._lights
+
+    def CheckLights(self) -> None:
+        """Be out of date if a shaded volume's renderer has other lights by now."""
+        if self._is_shaded():
+            self.GetLights()
+
+    def GetLitBy(self) -> Any:
+        """Return the renderer whose lights are looked at; ``None`` where there is none."""
+        return self._lit_by.Get()
+
+    def SetLitBy(self, renderer: Any) -> None:
+        """Look at the lights of another renderer; ``None`` leaves them as they were read last."""
+        self._lit_by.Set(renderer)
+
+    def SetPlace(self, model_transform: ArrayLike) -> None:
+        """Note the matrix, (4, 4), of the actor that the volume is shown by.
+
+        Where lights of the scene shine on a shaded volume, another place makes another VDI, which
+        is lit there.
+        """
+        placed = tuple(map(tuple, np.asarray(model_transform).tolist()))
+        if placed != self._placed:
+            self._placed = placed
+            if self._is_shaded() and self._lights.of_scene:
+                self.Modified()
+
+    def _is_shaded(self) -> bool:
+        prop = self.GetVolumeProperty()
+        return prop is not None and bool(prop.GetShade())
 
     def SetOptions(self, options: GenerationOptions) -> None:
         """Set how the VDI is made, all of it at once; lights are set by :meth:`SetLights`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View as View
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Held
-from pyvista_vdi.vtk_pipeline.vtk import weakly
+from pyvista_vdi.vtk_pipeline.vtk import vtkCamera, vtkMatrix4x4, vtkRenderer, weakly
+
+#: Largest departure of a rotation from one, by rounding of its matrix.
+_RIGID = 1e-9
 
 
 def as_array(matrix: Any) -> NDArray[np.float64]:
@@ -21,16 +24,48 @@ def as_array(matrix: Any) -> NDArray[np.float64]:
     return np.array(elements).reshape(4, 4)
 
 
-def aim(theirs: Any, camera: Camera) -> None:
-    """Set a ``vtkCamera`` to a view; a model transform is the prop's."""
-    theirs.SetPosition(camera.position)
-    theirs.SetFocalPoint(camera.focal_point)
-    theirs.SetViewUp(camera.view_up)
+def aim(theirs: Any, camera: Camera, matrix: NDArray[np.float64] | None = None) -> None:
+    """Set a ``vtkCamera`` to a view of the model frame, which a prop's matrix, (4, 4), places.
+
+    The model transform is in the camera: where it is rigid beside that matrix, the eye moves.
+    """
+    placed = camera.model_transform @ np.linalg.inv(np.eye(4) if matrix is None else matrix)
+    turn = placed[:3, :3]
+    rigid = np.abs(turn @ turn.T - np.eye(3)).max() <= _RIGID and np.linalg.det(turn) > 0
+    back = np.linalg.inv(placed) if rigid else np.eye(4)
+    position, focal_point = (
+        (back @ (*point, 1))[:3] for point in (camera.position, camera.focal_point)
+    )
+    theirs.SetPosition(position)
+    theirs.SetFocalPoint(focal_point)
+    theirs.SetViewUp(back[:3, :3] @ camera.view_up)
+    on_top = vtkMatrix4x4()
+    on_top.DeepCopy((np.eye(4) if rigid else placed).ravel())
+    theirs.SetModelTransformMatrix(on_top)
     theirs.SetUseHorizontalViewAngle(camera.use_horizontal_view_angle)
     theirs.SetViewAngle(camera.view_angle)
     theirs.SetParallelProjection(camera.parallel_projection)
     theirs.SetParallelScale(camera.parallel_scale)
     theirs.SetWindowCenter(*camera.window_center)
+    if hasattr(theirs, "is_set"):  # PyVista's, which keeps this by itself
+        theirs.parallel_projection, theirs.is_set = camera.parallel_projection, True
+
+
+def camera_to_come(renderer: Any) -> Any:
+    """Return the camera of a renderer's next picture: its own, or what VTK will make and reset."""
+    if renderer.IsActiveCameraCreated():
+        return renderer.GetActiveCamera()
+    return framed(vtkCamera(), renderer, renderer.ComputeVisiblePropBounds())
+
+
+def framed(camera: Any, renderer: Any, bounds: Sequence[float]) -> Any:
+    """Move a camera as the renderer's ``ResetCamera`` of these bounds would move its own."""
+    scratch = vtkRenderer()
+    scratch.SetActiveCamera(camera)
+    scratch.SetAspect(renderer.GetTiledAspectRatio(), 1.0)
+    if bounds[0] <= bounds[1]:
+        scratch.ResetCamera(bounds)
+    return camera
 
 
 def camera_of(camera: Any, model_transform: ArrayLike | None = None) -> Camera:
@@ -50,9 +85,13 @@ def camera_of(camera: Any, model_transform: ArrayLike | None = None) -> Camera:
 
 def renderer_view(renderer: Any, model_transform: NDArray[np.float64]) -> View:
     """Return what a renderer shows an actor from; UnsupportedError where no VDI can be."""
-    camera = camera_of(renderer.GetActiveCamera(), model_transform)
+    return View(camera_of(renderer.GetActiveCamera(), model_transform), size_of(renderer))
+
+
+def size_of(renderer: Any) -> tuple[int, int]:
+    """Return width and height of a renderer's picture in pixels, at least 1."""
     width, height = renderer.GetSize()
-    return View(camera, (max(1, width), max(1, height)))
+    return max(1, width), max(1, height)
 
 
 class TrackedCamera:

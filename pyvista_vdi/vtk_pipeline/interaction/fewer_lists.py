@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from pyvista_vdi.io.vdi_file.coarse import of_rows, rows_of
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
-from pyvista_vdi.model.packing import Packed8, Packed16
 from pyvista_vdi.model.vdi import VDI
 
 #: Share of the way to the middle of the bounds at which their corners are looked at.
@@ -41,9 +40,7 @@ def subsampled_lists(vdi: VDI, along_x: int, along_y: int) -> VDI:
     offsets, rows = rows_of(vdi, taken, vdi.counts.reshape(-1)[taken])
     result = of_rows(vdi, view, window, offsets, rows, vdi.optical_depth[rows])
     packing = vdi.packing
-    if isinstance(packing, Packed16):
-        result.packing = replace(packing, color=packing.color[rows])
-    elif isinstance(packing, Packed8):
+    if packing is not None:
         result.packing = replace(
             packing,
             origins=packing.origins[taken],

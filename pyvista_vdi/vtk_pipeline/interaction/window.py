@@ -10,12 +10,16 @@ import contextlib
 import time
 import weakref
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi.quality.frame_state import Settings
 from pyvista_vdi.quality.pace import Pace
+from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction import browser
-from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGL2PSHelper, weakly
+from pyvista_vdi.vtk_pipeline.vtk import vtkMatrix4x4, vtkOpenGLGL2PSHelper, vtkVolume, weakly
 
 T = TypeVar("T")
 
@@ -26,7 +30,7 @@ _BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressE
 #: Priorities of observers before and after the style's, which is 0.
 _BEFORE, _AFTER = 1.0, -1.0
 
-#: By the windows' addresses; without callbacks, as ``drawing.mapper._kept`` explains.
+#: By the windows' addresses.
 _windows: dict[str, weakref.ref[Window]] = {}
 
 
@@ -51,6 +55,84 @@ class Met:
         return True
 
 
+class ShownVolume(NamedTuple):
+    """A volume that a renderer shows, and what is behind it."""
+
+    actor: Any
+    mapper: Any
+    driver: Any  # of a VDI; None behind a volume of VTK's
+    assemblies: tuple[Any, ...]  # that it is a part of, the outermost first
+    shader: Any
+
+    @property
+    def visible(self) -> bool:
+        """Whether it is drawn, with the assemblies that it is in."""
+        return all(each.GetVisibility() for each in (self.actor, *self.assemblies))
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """Model frame to world, (4, 4), in the order of VTK's sums; not while it is drawn."""
+        placed = vtkMatrix4x4()
+        for each in (*self.assemblies, self.actor):
+            if each.GetMatrix() is not None:
+                vtkMatrix4x4.Multiply4x4(placed, each.GetMatrix(), placed)
+        return as_array(placed)
+
+
+class ShownVolumes:
+    """The volumes of a renderer, those in assemblies too, in its order.
+
+    They are held, with the objects that Python has of them, from the first look until a list of
+    props changes. VTK holds no more than its own part of them: where Python has let go of an object
+    of one of its own classes, each look at it would make another one.
+    """
+
+    def __init__(self, renderer: Any) -> None:
+        self.renderer = weakly(renderer)
+        self._volumes: list[ShownVolume] | None = None
+        self._lists: list[tuple[Any, int]] = []  # of props, and the tags of their observers
+
+    def __call__(self) -> list[ShownVolume]:
+        """Return them."""
+        if self._volumes is None:
+            self._volumes, weak = [], weakref.ref(self)
+
+            def changed(*_: Any) -> None:
+                shown = weak()
+                if shown is not None:
+                    shown.forget()
+
+            self._look(self.renderer().GetViewProps(), (), changed)
+        return self._volumes
+
+    def _look(self, props: Any, assemblies: tuple[Any, ...], changed: Callable[..., None]) -> None:
+        assert self._volumes is not None
+        self._lists.append((props, props.AddObserver("ModifiedEvent", changed)))
+        for i in range(props.GetNumberOfItems()):
+            prop = props.GetItemAsObject(i)
+            if hasattr(prop, "GetParts"):
+                # Not vtkRenderer.GetVolumes: an assembly that is asked for its volumes while it
+                # draws its parts loses its place among them
+                self._look(prop.GetParts(), (*assemblies, prop), changed)
+            elif isinstance(prop, vtkVolume):
+                mapper = prop.GetMapper()
+                driver = getattr(mapper, "driver", None)
+                own = driver if driver is not None and driver.actor is prop else None
+                shader = prop.GetShaderProperty()
+                self._volumes.append(ShownVolume(prop, mapper, own, assemblies, shader))
+
+    def check(self) -> None:
+        """Look again where a volume has another mapper than it had."""
+        if any(each.actor.GetMapper() is not each.mapper for each in self._volumes or ()):
+            self.forget()
+
+    def forget(self) -> None:
+        """Let go of them."""
+        lists, self._lists, self._volumes = self._lists, [], None
+        for props, tag in lists:
+            props.RemoveObserver(tag)
+
+
 class Window:
     """The frames of one render window; VTK's window owns this object, through its observers.
 
@@ -69,7 +151,7 @@ class Window:
         self.pace = Pace()
         self.of_frame: dict[Any, Any] = {}
         self._window = weakly(window)
-        self._drivers: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._shown: list[ShownVolumes] = []  # by each renderer that has drawn a VDI
         self._shared: dict[type, Any] = {}
         self._watched = Met()
         self._known: list[Callable[[], Any]] = []
@@ -101,9 +183,11 @@ class Window:
             self._shared[kind] = kind()
         return self._shared[kind]  # type: ignore[no-any-return]
 
-    def join(self, driver: Any, renderer: Any) -> None:
-        """Note that a driver draws in this window; called in each of its frames."""
-        self._drivers.add(driver)
+    def shown_in(self, renderer: Any) -> list[ShownVolume]:
+        """Return the volumes that a renderer of this window shows; called in each VDI's frame."""
+        for shown in self._shown:
+            if shown.renderer() is renderer:
+                return shown()
         if self._watched.is_new(renderer):
             weak = weakref.ref(self)
 
@@ -113,6 +197,14 @@ class Window:
                     window._camera_changed()
 
             renderer.AddObserver("ActiveCameraEvent", camera_changed)
+        self._shown.append(ShownVolumes(renderer))
+        return self._shown[-1]()
+
+    @property
+    def drivers(self) -> list[Any]:
+        """Those of all VDIs in this window."""
+        shown = [each.driver for volumes in self._shown for each in volumes()]
+        return list(dict.fromkeys(driver for driver in shown if driver is not None))
 
     def listen(self, interactor: Any, kind: type[Any]) -> None:
         """Begin and end what is shared of a kind around what a style does at a press."""
@@ -123,7 +215,7 @@ class Window:
         def pressed(caller: Any, _: str) -> None:
             window = weak()
             if window is not None:
-                window.shared(kind).begin(list(window._drivers), caller)
+                window.shared(kind).begin(window.drivers, caller)
 
         def taken(*_: Any) -> None:
             window = weak()
@@ -137,7 +229,7 @@ class Window:
     @property
     def single(self) -> bool:
         """Whether no other VDI is drawn in this window."""
-        return len(self._drivers) <= 1
+        return sum(bool(driver.actor.GetVisibility()) for driver in self.drivers) <= 1
 
     @property
     def drawing(self) -> bool:
@@ -213,16 +305,22 @@ class Window:
         self.of_frame.clear()
         self.number += 1
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
-        drivers = list(self._drivers)
+        window = self._window()
+        for shown in list(self._shown):
+            if window.HasRenderer(shown.renderer()):
+                shown.check()
+            else:
+                self._shown.remove(shown)
+                shown.forget()
+        drivers = self.drivers
         if self.whole_picture:
             for driver in drivers:
                 driver.between_frames()
         self._foreground.close()
         for runtime in {driver.runtime() for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
-        window = self._window()
         samples = window.GetMultiSamples()
-        if samples and self.pace.dear_samples and self._may_go_without(window, drivers):
+        if samples and self.pace.dear_samples and self._may_go_without():
             self._given_up, samples = samples, 0
             window.SetMultiSamples(0)
         # From 9.7 on VTK draws the whole window once more to give the screen a depth buffer, which
@@ -232,13 +330,13 @@ class Window:
             window.SetFrameBlitModeToBlitToCurrent()
         self.pace = self.pace.began(samples)
 
-    def _may_go_without(self, window: Any, drivers: list[Any]) -> bool:
+    def _may_go_without(self) -> bool:
         """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
         shown = [
-            (driver.state.settings, renderer)
-            for driver in drivers
-            for renderer in driver.renderers()
-            if renderer.GetRenderWindow() is window and driver.actor.GetVisibility()
+            (each.driver.state.settings, volumes.renderer())
+            for volumes in self._shown
+            for each in volumes()
+            if each.driver is not None and each.visible
         ]
         cameras = [known() for known in self._known]
         return bool(shown) and all(
@@ -262,7 +360,7 @@ class Window:
         started, self._started = self._started, None
         self._previewed = self.pace.frame.preview or given_up is not None
         seconds = None if started is None else now() - started
-        moving = any(self.moving(driver.state.settings) for driver in self._drivers)
+        moving = any(self.moving(driver.state.settings) for driver in self.drivers)
         self.pace = self.pace.ended(seconds, moving)
 
     def _camera_changed(self) -> None:

@@ -132,8 +132,6 @@ def pipeline(folder):
     simple.SaveData(str(folder / "small.vdi"), source, Precision="8-byte", Compression="zstd")
     reader = simple.OpenDataFile(str(folder / "brain.vdi"))
     simple.SaveData(str(folder / "again.vdi"), reader)
-    simple.SaveData(str(folder / "again.exr"), reader)
-    simple.SaveData(str(folder / "third.vdi"), simple.OpenDataFile(str(folder / "again.exr")))
     picture = simple.VDIToImage(Input=source, Azimuth=AZIMUTH)
     view = show_picture(picture, SIZE)
     simple.SaveScreenshot(str(folder / "picture.png"), view, ImageResolution=SIZE)
@@ -268,21 +266,6 @@ def in_time(folder):
     source.ColorFunction.ColorSpace = "RGB"
     source.OpacityFunction.Points = [0.0, 0.0, 0.5, 0.0, 255.0, 0.8, 0.5, 0.0]
     return source
-
-
-def ranks(folder):
-    """Make VDIs of points, of cells and of time steps with all ranks of a server."""
-    source = brain_source(simple.OpenDataFile(str(folder / "brain.vti")))
-    simple.SaveData(str(folder / "points.vdi"), source)
-    picture = simple.VDIToImage(Input=source, Azimuth=AZIMUTH)
-    view = show_picture(picture, SIZE, "Surface")
-    simple.SaveScreenshot(str(folder / "picture.png"), view, ImageResolution=SIZE)
-    cells = brain_source(simple.PointDatatoCellData(Input=source.Input))
-    cells.Scalars = ["CELLS", "ImageScalars"]
-    simple.SaveData(str(folder / "cells.vdi"), cells)
-    wavelet = simple.Wavelet(WholeExtent=[-9, 10, -8, 12, -7, 6])
-    simple.SaveData(str(folder / "wavelet.vdi"), simple.VDISource(Input=wavelet, WindowSize=SIZE))
-    simple.SaveData(str(folder / "steps.vdis"), in_time(folder))
 
 
 def settings(folder):

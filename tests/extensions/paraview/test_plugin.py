@@ -182,8 +182,7 @@ def test_files_keep_every_bit(made):
     folder, _ = made
     first = pvdi.read(folder / "brain.vdi")
     assert first.n_supersegments > 10_000
-    for name in ("again.vdi", "again.exr", "third.vdi"):
-        assert pvdi.read(folder / name).equals(first), name
+    assert pvdi.read(folder / "again.vdi").equals(first)
     assert pvdi.read(folder / "small.vdi").equals(first.with_precision("8-byte"))
     assert (folder / "small.vdi").stat().st_size < 0.5 * (folder / "brain.vdi").stat().st_size
 
@@ -308,47 +307,6 @@ def test_colour_map_editor_acts_on_values(paraview, tmp_path, default_runtime):
     for name, i in (("first", 0), ("last", 1)):  # from a state, each view by its own colour map
         again = screenshot(tmp_path / f"{name}.png")
         np.testing.assert_array_equal(again, screenshot(tmp_path / f"scene_{i}.png"))
-
-
-def save_volumes(folder):
-    """Save what the case ``ranks`` reads."""
-    save_steps(folder)
-    brain = examples.load_brain().extract_subset((0, 180, 0, 216, 0, 180), rate=(3, 3, 3))
-    brain.rename_array(brain.active_scalars_name, "ImageScalars")
-    brain.save(folder / "brain.vti")
-
-
-@pytest.fixture(scope="module")
-def by_one_process(paraview, tmp_path_factory):
-    """The folder with what one process made in the case ``ranks``."""
-    folder = tmp_path_factory.mktemp("one")
-    save_volumes(folder)
-    paraview("ranks", folder)
-    return folder
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", ["", " --symmetric"])
-def test_ranks_make_one_vdi_together(by_one_process, paraview, tmp_path, mode, default_runtime):
-    """Of points, of cells at blocks' borders, of a source that gives parts, and of time steps."""
-    if shutil.which("mpirun") is None:
-        pytest.skip("mpirun is not installed: Debian's package openmpi-bin")
-    save_volumes(tmp_path)
-    mpirun = "mpirun --oversubscribe --allow-run-as-root -n 3"
-    # The client that each symmetric rank has finds no picture on any but the first
-    no_range = "Could not determine array range"
-    times = 3 if mode else 1  # symmetric ranks run the script each
-    paraview("ranks", tmp_path, program=f"{mpirun} pvbatch{mode}", bears=[no_range], times=times)
-    for name in ("points.vdi", "cells.vdi", "wavelet.vdi", "steps.vdis"):
-        found, one = (pvdi.read(folder / name) for folder in (tmp_path, by_one_process))
-        for ours, expected in zip(found, one, strict=True) if "vdis" in name else [(found, one)]:
-            assert np.prod(ours.metadata["blocks"]) == 3, name
-            pictures = [over_black(pvdi.render(vdi, vdi.camera)) for vdi in (ours, expected)]
-            assert pictures[1].max() > 0.1, name
-            assert compare_images(*pictures).ssim >= 0.9999, name
-            assert np.abs(pictures[0] - pictures[1]).max() <= 1 / 255, name
-    pictures = [screenshot(folder / "picture.png") for folder in (tmp_path, by_one_process)]
-    assert compare_images(*pictures).ssim > 0.99
 
 
 def ball_at(step):

@@ -7,11 +7,13 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from command_line import complaint, outcome, run
 
 from pyvista_vdi.extensions.paraview import cli as verb
+from pyvista_vdi.extensions.paraview.parts.one_process import require_one_process
 
 
 @pytest.fixture
@@ -83,3 +85,10 @@ def test_paraview_is_not_shown_what_it_cannot_use(plain_installation, capsys):
     (plain_installation.parent / "vtkmodules").mkdir()
     message = complaint(capsys, "paraview", "--environment")
     assert "holds a VTK of its own" in message
+
+
+def test_a_server_of_several_ranks_is_refused_when_the_plugin_is_loaded():
+    with pytest.raises(ImportError, match=r"has 4 ranks, .* without mpirun, or .*InSitu"):
+        require_one_process(SimpleNamespace(GetNumberOfProcesses=lambda: 4))
+    require_one_process(SimpleNamespace(GetNumberOfProcesses=lambda: 1))
+    require_one_process(None)

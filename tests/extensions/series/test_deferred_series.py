@@ -141,7 +141,9 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
     ("kept", "says"),
     [
         ({"importance": [1, -1]}, "importance must be"),
-        ({"precision": "16-byte"}, "no 16-byte supersegments"),
+        ({"value_range": RANGE, "importance": [(0, 0), (300, 0)]}, "importance is 0 over all"),
+        ({"importance": "much"}, "importance must be.*much"),
+        ({"ambient_occlusion": pvdi.AmbientOcclusion()}, "ambient occlusion follows"),
     ],
 )
 def test_what_cannot_be_kept_is_refused_before_a_step_is_written(kept, says, tmp_path):
@@ -177,8 +179,6 @@ def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
         for name in ("run.vdis", "run.html"):
             with pytest.raises(InvalidArgumentError, match="cmap, opacity: .*classified"):
                 vdis.save(tmp_path / name, cmap="bone", opacity="linear")
-    with pytest.raises(UnsupportedError, match="16-byte"):
-        series.save(tmp_path / "run.vdis", precision="16-byte")
     with pytest.raises(InvalidArgumentError, match="cmap"):
         pvdi.generate_series(volumes(), CAMERA, SIZE, cmap="bone", **KEPT)
     with pytest.raises(UnsupportedError, match="quality"):

@@ -62,7 +62,7 @@ def test_slices_are_series_and_negative_indices_count_from_the_end(series):
     assert isinstance(part, pvdi.VDISeries)
     assert part.times == (1.0, 4.0)
     assert part[1] is series[3]
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match=r"\[\d+\] is out of range: there are \d+ steps"):
         series[4]
 
 

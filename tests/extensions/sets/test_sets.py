@@ -232,7 +232,7 @@ def test_what_is_no_set_is_refused(made):
     other = pvdi.generate(z, VIEW, (4, 4), transfer_function=_table())
     with pytest.raises(InvalidVDIError, match="bounds"):
         pvdi.VDISet.of([made[0], other])
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match=r"is out of range: there are \d+ VDIs"):
         made[len(made)]
     assert [vdi is made[i] for i, vdi in enumerate(made)] == [True] * len(made)
     assert made[1:3] == [made[1], made[2]]

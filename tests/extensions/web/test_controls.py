@@ -317,7 +317,12 @@ def test_fingers_use_it_and_do_not_touch_what_has_faded(vdi, open_page, tmp_path
     opener = page.page.get_by_role("button", name="View and marks")
     box = opener.bounding_box()
     at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.evaluate("void document.body.append(document.createElement('vdi-viewer'))")
+    page.page.wait_for_timeout(3500)  # that of a viewer which waits for its data has not faded
     page.wait_for("!viewer.shadowRoot.querySelector('.frame.awake')")
+    waiting = "document.body.lastChild"
+    assert page.evaluate(f"!!{waiting}.shadowRoot.querySelector('.frame.awake')")
+    page.evaluate(f"{waiting}.remove()")
     tap(*at)
     page.page.wait_for_timeout(500)
     assert opener.get_attribute("aria-expanded") == "false"

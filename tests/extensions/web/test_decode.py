@@ -19,8 +19,7 @@ window.decoded = (bytes) => told(decodeVDI(bytes));
 window.loadVDI = load;
 """
 
-DIRECT = ("counts", "front", "back", "color", "optical_depth")
-PACKED = ("counts", "origin", "stride", *DIRECT[1:])
+PACKED = ("counts", "origin", "stride", "front", "back", "color", "optical_depth")
 
 
 @pytest.fixture
@@ -52,13 +51,18 @@ def large_vdi():
     )  # fmt: skip
 
 
-@pytest.mark.every(6)
-@pytest.mark.parametrize("codec", ["lz4", "zstd", "deflate", "none"])
-@pytest.mark.parametrize("precision", ["exact", "16-byte", "8-byte"])
-def test_arrays_are_python_s(codec, precision, page):
+@pytest.mark.parametrize("precision", ["exact", "8-byte"])
+def test_arrays_are_python_s(precision, page):
     for vdi in (large_vdi(), *(random_vdi(np.random.default_rng(seed)) for seed in range(4))):
         packed = vdi.with_precision(precision)
-        assert_decoded(decoded(page, file_of(packed, codec)), packed)
+        assert_decoded(decoded(page, file_of(packed)), packed)
+
+
+@pytest.mark.parametrize("codec", ["lz4", "zstd", "none"])
+def test_other_compressions_are_refused_with_the_remedy(codec, page):
+    answer = decoded(page, file_of(random(1), codec))
+    assert f"is compressed with {codec}, and pages read deflate alone" in answer
+    assert "pyvista-vdi convert" in answer
 
 
 def levels_of(vdi):
@@ -114,26 +118,24 @@ def test_without_workers_the_page_decodes(open_page):
 
 def test_every_truncation_is_noticed(page):
     """But for the archive's directory behind the last member, which nothing is read from."""
-    for codec in ("deflate", "lz4"):
-        data = file_of(random(1), codec)
-        end = zipfile.ZipFile(BytesIO(data)).start_dir
-        cuts = [*range(0, end, 41), end - 1, end]
-        answers = page.evaluate(
-            """async ([text, cuts]) => {
-              const bytes = bytesOf(text), answers = [];
-              for (const cut of cuts) answers.push(await decoded(bytes.slice(0, cut)));
-              return answers.map(String);
-            }""",
-            [in_base64(data), cuts],
-        )
-        for cut, answer in zip(cuts, answers, strict=True):
-            assert answer.startswith("VDIFileError: the VDI file is "), (cut, answer)
-            assert "truncated" in answer, (cut, answer)
+    data = file_of(random(1))
+    end = zipfile.ZipFile(BytesIO(data)).start_dir
+    cuts = [*range(0, end, 41), end - 1, end]
+    answers = page.evaluate(
+        """async ([text, cuts]) => {
+          const bytes = bytesOf(text), answers = [];
+          for (const cut of cuts) answers.push(await decoded(bytes.slice(0, cut)));
+          return answers.map(String);
+        }""",
+        [in_base64(data), cuts],
+    )
+    for cut, answer in zip(cuts, answers, strict=True):
+        assert answer.startswith("VDIFileError: the VDI file is "), (cut, answer)
+        assert "truncated" in answer, (cut, answer)
 
 
-@pytest.mark.parametrize("codec", ["deflate", "lz4", "zstd", "none"])
-def test_every_changed_byte_is_noticed_or_harmless(codec, page):
-    data = file_of(random(2), codec)
+def test_every_changed_byte_is_noticed_or_harmless(page):
+    data = file_of(random(2))
     outcome = page.evaluate(
         """async ([text, step]) => {
           const bytes = bytesOf(text), whole = JSON.stringify(await decoded(bytes));
@@ -159,8 +161,8 @@ HOSTILE = {
     "n_supersegments": (10**9, -1, 1.5, "5", None, 2**60),
     "window_size": ([65536, 65536], [0, 1], [1], None, [1e9, 1]),
     "version": (5, "4"),
-    "codec": ("deflate", "lzma", ["none"]),
-    "precision": ("half",),
+    "codec": ("lzma", ["none"]),
+    "precision": ("half", "16-byte"),
     "depth_step": (0.3, -1),
     "bounds": ([1, 0, 0, 1, 0, 1], "x"),
     "arrays": (None, {}),
@@ -179,7 +181,7 @@ NO_CAMERAS = (
 
 def test_hostile_headers(page):
     vdi = random(2)
-    data, camera = file_of(vdi, "none"), vdi.camera.to_dict()
+    data, camera = file_of(vdi), vdi.camera.to_dict()
     changes = [{name: value} for name, values in HOSTILE.items() for value in values]
     for wrong in (*NO_CAMERAS, {"position": camera["focal_point"]}):
         changes.append({"camera": {**camera, **wrong}})
@@ -199,20 +201,6 @@ def test_streams_that_lie_about_their_size(more, page):
 
     answer = decoded(page, rewritten(file_of(random(2)), edit, PACKED))
     assert "does not decompress to the" in answer
-
-
-@pytest.mark.parametrize("begin", [16, 24, 40])
-def test_noise_is_no_lz4(begin, page):
-    """Frames of Blosc whose streams are noise end as a sentence, within their bounds."""
-
-    def edit(members):
-        color = bytearray(members["color"])
-        color[begin:] = np.random.default_rng(3).bytes(len(color) - begin)
-        members["color"] = bytes(color)
-
-    vdi = random_vdi(np.random.default_rng(4))
-    answer = decoded(page, rewritten(file_of(vdi, "lz4"), edit, DIRECT))
-    assert "VDIFileError: the VDI file is damaged" in str(answer)
 
 
 def test_a_load_can_be_ended(page):

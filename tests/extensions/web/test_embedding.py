@@ -312,8 +312,7 @@ def test_a_scene_that_is_damaged_is_made_up_for_by_the_next(vdi, data, open_page
             f"""async () => {{
               const packed = async (blob) => new Uint8Array(await new Response(
                 blob.stream().pipeThrough(new CompressionStream("deflate"))).arrayBuffer());
-              const head = {{ camera: null, size: [1, 1], lights: [], shapes: [], renderers: [],
-                texts: [], bounds: null, arrays: [],
+              const head = {{ camera: null, size: [1, 1], meshes: [], pictures: [], arrays: [],
                 vdis: [{{ file: null, planes: [],
                   matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] }}] }};
               const json = JSON.stringify(head), text = json + " ".repeat(-json.length & 3);

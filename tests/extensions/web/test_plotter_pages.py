@@ -82,9 +82,11 @@ def assert_as_plotter(page, plotter):
 def test_a_series_is_whole_in_the_page_and_plays(plotter, from_disk, series, tmp_path):
     """The first VDI is a single one, and the series no more than half as dense."""
     single = plotter.add_vdi(series[0].with_precision("8-byte"), **AS_IT_IS)
-    single.position = (0, 1.5, 0)
+    single.position = (0, 2.1, 0)
     actor = plotter.add_vdi(series, **AS_IT_IS)
     actor.opacity_multiplier = 0.5
+    plotter.remove_all_lights()
+    plotter.add_light(pv.Light(light_type="headlight"))
     plotter.add_mesh(pv.Sphere(radius=0.3, center=(0, 0, 1)), color="tomato")
     look_from(plotter, series.camera)
     page = from_disk(plotter)
@@ -127,7 +129,7 @@ def test_of_a_set_the_page_draws_the_nearest(plotter, from_disk, vdi_set, tmp_pa
 def test_of_several_series_those_that_do_not_play_are_named(plotter, series, vdi_set):
     for name, more in (("first", series), ("second", series[:2]), ("third", vdi_set)):
         plotter.add_vdi(more, name=name, **AS_IT_IS)
-    with pytest.warns(VDIWarning, match="without all but one of the") as warned:
+    with pytest.warns(VDIWarning, match="all but one of the") as warned:
         plotter.vdi.export_html(None)
     words = str(warned[0].message)
     assert "2 steps of a series (second)" in words
@@ -162,6 +164,8 @@ def test_subplots_turn_together_if_they_are_linked(linked, from_disk):
 
 
 def test_a_scene_without_vdis_is_a_page_too(plotter, from_disk):
+    plotter.remove_all_lights()
+    plotter.add_light(pv.Light(light_type="headlight"))
     plotter.add_mesh(pv.Sphere(), color="tomato")
     hidden = plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
     hidden.visibility = False

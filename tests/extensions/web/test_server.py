@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import inspect
-import io
 import json
 import math
 import os
@@ -12,8 +11,8 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import urllib.request
-import weakref
 from pathlib import Path
 
 import aiohttp
@@ -21,21 +20,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 from slow_line import SlowLine
 from web_client import PATIENCE, WebClient, soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.extensions import web
-from pyvista_vdi.extensions.web import messages, session
+from pyvista_vdi.extensions.web import messages
 from pyvista_vdi.extensions.web.server import Server
 from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
-
-pytestmark = pytest.mark.usefixtures("settled_at_once")
 
 SIZE = (160, 120)
 HIGH, LOW = soft_ball(), soft_ball(scale=0.5)
@@ -106,99 +102,34 @@ def ssim(vdi, volume, **look):
     return pvdi.compare_images(pvdi.render(vdi, CAMERA, SIZE), truth).ssim
 
 
-def levels(said):
-    return [message["level"] for message in said if message["type"] == "vdi"]
+def vdis(said):
+    return [message for message in said if message["type"] == "vdi"]
 
 
 @by_clients
-async def test_a_view_gets_a_coarse_vdi_and_then_a_full_one(client):
+async def test_a_view_gets_a_vdi_of_its_own(client):
     await client.look_from(CAMERA, SIZE)
-    coarse, full = await client.vdi(), await client.vdi()
-    assert levels(client.messages) == ["coarse", "full"]
-    # The ball is smooth, so that even these show it
-    assert math.prod(coarse.window_size) < math.prod(full.window_size) / 3
-    assert coarse.counts.max() <= 3
-    assert ssim(coarse, HIGH) > 0.93
-    assert ssim(full, HIGH) > 0.99
-    assert full.precision == "8-byte"
-    assert full.metadata == {}
-
-
-@by_clients
-async def test_a_view_at_rest_gets_the_volumes_own_picture_first(client):
-    plane = (0, 0, 0, 1, 0, 0)
-
-    async def is_of(picture, volume, **more):
-        head, file = picture
-        assert head["bytes"] == len(file)
-        pixels = np.asarray(Image.open(io.BytesIO(file)).convert("RGBA"), np.float32) / 255
-        pixels[..., :3] *= pixels[..., 3:]
-        truth = pvdi.render_volume(volume, CAMERA, SIZE, **LOOK, **more)
-        # Eight bits of straight colour and of opacity: half a step of each
-        assert np.abs(pixels - truth).max() <= 1.01 / 255
-
-    await client.look_from(CAMERA, SIZE, moving=True)
-    await client.vdi()
-    await client.look_from(CAMERA, SIZE)
-    first = await client.picture()
-    assert first[0]["said"] == client.said == 2
-    kinds = [m["type"] for m in client.messages if m["type"] in ("picture", "vdi")]
-    assert kinds[:2] == ["vdi", "picture"]
-    await is_of(first, HIGH)
-    await client.vdi("full")
-    await client.say("clip", planes=[plane])
-    await is_of(await client.picture(), HIGH, clipping_planes=[plane])
-    await client.say("clip", planes=[])
-    await client.say("time", step=1)
-    other = await client.picture()
-    while other[0]["said"] != client.said:
-        other = await client.picture()
-    await is_of(other, LOW)
-    await client.look_from(CAMERA.replace(focal_point=(9, 0, 0)), SIZE)
-    assert (await client.message("picture"))["bytes"] == 0
-
-
-@by_clients
-async def test_a_full_vdi_follows_where_a_view_settles(client):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(session, "SETTLED", 3600.0)
-        await client.look_from(CAMERA, SIZE)
-        await client.vdi()
-        await client.say("clip", planes=[])
-        await client.picture()
-        assert levels(client.messages) == ["coarse"]
-        patch.setattr(session, "SETTLED", 0.1)
-        await client.look_from(CAMERA, SIZE)
-        await client.vdi("full")
+    vdi = await client.vdi()
+    assert ssim(vdi, HIGH) > 0.99
+    assert vdi.precision == "8-byte"
+    assert vdi.metadata == {}
+    await client.look_from(CAMERA.azimuth(40), SIZE)
+    assert (await client.vdi()).camera.position == CAMERA.azimuth(40).position
 
 
 @by_clients
 async def test_only_lists_in_view_are_sent(client):
     near = CAMERA.replace(view_angle=8, focal_point=(0.5, 0, 0.2))
     await client.look_from(near, SIZE)
-    vdi = await client.vdi("full")
+    vdi = await client.vdi()
+    await client.message("status")
     await client.look_from(CAMERA.replace(focal_point=(9, 0, 0)), SIZE)
     await client.idle()
     assert vdi.window_size == SIZE
     whole = pvdi.generate(HIGH, near, SIZE, **MADE, **LOOK)
     assert np.array_equal(pvdi.render(vdi, near, SIZE), pvdi.render(whole, near, SIZE))
     assert client.messages[-1] == {"type": "status", "doing": None}
-    assert len(levels(client.messages)) == 2  # nothing is in view: nothing was sent
-
-
-@by_clients
-async def test_another_is_made_only_where_the_view_error_asks_for_it(client):
-    near = CAMERA.replace(view_angle=8)
-    await client.look_from(near, SIZE)
-    await client.vdi("full")
-    before = len(client.messages)
-    await client.look_from(near.azimuth(2), SIZE)
-    await client.idle()
-    turned = client.messages[before:]
-    assert {"type": "status", "doing": "estimate"} in turned
-    assert not levels(turned)
-    await client.look_from(CAMERA, SIZE)  # most of this picture was not in the first
-    assert ssim(await client.vdi("full"), HIGH) > 0.99
+    assert len(vdis(client.messages)) == 1  # nothing is in view: nothing was sent
 
 
 @by_clients
@@ -206,39 +137,27 @@ async def test_transfer_function_and_time_are_changed_by_messages(client):
     assert client.hello["steps"] == 2
     assert client.hello["look"] == {"cmap": "bone", "opacity": "linear"}
     await client.look_from(CAMERA, SIZE)
-    await client.vdi("full")
+    await client.vdi()
     look = {"cmap": "hot", "opacity": [0, 0.2, 1], "clim": [0, 200]}
     wishes = (("look", look, HIGH), ("time", {"step": 1}, LOW))
     for kind, wish, volume in wishes:
         await client.say(kind, **wish)
-        vdi = await client.vdi("full")
+        vdi = await client.vdi()
         whole = pvdi.generate(volume, CAMERA, SIZE, **MADE, **look)
         pictures = (pvdi.render(each, CAMERA, SIZE) for each in (vdi, whole))
         assert pvdi.compare_images(*pictures).ssim > 0.999  # the same rays but for rounding
 
 
 @by_clients
-async def test_clipping_is_the_pages_and_asks_for_no_vdi(client):
-    await client.look_from(CAMERA, SIZE)
-    await client.vdi("full")
-    before = len(client.messages)
-    await client.say("clip", planes=[[0, 0, 0, 1, 0, 0]])
-    await client.look_from(CAMERA.azimuth(4), SIZE)
-    await client.idle()
-    assert not levels(client.messages[before:])
-
-
-@by_clients
-async def test_wishes_that_follow_each_other_fast_end_in_pictures(client):
+async def test_of_wishes_that_follow_each_other_fast_the_last_one_counts(client):
     last = CAMERA.azimuth(200)
     for angle in range(0, 200, 2):
-        await client.look_from(CAMERA.azimuth(angle), SIZE, moving=True)
+        await client.look_from(CAMERA.azimuth(angle), SIZE)
         await client.say("look", clim=[0, 200 + angle % 7])
-    moving = await client.vdi()  # although another was wished for ever since
-    assert moving.n_supersegments > 0
     await client.look_from(last, SIZE)
-    while (await client.vdi("full")).camera.position != last.position:
+    while (await client.vdi()).camera.position != last.position:
         pass
+    assert len(vdis(client.messages)) < 100  # what is out of date is not made, nor kept to be sent
 
 
 @by_clients
@@ -250,7 +169,7 @@ async def test_errors_of_the_engine_are_said_to_the_client(client):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Source, "make", fails)
-        await client.look_from(CAMERA, SIZE, moving=True)
+        await client.look_from(CAMERA, SIZE)
         assert (await client.message("error"))["message"] == "too little"
     assert client.messages[-2] == {"type": "status", "doing": None}
     await client.look_from(CAMERA.azimuth(1), SIZE)
@@ -259,39 +178,32 @@ async def test_errors_of_the_engine_are_said_to_the_client(client):
 
 @by_clients
 async def test_a_busy_client_does_not_keep_another_waiting(busy, quiet):
-    await busy.look_from(CAMERA, SIZE, moving=True)
+    await busy.look_from(CAMERA, SIZE)
     await quiet.look_from(CAMERA, SIZE)
-    waiting = asyncio.ensure_future(quiet.vdi("full"))
+    waiting = asyncio.ensure_future(quiet.vdi())
     sent = 0
     while not waiting.done():
         await busy.say("look", clim=[0, 200 + sent % 2])
         await busy.file()
         sent += 1
-    # The quiet one needs two turns. There are two threads, and a turn of full lists takes some of
-    # the busy one's, which are coarse: by the lists, four.
-    assert sent <= 20
+    assert sent <= 4  # two threads take clients in turn
 
 
 @pytest.mark.slow
-def test_a_full_vdi_on_a_slow_line_gives_way(server, tmp_path):
-    """What is seen changes while a full VDI is under way: the rest of that is not sent."""
-
+def test_a_slow_client_is_sent_fewer_vdis_and_no_queue(server, tmp_path):
     async def story():
         line = SlowLine(server.port, rate=1e6, latency=0.05)
         async with line, WebClient(server, tmp_path, port=line.port) as client:
             await client.look_from(CAMERA, (480, 360))
-            await client.vdi("coarse")
-            head = await client.message("vdi")
-            await client.say("look", clim=[0, 200])
-            while client.head is head:
-                came = sum(map(len, client.parts))
-                await client.receive()
-            await client.vdi("full")
-            return head, came
+            await client.message("vdi")
+            for angle in range(1, 30):  # while the first is on its way
+                await client.look_from(CAMERA.azimuth(angle), (480, 360))
+            while (await client.vdi()).camera.position != CAMERA.azimuth(29).position:
+                pass
+            return len(vdis(client.messages))
 
-    head, came = asyncio.run(story())
-    assert head["level"] == "full"
-    assert came < head["bytes"]
+    # The first, the one that was made when the first had been sent, and the last
+    assert asyncio.run(asyncio.wait_for(story(), PATIENCE)) <= 3
 
 
 async def status_of(server, path, query, headers):
@@ -336,7 +248,7 @@ def test_any_text_is_a_token_but_none_and_our_page_can_connect(own_server, tmp_p
     with urllib.request.urlopen(server.url) as response:
         assert response.status == 200
     headers = {"Origin": f"http://127.0.0.1:{server.port}"}
-    assert hello_of(server, tmp_path, headers=headers)["protocol"] == 1
+    assert hello_of(server, tmp_path, headers=headers)["protocol"] == 2
     with pytest.raises(InvalidArgumentError, match="token is empty"):
         own_server(token="")
 
@@ -345,7 +257,7 @@ EYE = {"position": [0, -5, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1]}
 VIEW = {"type": "view", "camera": EYE, "size": [64, 48]}
 OTHER_VIEWS = [
     *({"size": size} for size in ([0, 48], [64, 48.5], [10**9, 10**9], [True, True])),
-    *({"more": 1}, {"moving": 1}, {"camera": None}),
+    *({"more": 1}, {"camera": None}),
 ]
 PLACES = ([0, 0, 0], [math.nan, 0, 0], [math.inf, 0, 0], [10**400, 0, 0], "abc")
 OTHER_EYES = [
@@ -357,7 +269,7 @@ OTHERS = [
     {"type": "look", "cmap": "../../etc/passwd"},
     {"type": "look", "clim": [1, 1]},
     *({"type": "time", "step": step} for step in (2, -1)),
-    *({"type": "clip", "planes": planes} for planes in ([[0] * 6], [[0, 0, 0, 1, 0, 0]] * 7)),
+    {"type": "clip", "planes": []},
     {"type": "file", "path": "/etc/passwd"},
     {"type": "é" * 40},  # the reason, which has it, is cut
 ]
@@ -392,10 +304,10 @@ _json = st.recursive(
     max_leaves=8,
 )
 _entries = st.fixed_dictionaries(
-    {"type": st.sampled_from(["view", "look", "clip", "time"])},
+    {"type": st.sampled_from(["view", "look", "time"])},
     optional={
         name: _json | st.lists(st.floats(), min_size=2, max_size=6)
-        for name in ("camera", "size", "moving", "cmap", "opacity", "clim", "planes", "step")
+        for name in ("camera", "size", "cmap", "opacity", "clim", "step")
     },
 )
 
@@ -445,30 +357,28 @@ def test_a_client_that_stops_reading_is_dropped(own_server, tmp_path):
     assert asyncio.run(asyncio.wait_for(story(), PATIENCE)).n_supersegments > 0
 
 
-def test_what_is_made_for_a_client_that_has_left_is_let_go(own_server, tmp_path, monkeypatch):
-    server, encode = own_server(), session.encoded
-    making, gone, made = threading.Event(), threading.Event(), []
+def test_what_is_made_for_a_client_that_has_left_is_given_up(own_server, tmp_path, monkeypatch):
+    server, make = own_server(), Source.make
+    making, ended = threading.Event(), []
 
-    def slowly(vdi):
-        made.append(weakref.ref(vdi))
+    def slowly(source, wish, cancelled):
         making.set()
-        assert gone.wait(PATIENCE)
-        return encode(vdi)
+        while not cancelled():
+            time.sleep(0.01)
+        ended.append(wish)
+        return make(source, wish, cancelled)
 
     async def leave(client):
-        await client.look_from(CAMERA, SIZE, moving=True)
+        await client.look_from(CAMERA, SIZE)
         assert await asyncio.to_thread(making.wait, PATIENCE)
 
-    async def let_go():
-        while server.clients:
-            await asyncio.sleep(0.01)
-        gone.set()
-        while made[0]() is not None:
+    async def given_up():
+        while server.clients or not ended:
             await asyncio.sleep(0.01)
 
-    monkeypatch.setattr(session, "encoded", slowly)
+    monkeypatch.setattr(Source, "make", slowly)
     by_a_client(server, tmp_path, leave)
-    asyncio.run(asyncio.wait_for(let_go(), PATIENCE))
+    asyncio.run(asyncio.wait_for(given_up(), PATIENCE))
 
 
 @pytest.mark.slow
@@ -487,7 +397,7 @@ def test_two_hundred_clients_at_once(own_server, tmp_path):
             )
             return await asyncio.gather(*(c.file() for c in clients))
 
-    assert all(head["level"] == "full" for head, _ in asyncio.run(story()))
+    assert all(head["bytes"] == len(file) for head, file in asyncio.run(story()))
 
 
 def test_where_nobody_can_listen_is_a_sentence(server):

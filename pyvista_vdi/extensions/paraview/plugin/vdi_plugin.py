@@ -17,6 +17,7 @@ from vtkmodules.vtkCommonCore import vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData, vtkPolyData
 from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm
 from vtkmodules.vtkFiltersSources import vtkOutlineSource
+from vtkmodules.vtkParallelCore import vtkMultiProcessController
 
 try:
     from pyvista_vdi import vtk_pipeline
@@ -28,8 +29,6 @@ except ImportError as error:
     ) from error
 
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.extensions.large.on_mpi import together
-from pyvista_vdi.extensions.large.vtk_ranks import RanksVDISource, communicator, is_first_rank
 from pyvista_vdi.extensions.paraview.parts.client import Client, say
 from pyvista_vdi.extensions.paraview.parts.functions import (
     Functions,
@@ -37,6 +36,7 @@ from pyvista_vdi.extensions.paraview.parts.functions import (
     functions_of_array,
 )
 from pyvista_vdi.extensions.paraview.parts.looking import Looking
+from pyvista_vdi.extensions.paraview.parts.one_process import require_one_process
 from pyvista_vdi.extensions.paraview.parts.properties import (
     DEVICE_XML,
     FUNCTIONS_XML,
@@ -45,7 +45,6 @@ from pyvista_vdi.extensions.paraview.parts.properties import (
     UNIT_DISTANCE_XML,
     VIEW_XML,
 )
-from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.model.vdi import VDI
@@ -57,7 +56,8 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_from_image,
 )
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
-from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
+
+require_one_process(vtkMultiProcessController.GetGlobalController())
 
 #: What ParaView's plugin manager shows.
 paraview_plugin_name = "VDI"
@@ -83,7 +83,7 @@ def _of_looks(setter: str) -> Any:
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
-class VDISource(Looking, Functions, RanksVDISource):
+class VDISource(Looking, Functions, vtk_pipeline.VDISource):
     """Generates a volume's VDI, by default of a view and with a ramp of its own.
 
     See :class:`pyvista_vdi.VDISource`.
@@ -176,14 +176,14 @@ class VDISource(Looking, Functions, RanksVDISource):
             self._set_view()
         return int(super().RequestInformation(request, inputs, outputs))
 
-    def _execute_here(self, inputs: Any, outputs: Any) -> None:
+    def _execute(self, inputs: Any, outputs: Any) -> None:
         # A script may connect what ParaView's menus do not offer
         image = require_image(vtkDataObject.GetData(inputs[0], 0))
         self._set_view()
         self._set_looks(image)
         kept = ("deferred", self._value_range, self._importance or None)
         self.SetDeferral(*kept if self._deferred else ())
-        super()._execute_here(inputs, outputs)
+        super()._execute(inputs, outputs)
 
     def _set_view(self) -> None:
         view, bounds, size = self._given_camera(), self._known_bounds(), self.GetWindowSize()
@@ -195,8 +195,9 @@ class VDISource(Looking, Functions, RanksVDISource):
 
     def _set_looks(self, image: vtkImageData) -> None:
         """Bring the volume property up to date with what is given, and with defaults."""
-        distance = self._unit_distance or self._default_unit_distance(image)
-        self._looks.copy(list(self._functions.values()), self._scalar_range(image), distance)
+        distance = self._unit_distance or self._read(image).default_unit_distance
+        ends = scalars_of(image, self.GetScalars(), self._preference).GetFiniteRange()
+        self._looks.copy(list(self._functions.values()), ends, distance)
         self.SetVolumeProperty(self._looks.prop)
 
 
@@ -227,9 +228,6 @@ class VDIToImage(Looking, Functions, vtk_pipeline.VDIToImage):
         self._watching = False
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        if not is_first_rank():  # one picture is enough
-            vtkImageData.GetData(outputs, 0).Initialize()
-            return
         self.SetCamera(self._given_camera())
         super()._execute(inputs, outputs)
         if not self._watching:
@@ -467,29 +465,25 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
                              default_values="usual">
          <StringListDomain name="list">
            <String value="usual" /><String value="exact" />
-           <String value="16-byte" /><String value="8-byte" />
+           <String value="8-byte" />
          </StringListDomain>
          <Documentation>What a supersegment takes. usual: 8 bytes in a .vdis; exact, 24 bytes, in a
-         .vdi. An .exr is exact.</Documentation>
+         .vdi. An .exr has float32.</Documentation>
        </StringVectorProperty>
        <StringVectorProperty name="Compression" command="SetCompressionName" number_of_elements="1"
                              default_values="usual" panel_visibility="advanced">
          <StringListDomain name="list">
            <String value="usual" /><String value="lz4" /><String value="zstd" />
-           <String value="deflate" /><String value="zips" /><String value="none" />
+           <String value="deflate" /><String value="none" />
          </StringListDomain>
-         <Documentation>usual: zstd of .vdis, lz4 of .vdi (zstd is smaller), zips of .exr, which
-         has none beside it.</Documentation>
+         <Documentation>usual: zstd of .vdis, lz4 of .vdi (zstd is smaller); an .exr has no
+         other.</Documentation>
        </StringVectorProperty>"""
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
 class VDIWriter(vtk_pipeline.VDIWriter):
     """Writes a VDI, or all time steps, to a file: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
-
-    def _execute(self, inputs: Any, outputs: Any) -> None:
-        if is_first_rank():  # all have the VDI
-            super()._execute(inputs, outputs)
 
     def SetPrecisionName(self, name: str) -> None:
         """Set the precision; "usual" is that of the file's kind."""
@@ -501,17 +495,7 @@ class VDIWriter(vtk_pipeline.VDIWriter):
 
     def Write(self) -> None:
         """Write the file; ParaView's output window says what went wrong."""
-        comm = communicator()
         try:
-            if comm is None or holds(self.GetFileName()) != "series":
-                super().Write()
-                return
-            with together(comm, "writing the series"):
-                if comm.rank == 0:
-                    super().Write()
-                    return
-                images, _ = steps_and_times(self.GetInputAlgorithm(0, 0))
-                for _ in images:  # which the first rank needs the others for
-                    pass
+            super().Write()
         except (VDIError, OSError) as error:
             say(self, error)

@@ -11,7 +11,7 @@ from typing import Any
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.extensions.web.page import View, assembled, check_controls, in_parts, several
 from pyvista_vdi.extensions.web.placing import several_of
-from pyvista_vdi.extensions.web.scenes.scene import css, scene_of
+from pyvista_vdi.extensions.web.scenes.scene import scene_of
 from pyvista_vdi.extensions.web.still import part_of
 from pyvista_vdi.model.whole_file import whole_file
 
@@ -44,7 +44,7 @@ def export_html(
             series=series,
         )
         if several:
-            view.attributes["style"] = _placed(renderer) + _border(plotter)
+            view.attributes["style"] = _placed(renderer)
             view.attributes["data-link"] = str(cameras.index(camera))
         views.append(view)
     if left_out:
@@ -104,13 +104,3 @@ def _placed(renderer: Any) -> str:
     left, bottom, right, top = (f"{100 * edge:g}%" for edge in renderer.GetViewport())
     size = f"width: calc({right} - {left}); height: calc({top} - {bottom})"
     return f"position: absolute; left: {left}; bottom: {bottom}; {size}"
-
-
-def _border(plotter: Any) -> str:
-    """Return the lines between subplots as CSS, where a plotter has some."""
-    overlay = getattr(plotter.renderers, "border_overlay_renderer", None)
-    framed = [r for r in (overlay, *plotter.renderers) if r is not None and r.has_border]
-    if not framed:
-        return ""
-    color = css(framed[0].border_color.float_rgb)
-    return f"; outline: {framed[0].border_width / 2:g}px solid {color}"

@@ -5,7 +5,7 @@ import { htmlElement, strokes } from "./html.js";
 import { AS_MADE } from "./look.js";
 import { drawMarks, inShort, viewAt } from "./marks.js";
 
-/** Milliseconds after the last sign of somebody from which the bar fades. */
+/** Milliseconds after the picture and the last sign of somebody, from which the bar fades. */
 const FADES = 3000;
 /** Milliseconds from the last movement of a pointer until its place is looked up. */
 const POINTER_RESTS = 60;
@@ -266,7 +266,7 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
   };
   const isOpen = () => panels.some((each) => !each.hidden);
 
-  let sleeps = 0;
+  let sleeps = 0, loading = true; // until there is a picture, however long that takes
   const wake = (event) => {
     // A finger that finds no bar presses none of its buttons: its click is still to come
     if (event?.pointerType === "touch" && !frame.classList.contains("awake")) {
@@ -275,11 +275,16 @@ export function viewerControls(frame, canvas, marks, viewer, host, signal) {
     }
     frame.classList.add("awake");
     clearTimeout(sleeps);
-    sleeps = setTimeout(() => isOpen() ? wake() : frame.classList.remove("awake"), FADES);
+    sleeps = setTimeout(() => isOpen() || loading ? wake() : frame.classList.remove("awake"), FADES);
   };
   signal.addEventListener("abort", () => clearTimeout(sleeps));
   for (const name of ["pointermove", "pointerdown", "focusin", "keydown"]) listen(viewer, name, wake);
   wake();
+  const begin = () => {
+    loading = false;
+    wake();
+  };
+  viewer.ready.then(begin, begin);
 
   // A right button that has not been dragged opens the menu, on all systems alike; another one, or a
   // finger, on a face of the cube goes to the view that it names

@@ -3,10 +3,12 @@
 // and depths against a VDI's rules; and nothing is allocated for a mere declaration.
 
 import {
-  GrowingBytes, REMEDY, VDIFileError, crc32, damaged, decodes, mayHold, unpackChunk,
+  GrowingBytes, REMEDY, VDIFileError, crc32, damaged, unpackChunk,
 } from "./unpack.js";
 
-const VERSIONS = [2, 3, 4];
+/** The version of files that are compressed with deflate, which browsers inflate by themselves. */
+const VERSION = 4;
+const MOST_COMPRESSED = 1032; // deflate makes no more bytes of one
 const CHUNK_ROWS = 1 << 16;
 /** Constants of docs/conventions.md, "Packed supersegments". */
 export const DEPTH_CODES = 16383;
@@ -100,11 +102,9 @@ async function decodedFile(bytes, level) {
   }
   const file = described(members);
   const arrays = packedArrays(file, members);
-  const counts = await unpacked(file, arrays.counts);
-  const offsets = offsetsOf(counts, arrays.counts.itemBytes, file.n);
-  const vdi = {
-    ...file.view, level, precision: file.precision === "8-byte" ? "8-byte" : "exact", offsets,
-  };
+  const counts = await unpacked(arrays.counts);
+  const offsets = offsetsOf(counts, arrays.counts.rowBytes, file.n);
+  const vdi = { ...file.view, level, precision: file.precision, offsets };
   const decode = file.precision === "8-byte" ? decodedCodes : decodedMedia;
   return Object.assign(vdi, await decode(file, arrays, offsets));
 }
@@ -168,28 +168,27 @@ function described(members) {
   if (d?.format !== "pyvista-vdi" && d?.format !== WITH_VALUES) {
     throw new VDIFileError(`this is no VDI file: ${DESCRIPTION} does not name the format`);
   }
-  if (!VERSIONS.includes(d.version)) {
+  const remedy = "write it again by pyvista-vdi convert x.vdi -o y.vdi --compression deflate";
+  if (["none", "lz4", "zstd"].includes(d.codec)) {
     throw new VDIFileError(
-      `the VDI file is of version ${d.version}, and this viewer reads versions 2 to 4: ` +
-        "write it anew by pyvista-vdi convert x.vdi -o y.vdi --compression deflate"
+      `the VDI file is compressed with ${d.codec}, and pages read deflate alone: ${remedy}`
     );
   }
-  if (!decodes(d.codec)) {
+  if (d.version !== VERSION) {
     throw new VDIFileError(
-      `the VDI file is compressed with ${d.codec}, which this page does not decode: ` +
-        "pyvista-vdi convert x.vdi -o y.vdi --compression deflate"
+      `the VDI file is of version ${d.version}, and this viewer reads ${VERSION}: ${remedy}`
     );
   }
   const n = d.n_supersegments;
   requireAll(d, {
-    codec: (d.version > 3 ? ["deflate"] : ["none", "lz4", "zstd"]).includes(d.codec),
+    codec: d.codec === "deflate",
     n_supersegments: Number.isInteger(n) && n >= 0 && n <= 2 ** 30,
     chunk_rows: d.chunk_rows === CHUNK_ROWS,
-    precision: d.version === 2 || ["exact", "16-byte", "8-byte"].includes(d.precision),
+    precision: ["exact", "8-byte"].includes(d.precision),
     depth_step: d.precision !== "8-byte" || Number.isInteger(Math.log2(d.depth_step)),
   });
   const view = { ...checkedView(d), ...(d.format === WITH_VALUES && { values: checkedValues(d) }) };
-  return { ...d, view, n, precision: d.version === 2 ? "exact" : d.precision };
+  return { ...d, view, n };
 }
 
 const areNumbers = (x, length) =>
@@ -215,14 +214,13 @@ export function checkedView(d) {
 }
 
 // What is known of lists that keep values: their range, and lengths in model units.
-function checkedValues({ precision, deferred }) {
+function checkedValues({ deferred }) {
   if (deferred?.version !== 1) {
     throw new VDIFileError(`the VDI file keeps values in version ${deferred?.version}; this viewer reads 1`);
   }
   const isLength = (x) => x > 0 && x < Infinity;
   const { value_range: range, unit_distance: unitDistance, sample_distance: sampleDistance } = deferred;
-  requireAll({ precision, ...deferred }, {
-    precision: precision !== "16-byte",
+  requireAll(deferred, {
     value_range: areNumbers(range, 2) && range[0] < range[1],
     unit_distance: isLength(unitDistance),
     sample_distance: isLength(sampleDistance),
@@ -259,14 +257,13 @@ function packedArrays(file, members) {
   const [n, lists] = [file.n, file.window_size[0] * file.window_size[1]];
   const kind = { "|u1": 1, "<u2": 2, "<u4": 4 }[file.arrays?.counts?.dtype];
   if (!kind) damaged("the type of its counts is unknown");
-  const depth = file.codec === "none" ? "none" : "difference";
   const wanted = file.precision === "8-byte" ? {
     counts: [lists, kind], origin: [lists, 4], stride: [lists, 2], front: [n, 2, 1, "difference"],
     back: [n, 2, 1, "difference"],
-    color: [n, 1, 3, file.version > 3 ? "channel-difference" : "none"], optical_depth: [n, 2],
+    color: [n, 1, 3, "channel-difference"], optical_depth: [n, 2],
   } : {
-    counts: [lists, kind], front: [n, 4, 1, depth], back: [n, 4, 1, depth],
-    color: file.precision === "exact" ? [n, 4, 3] : [n, 4], optical_depth: [n, 4],
+    counts: [lists, kind], front: [n, 4, 1, "difference"], back: [n, 4, 1, "difference"],
+    color: [n, 4, 3], optical_depth: [n, 4],
   };
   const index = members.get("chunks");
   if (!index) damaged("it is truncated, or its member chunks is missing");
@@ -279,13 +276,13 @@ function packedArrays(file, members) {
     const member = members.get(name);
     if (!member) damaged(`it is truncated, or its member ${name} is missing`);
     const bytes = checkedMember(member);
-    const array = { name, rows, itemBytes, rowBytes: itemBytes * items, chunks: [] };
+    const array = { rows, rowBytes: itemBytes * items, chunks: [] };
     let at = 0;
     for (let first = 0; first < rows; first += CHUNK_ROWS, ++k) {
       if (8 * k + 8 > chunks.byteLength) damaged(`it has ${k} chunks where more belong`);
       const size = chunks.getUint32(8 * k, true);
       const raw = Math.min(CHUNK_ROWS, rows - first) * array.rowBytes;
-      if (!mayHold(file.codec, size, raw) || at + size > bytes.length) {
+      if (raw > MOST_COMPRESSED * size || at + size > bytes.length) {
         damaged(`${size} bytes cannot hold the ${raw} of a chunk of array ${name}`);
       }
       array.chunks.push({ bytes: bytes.subarray(at, at + size), raw });
@@ -301,12 +298,12 @@ function packedArrays(file, members) {
 // -- chunks --------------------------------------------------------------------------------------
 
 // The bytes of an array's rows.
-async function unpacked(file, array) {
+async function unpacked(array) {
   const out = new Uint8Array(array.rows * array.rowBytes);
   let at = 0;
   for (const { bytes, raw } of array.chunks) {
     const rows = out.subarray(at, at + raw);
-    await unpackChunk(file.codec, bytes, rows, array.itemBytes, array.rowBytes);
+    await unpackChunk(bytes, rows, array.rowBytes);
     at += raw;
   }
   array.chunks = null;
@@ -331,8 +328,8 @@ const typed = (Kind, bytes) => new Kind(bytes.buffer, 0, bytes.length / Kind.BYT
 
 async function decodedCodes(file, arrays, offsets) {
   const { n, depth_step: depthStep } = file;
-  const origin = typed(Int32Array, await unpacked(file, arrays.origin));
-  const stride = typed(Uint16Array, await unpacked(file, arrays.stride));
+  const origin = typed(Int32Array, await unpacked(arrays.origin));
+  const stride = typed(Uint16Array, await unpacked(arrays.stride));
   for (let list = 0; list < origin.length; ++list) {
     const first = origin[list];
     const step = stride[list];
@@ -343,12 +340,11 @@ async function decodedCodes(file, arrays, offsets) {
       damaged("a list's depths lie beyond the VDI's grid");
     }
   }
-  const gaps = typed(Uint16Array, await unpacked(file, arrays.front));
-  const thicknesses = typed(Uint16Array, await unpacked(file, arrays.back));
-  const color = await unpacked(file, arrays.color);
-  const tau = typed(Uint16Array, await unpacked(file, arrays.optical_depth));
+  const gaps = typed(Uint16Array, await unpacked(arrays.front));
+  const thicknesses = typed(Uint16Array, await unpacked(arrays.back));
+  const color = await unpacked(arrays.color);
+  const tau = typed(Uint16Array, await unpacked(arrays.optical_depth));
   const words = new Uint32Array(2 * n);
-  const differ = file.arrays.color.filter === "channel-difference";
   let begun = 0; // the back before, in codes
   for (let k = 0, list = 0; k < n; ++k) {
     while (offsets[list + 1] <= k) ++list;
@@ -359,22 +355,20 @@ async function decodedCodes(file, arrays, offsets) {
       damaged("a supersegment has no thickness, or a code beyond its largest");
     }
     words[2 * k] = front | (back << 14) | (tau[k] << 28);
-    const blue = color[3 * k + (differ ? 0 : 2)];
-    const green = color[3 * k + 1] + (differ ? blue : 0);
-    const red = color[3 * k + (differ ? 2 : 0)] + (differ ? blue : 0);
+    const blue = color[3 * k];
+    const green = color[3 * k + 1] + blue;
+    const red = color[3 * k + 2] + blue;
     words[2 * k + 1] = (tau[k] >> 4) | ((red & 255) << 8) | ((green & 255) << 16) | (blue << 24);
   }
   return { words, origin, stride, depthStep };
 }
 
 async function decodedMedia(file, arrays, offsets) {
-  const front = typed(Float32Array, await unpacked(file, arrays.front));
-  const back = typed(Float32Array, await unpacked(file, arrays.back));
-  if (file.arrays.front.filter === "difference") sumDepths(front, back);
-  let color = await unpacked(file, arrays.color);
-  color = file.precision === "exact" ? typed(Float32Array, color)
-    : colorsOf16Bytes(typed(Uint32Array, color));
-  const opticalDepth = typed(Float32Array, await unpacked(file, arrays.optical_depth));
+  const front = typed(Float32Array, await unpacked(arrays.front));
+  const back = typed(Float32Array, await unpacked(arrays.back));
+  sumDepths(front, back);
+  const color = typed(Float32Array, await unpacked(arrays.color));
+  const opticalDepth = typed(Float32Array, await unpacked(arrays.optical_depth));
   for (let k = 0, list = 0; k < file.n; ++k) {
     while (offsets[list + 1] <= k) ++list;
     const sorted = k === offsets[list] || back[k - 1] <= front[k];
@@ -399,14 +393,4 @@ function sumDepths(front, back) {
     thicknesses[k] += gaps[k];
     before = thicknesses[k];
   }
-}
-
-function colorsOf16Bytes(packed) {
-  const color = new Float32Array(3 * packed.length);
-  for (let k = 0; k < packed.length; ++k) {
-    color[3 * k] = (packed[k] & 2047) * Math.fround(1 / 2047);
-    color[3 * k + 1] = ((packed[k] >>> 11) & 2047) * Math.fround(1 / 2047);
-    color[3 * k + 2] = (packed[k] >>> 22) * Math.fround(1 / 1023);
-  }
-  return color;
 }

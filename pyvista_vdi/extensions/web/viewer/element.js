@@ -90,7 +90,6 @@ export class VDIViewer extends HTMLElement {
   #aspect = 0; // of what is to be seen whole
   #scene = null; // what is drawn
   #coming = null; // what will be, as soon as it can
-  #still = null; // URL of the picture that is laid over it
   #series = null;
   #player = null;
   #step = null; // that is drawn with the next frame
@@ -106,7 +105,6 @@ export class VDIViewer extends HTMLElement {
     const parts = this.#parts = {
       img: make("img", "without", { alt: "" }),
       canvas: make("canvas", "", { hidden: false, tabIndex: 0, role: "img" }),
-      laid: make("img", "over", { alt: "" }),
       over: make("canvas", "over"),
       slot: make("slot"),
       marks: make("canvas", "over"),
@@ -149,7 +147,6 @@ export class VDIViewer extends HTMLElement {
     // Viewers that follow each other would go round for ever
     if (JSON.stringify(checked) === JSON.stringify(this.#camera)) return;
     this.#camera = checked;
-    this.showStill(null);
     this.#announceCamera();
     this.invalidate();
   }
@@ -179,7 +176,6 @@ export class VDIViewer extends HTMLElement {
       throw new TypeError(`At most ${MOST_CLIPPING_PLANES} planes clip a VDI; got ${checked.length}.`);
     }
     this.#planes = checked;
-    this.showStill(null);
     this.invalidate();
   }
 
@@ -192,7 +188,6 @@ export class VDIViewer extends HTMLElement {
     const checked = checkedLook(look);
     if (JSON.stringify(checked) === JSON.stringify(this.#look)) return;
     this.#look = checked;
-    this.showStill(null);
     this.#bar?.show();
     this.#address?.changed();
     this.dispatchEvent(new CustomEvent("lookchange", { detail: { look: this.look } }));
@@ -388,26 +383,6 @@ export class VDIViewer extends HTMLElement {
     return this.load(bytes);
   }
 
-  /**
-   * Show a picture of the present view in place of what is drawn, until the view changes.
-   *
-   * @param {Blob|null} file An image of the whole window, transparent where nothing is.
-   */
-  async showStill(file) {
-    const { laid, canvas } = this.#parts;
-    const url = (this.#still = file && URL.createObjectURL(file));
-    const lay = (there) => {
-      laid.hidden = !there;
-      canvas.style.opacity = there ? 0 : ""; // not hidden: it is what is turned
-    };
-    lay(false);
-    if (!url) return;
-    laid.src = url;
-    await laid.decode().catch(() => {}); // a broken one has no width
-    if (this.#still === url) lay(laid.naturalWidth > 0);
-    URL.revokeObjectURL(url);
-  }
-
   /** Show what prepare.js has made of a VDI: swapped whole. */
   setPrepared(prepared) {
     try {
@@ -564,7 +539,6 @@ export class VDIViewer extends HTMLElement {
     if (!this.#step) return;
     const { prepared, time, step } = this.#step;
     this.#step = null;
-    this.showStill(null);
     this.setPrepared(prepared);
     if (this.series) this.dispatchEvent(new CustomEvent("vditime", { detail: { time, step } }));
   }
@@ -812,7 +786,6 @@ export class VDIViewer extends HTMLElement {
     const size = [this.clientWidth, this.clientHeight].map((edge) => Math.max(1, Math.round(edge * density)));
     if (this.#size.every((edge, k) => edge === size[k])) return;
     this.#size = size;
-    this.showStill(null);
     this.#moved = performance.now(); // the first picture of a new size is a quick one
     this.invalidate(false);
   }

@@ -1,11 +1,10 @@
 // A viewer whose VDIs a server makes: docs/web.md, "Served".
-import type { ClippingPlane, VDIViewer } from "./element.js";
+import type { VDIViewer } from "./element.js";
 
 export class RemoteVDI extends EventTarget {
   constructor(viewer: VDIViewer, url: string);
   setLook(look: { cmap?: string; opacity?: string | number[]; clim?: [number, number] }): void;
   setStep(step: number): void;
-  setClippingPlanes(planes: ClippingPlane[]): void;
   close(): void;
 }
 

@@ -1,21 +1,16 @@
 // A viewer whose VDIs a server makes: `pyvista-vdi serve`. docs/web.md, "Served", has the protocol.
 //
-// The viewer draws what it has. Its view is told to the server, which sends another VDI when it
-// finds that the picture is too far from the volume's: a coarse one first. Each is swapped whole.
-// Where the view rests, the volume's own picture of it is laid over the VDI until it moves again.
+// The viewer draws what it has. Where its view rests that is told to the server, which sends another
+// VDI; that is swapped whole.
 import { htmlElement } from "./html.js";
-import { AS_MADE } from "./look.js";
 
-/** Milliseconds between two messages of a moving view, and without one after which it rests. */
-const VIEW_PERIOD = 50;
+/** Milliseconds without a movement after which a view rests. */
 const VIEW_RESTS = 150;
 /** Milliseconds until a lost connection is tried again: twice as long each time, up to the last. */
 const FIRST_RETRY = 500;
 const LAST_RETRY = 16000;
 /** The server's longest edge of a picture, pixels. */
 const LONGEST_EDGE = 8192;
-/** Planes that a server clips by. */
-const MOST_TOLD_PLANES = 6;
 /** Why a server ends a connection for good: the client has said something wrong. */
 const REFUSED = 1008;
 /** Code of a connection that has ended, or was not made, without a word. */
@@ -39,23 +34,14 @@ export class RemoteVDI extends EventTarget {
     this.viewer = viewer;
     this.url = url;
     this.hello = null;
-    this.received = { coarse: 0, full: 0, pictures: 0, bytes: 0 };
-    this._pictured = true; // whether the server's pictures show what the viewer shows
+    this.received = { vdis: 0, bytes: 0 };
     this._said = new Map(); // the last message of each kind, said again to a new connection
     this._retry = FIRST_RETRY;
     this._showing = false;
     this._next = null;
-    this._timer = 0;
     this._restTimer = 0;
-    this._viewSentAt = -Infinity;
-    this._planes = [];
     this._onCamera = () => this._viewMoved();
-    this._onLook = () => {
-      this._sayClip();
-      this._viewMoved(); // a picture of the volume may do again
-    };
     viewer.addEventListener("camerachange", this._onCamera);
-    viewer.addEventListener("lookchange", this._onLook);
     this._sizes = new ResizeObserver(this._onCamera);
     this._sizes.observe(viewer);
     this._connect();
@@ -71,36 +57,10 @@ export class RemoteVDI extends EventTarget {
     this._say({ type: "time", step });
   }
 
-  /** Clip by planes, [{origin, normal}], world coordinates: here at once, and in estimates. */
-  setClippingPlanes(planes) {
-    this.viewer.clippingPlanes = planes;
-    this._planes = planes.map((p) => [...p.origin, ...p.normal]);
-    this._sayClip();
-  }
-
-  // Tell of these planes, and of the faces of the box that the viewer's own sliders have moved.
-  _sayClip() {
-    const { clip } = this.viewer.look ?? AS_MADE, bounds = this.hello?.bounds;
-    const faces = clip.flatMap((share, k) => {
-      if (!bounds || share === k % 2) return [];
-      const axis = k >> 1, [low, high] = bounds.slice(2 * axis, 2 * axis + 2);
-      const place = [0, 1, 2].map((i) => (bounds[2 * i] + bounds[2 * i + 1]) / 2);
-      place[axis] = low + share * (high - low);
-      return [[...place, ...[0, 1, 2].map((i) => (i === axis ? 1 - 2 * (k % 2) : 0))]];
-    });
-    const planes = [...this._planes, ...faces];
-    this._pictured = planes.length <= MOST_TOLD_PLANES;
-    const message = { type: "clip", planes: planes.slice(0, MOST_TOLD_PLANES) };
-    const before = this._said.get("clip")?.planes ?? [];
-    if (JSON.stringify(before) !== JSON.stringify(message.planes)) this._say(message);
-  }
-
   /** End the connection for good. The viewer goes on drawing what it has. */
   close() {
     this.viewer.removeEventListener("camerachange", this._onCamera);
-    this.viewer.removeEventListener("lookchange", this._onLook);
     this._sizes.disconnect();
-    clearTimeout(this._timer);
     clearTimeout(this._restTimer);
     clearTimeout(this._retryTimer);
     this._closed = true;
@@ -112,11 +72,8 @@ export class RemoteVDI extends EventTarget {
     socket.binaryType = "arraybuffer";
     this._socket = socket;
     this._incoming = null;
-    this._picture = null; // the next binary message is this picture
-    this._messages = 0; // that were said on this connection
     socket.onmessage = ({ data }) => {
       if (typeof data === "string") this._hear(JSON.parse(data));
-      else if (this._picture !== null) this._takePicture(data);
       else this._take(new Uint8Array(data));
     };
     socket.onclose = async (event) => {
@@ -139,32 +96,18 @@ export class RemoteVDI extends EventTarget {
       if (first) this.viewer.home = message.camera;
       if (first && !this.viewer.camera) this.viewer.camera = message.camera; // no link has said another
       this._said.forEach((said) => this._send(said));
-      if (first) this._sayClip(); // a link may have said it before there was a server
-      this._sendView(false);
+      this._sendView();
       this._status(null, "");
       this.dispatchEvent(new CustomEvent("hello", { detail: message }));
     } else if (message.type === "vdi") {
       this._retry = FIRST_RETRY; // not at once: a server may fail whenever it is asked for one
       // One that has not come whole is given up by the server
       this._incoming = { ...message, file: new Uint8Array(message.bytes), filled: 0 };
-    } else if (message.type === "picture") {
-      if (message.bytes > 0) this._picture = message;
     } else if (message.type === "status") {
       this._status(message.doing, "");
     } else if (message.type === "error") {
       this._status(null, message.message);
     }
-  }
-
-  /** Lay a picture over the view that it is of, if that still is what is looked at. */
-  _takePicture(file) {
-    const isLatest = this._picture.said === this._messages && this._timer === 0;
-    this._picture = null;
-    this.received.bytes += file.byteLength;
-    const { brightness, opacity } = this.viewer.look;
-    if (!isLatest || !this._pictured || brightness !== 1 || opacity !== 1) return;
-    this.received.pictures += 1;
-    this.viewer.showStill(new Blob([file]));
   }
 
   _take(part) {
@@ -183,38 +126,24 @@ export class RemoteVDI extends EventTarget {
   async _show() {
     this._showing = true;
     while (this._next !== null) {
-      const { file, level } = this._next, listening = new AbortController();
+      const { file } = this._next;
       this._next = null;
-      // Of a view that goes on moving no frame has all pixels: one of the new VDI is enough
-      const drawn = new Promise((resolve) => {
-        this.viewer.addEventListener("framedrawn", ({ detail }) => {
-          if (detail.state === "full") resolve();
-        }, { signal: listening.signal });
-      });
       try {
-        await Promise.race([this.viewer.showBytes(file), drawn]);
-        this.received[level] += 1;
+        await this.viewer.showBytes(file);
+        this.received.vdis += 1;
       } catch (error) {
         this._status(null, error.message);
       }
-      listening.abort();
     }
     this._showing = false;
   }
 
   _viewMoved() {
     clearTimeout(this._restTimer);
-    this._restTimer = setTimeout(() => this._sendView(false), VIEW_RESTS);
-    if (this._timer) return;
-    const wait = Math.max(0, this._viewSentAt + VIEW_PERIOD - performance.now());
-    this._timer = setTimeout(() => {
-      this._timer = 0;
-      // A slow line is not filled with views that nobody will look at
-      if (this._socket.bufferedAmount === 0) this._sendView(true);
-    }, wait);
+    this._restTimer = setTimeout(() => this._sendView(), VIEW_RESTS);
   }
 
-  _sendView(moving) {
+  _sendView() {
     const { viewer } = this;
     if (this.hello === null || this._socket.readyState !== WebSocket.OPEN) return;
     const density = globalThis.devicePixelRatio || 1;
@@ -223,23 +152,16 @@ export class RemoteVDI extends EventTarget {
     const { position, focal_point, view_up, view_angle, parallel_scale } = viewer.camera;
     const lens = parallel_scale === undefined ? { view_angle } : { parallel_scale };
     const camera = { position, focal_point, view_up, ...lens };
-    if (!moving) {
-      clearTimeout(this._restTimer);
-      clearTimeout(this._timer);
-      this._timer = 0;
-    }
-    this._viewSentAt = performance.now();
-    this._send({ type: "view", camera, size, moving });
+    clearTimeout(this._restTimer);
+    this._send({ type: "view", camera, size });
   }
 
   _send(message) {
-    this._messages += 1;
     this._socket.send(JSON.stringify(message));
   }
 
   _say(message) {
     this._said.set(message.type, message);
-    this.viewer.showStill(null);
     if (this.hello !== null && this._socket.readyState === WebSocket.OPEN) this._send(message);
   }
 
@@ -345,7 +267,7 @@ export function connectPage(viewer, panel, line) {
     else if (!offered) fillPanel(panel, remote, detail, (wrong) => say({ wrong }));
     offered = offer;
   });
-  const words = { picture: "drawing", estimate: "looking", vdi: "making a VDI of this view" };
+  const words = { vdi: "making a VDI of this view" };
   remote.addEventListener("status", ({ detail }) => {
     say({ going: detail.text || words[detail.doing] || "" });
   });

@@ -1,5 +1,4 @@
-// Checksums and codecs: what lies in a file to the bytes that it stands for.
-import { unzstd } from "./zstd.js";
+// Checksums and deflate: what lies in a file to the bytes that it stands for.
 
 /** What to do about a file that is not as it was written. */
 export const REMEDY = "load it again, or copy it from its source again";
@@ -143,31 +142,9 @@ async function inflatePieces(bytes, take) {
   }
 }
 
-/** Whether so many compressed bytes may hold the `raw` that they are said to. */
-export function mayHold(codec, size, raw) {
-  if (codec === "none") return size === raw;
-  if (codec === "deflate") return raw <= 1032 * size;
-  return size > 16 && raw <= (codec === "zstd" ? 1 << 15 : 255) * size;
-}
-
-/**
- * Decompress a chunk of an array's rows into `rows`.
- *
- * @param {string} codec "none", "lz4", "zstd" or "deflate".
- * @param {Uint8Array} bytes
- * @param {Uint8Array} rows
- * @param {number} itemBytes Of a number; of Blosc's shuffling.
- * @param {number} rowBytes Of a row; of the shuffling that goes with deflate.
- */
-export async function unpackChunk(codec, bytes, rows, itemBytes, rowBytes) {
-  if (codec === "none") rows.set(bytes);
-  else if (codec === "deflate") unshuffle(await inflate(bytes, rows.length), rows, rowBytes);
-  else unblosc(bytes, rows, itemBytes, codec);
-}
-
-/** Whether this viewer decodes a codec: of pages that hold other ones, zstd is left out. */
-export function decodes(codec) {
-  return codec !== "zstd" || unzstd !== null;
+/** Decompress a chunk of an array's rows, which were shuffled before, into `rows`. */
+export async function unpackChunk(bytes, rows, rowBytes) {
+  unshuffle(await inflate(bytes, rows.length), rows, rowBytes);
 }
 
 /** Byte planes to elements: first the first bytes of all, then the second ones. */
@@ -178,71 +155,4 @@ export function unshuffle(planes, out, size) {
     for (let k = 0, to = plane; k < n; ++k, to += size) out[to] = planes[from + k];
   }
   out.set(planes.subarray(n * size, out.length), n * size);
-}
-
-/** Decompress a frame of Blosc 1 (c-blosc, README_CHUNK_FORMAT.rst) by lz4 or zstd into `out`. */
-export function unblosc(bytes, out, itemBytes, codec) {
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const wrong = () => damaged(`a chunk is not in Blosc's format with ${codec}`);
-  const unpack = codec === "zstd" ? unzstd : unlz4;
-  const [flags, typeSize] = [bytes[2], bytes[3]];
-  const blockBytes = view.getUint32(8, true);
-  if (bytes[0] !== 2 || typeSize !== itemBytes || view.getUint32(4, true) !== out.length) wrong();
-  if (view.getUint32(12, true) !== bytes.length) wrong();
-  if (flags & 2) { // the bytes as they are
-    if (bytes.length !== out.length + 16) wrong();
-    out.set(bytes.subarray(16));
-    return;
-  }
-  if (flags >> 5 !== (codec === "zstd" ? 4 : 1) || flags & 4 || !blockBytes || blockBytes > out.length) wrong();
-  const block = new Uint8Array(blockBytes);
-  for (let first = 0, k = 0; first < out.length; first += blockBytes, ++k) {
-    const size = Math.min(blockBytes, out.length - first);
-    if (20 + 4 * k > bytes.length) wrong();
-    let at = view.getUint32(16 + 4 * k, true);
-    const split = !(flags & 16) && size === blockBytes && typeSize <= 16 && size / typeSize >= 128;
-    const parts = split ? typeSize : 1;
-    for (let part = 0; part < parts; ++part) {
-      if (at + 4 > bytes.length) wrong();
-      const packed = view.getUint32(at, true);
-      at += 4;
-      if (at + packed > bytes.length) wrong();
-      const target = block.subarray((part * size) / parts, ((part + 1) * size) / parts);
-      if (packed === target.length) target.set(bytes.subarray(at, at + packed));
-      else if (!unpack(bytes.subarray(at, at + packed), target)) wrong();
-      at += packed;
-    }
-    const rows = out.subarray(first, first + size);
-    if (flags & 1 && typeSize > 1) unshuffle(block, rows, typeSize);
-    else rows.set(block.subarray(0, size));
-  }
-}
-
-// A block of LZ4; whether it fills `out` exactly, and from within both.
-function unlz4(from, out) {
-  let at = 0;
-  let to = 0;
-  while (at < from.length) {
-    const token = from[at++];
-    let length = token >> 4;
-    if (length === 15) {
-      let more;
-      do length += more = from[at++]; while (more === 255);
-    }
-    if (!(at + length <= from.length && to + length <= out.length)) return false;
-    for (const end = at + length; at < end;) out[to++] = from[at++];
-    if (at === from.length) break; // the last sequence has literals alone
-    const distance = from[at] | (from[at + 1] << 8);
-    at += 2;
-    length = token & 15;
-    if (length === 15) {
-      let more;
-      do length += more = from[at++]; while (more === 255);
-    }
-    length += 4;
-    const within = at <= from.length && to + length <= out.length;
-    if (!(within && distance && distance <= to)) return false;
-    for (const end = to + length; to < end; ++to) out[to] = out[to - distance];
-  }
-  return to === out.length;
 }

@@ -1,0 +1,341 @@
+"""What each format's files hold: a function for each, by the format's library, and their table."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi import registry
+from pyvista_vdi.errors import InvalidVolumeError, warn_external
+from pyvista_vdi.io.axes import in_one_unit, one_unit, to_world
+from pyvista_vdi.io.time_steps import natural_key
+from pyvista_vdi.io.volumes.dicom import dicom
+from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of, stack
+from pyvista_vdi.model.host_memory import aligned_empty
+
+#: Units of length in NIfTI, types in MRC, and what OME and ImageJ call a micrometre.
+_UNITS = {1: "m", 2: "mm", 3: "um"}
+_MODES = {0: "i1", 1: "i2", 2: "f4", 6: "u2", 12: "f2"}
+_MICRONS = ("um", "µm", "\\u00b5m", "micron", "microns")
+_TIFF = (".tif", ".tiff")
+
+
+def nrrd(file: Path) -> list[VolumeInFile]:
+    """Return the volume of an NRRD file, in the coordinates that its ``space`` names.
+
+    What pynrrd does not put together SimpleITK does: data in several files, other axes, borders.
+    """
+    import nrrd
+
+    head = head_of(file).partition(b"\n\n")[0].decode("latin-1")
+    header: Any = {}
+    if not re.search(r"(?im)^(data ?file: *(LIST|\S*%)|axis ?m)", head):
+        header = nrrd.read_header(str(file))
+    if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space", "???"}:
+        array, axes, place = _by_itk(file)
+        # ITK turns frames that grow to the right and the front: turn them back
+        space = "".join(re.findall(r"(?im)^space: *(\S+)", head)).lower()
+        initials = "".join(word[0] for word in space.split("-")) if "-" in space else space
+        signs = [1 - 2 * (initials[:1] == "r"), 1 - 2 * (initials[1:2] == "a"), 1, 1]
+        return [VolumeInFile(array, axes, np.diag(signs) @ place)]
+
+    def read() -> NDArray[Any]:
+        values, _ = nrrd.read(str(file), index_order="C")
+        array = aligned_empty(values.shape, values.dtype.newbyteorder("="))
+        array[...] = values  # where a CPU device reads it without a copy of its own
+        return array
+
+    steps = header.get("space directions", header.get("spacings", np.ones(3)))
+    place = to_world(np.transpose(steps), header.get("space origin", np.zeros(3)))
+    units = [str(unit) for unit in header.get("space units", header.get("units", ("", "", "")))]
+    dtype = np.dtype(nrrd.reader._determine_datatype(header)).newbyteorder("=")
+    lazy = Lazy(header["sizes"][::-1].tolist(), dtype, read)
+    return [VolumeInFile(lazy, "zyx", place, str(header.get("content", "")), one_unit(units))]
+
+
+def _by_itk(file: Path) -> tuple[NDArray[Any], str, NDArray[np.float64]]:
+    """Return what SimpleITK reads: an array, its axes, and its place in ITK's frame."""
+    import SimpleITK
+
+    shown = SimpleITK.ProcessObject.GetGlobalWarningDisplay()
+    SimpleITK.ProcessObject.SetGlobalWarningDisplay(False)
+    try:
+        image = SimpleITK.ReadImage(str(file))
+    finally:
+        SimpleITK.ProcessObject.SetGlobalWarningDisplay(shown)
+    array, n = SimpleITK.GetArrayFromImage(image), image.GetDimension()
+    axes = "tzyx"[-n:] if n < 5 else "?" * (n - 4) + "tzyx"
+    if (components := image.GetNumberOfComponentsPerPixel()) > 1:
+        axes += "s" if components in (3, 4) and array.dtype == np.uint8 else "c"
+    turn = np.eye(3)
+    turn[:n, :n] = np.reshape(image.GetDirection(), (n, n))[:3, :3]
+    lengths, origin = [*image.GetSpacing(), 1.0][:3], [*image.GetOrigin(), 0.0][:3]
+    return array, axes, to_world(turn * lengths, origin)
+
+
+def itk(file: Path) -> list[VolumeInFile]:
+    """Return the volume of a MetaImage, in ITK's frame, or of a GIPL or MINC file, in its own."""
+    unit = "" if file.suffix.lower() in (".mha", ".mhd") else "mm"
+    return [VolumeInFile(*_by_itk(file), unit=unit)]
+
+
+def nifti(file: Path) -> list[VolumeInFile]:
+    """Return the volume of a NIfTI or Analyze file, in its own frame: right, front, head."""
+    array, axes, place = _by_itk(file)
+    # Take from the header what ITK rounds, brings to millimetres or decides otherwise
+    head = head_of(file.with_name(re.sub(r"(?i)\.img(?=$|\.)", ".hdr", file.name)))
+    order = "<" if head[:4] == b"\x5c\x01\0\0" else ">"
+    real, short = (partial(np.frombuffer, head, f"{order}{kind}") for kind in ("f4", "i2"))
+    n, *counts = short(8, 40).tolist()
+    points, bits = np.prod(counts[:n], dtype=object), int(short(1, 72)[0])
+    _require_bytes(file, int(real(1, 108)[0]) + points * bits // 8)
+    slope, shift = real(2, 112)
+    if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
+        array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled
+    steps, (quaternion, sform) = np.abs(real(3, 80).astype(np.float64)), short(2, 252)
+    steps[steps == 0] = 1.0
+    if head[344:347] not in (b"n+1", b"ni1"):
+        return [VolumeInFile(array, axes, to_world(steps), unit="mm")]
+    if sform > 0:
+        place[:3] = real(12, 280).reshape(3, 4)
+    elif quaternion > 0:
+        turn = np.diag([-1, -1, 1]) @ place[:3, :3] / np.linalg.norm(place[:3, :3], axis=0)
+        place = to_world(turn * steps, real(3, 268))
+    else:
+        place = to_world(steps)
+    return [VolumeInFile(array, axes, place, unit=_UNITS.get(head[123] & 7, ""))]
+
+
+def _require_bytes(file: Path, count: int) -> None:
+    """Refuse a file of values that ITK would fill with zeros, or that gzip's checksum refuses."""
+    values, size = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name)), 0
+    with values.open("rb") as stream:
+        packed = stream.read(2) == b"\x1f\x8b"
+    with gzip.open(values) if packed else values.open("rb") as stream:
+        while part := stream.read(1 << 24):
+            size += len(part)
+    if size < count:
+        raise InvalidVolumeError(f"it has {size} of {count} bytes: it is cut off")
+
+
+def mrc(file: Path) -> list[VolumeInFile]:
+    """Return an MRC or CCP4 map, axes as MAPC, MAPR and MAPS have them; lengths in angstrom.
+
+    SimpleITK refuses maps that begin elsewhere than at a cell's corner, and half floats.
+    """
+    head = head_of(file)
+    order = "<" if 0 < int.from_bytes(head[64:68], "little") < 4 else ">"
+    words, reals = (np.frombuffer(head, f"{order}{kind}4", 56) for kind in "if")
+    shape, mode, mapped = words[2::-1].tolist(), int(words[3]), words[16:19].tolist()
+    if head[208:212] != b"MAP " or mode not in _MODES or sorted(mapped) != [1, 2, 3]:
+        raise InvalidVolumeError(
+            f"it is no map, or of mode {mode}, where modes {', '.join(map(str, _MODES))} are read"
+        )
+    axes = "".join("?xyz"[n] for n in mapped)
+    counts = np.maximum(words[7:10], 1)
+    step = np.where(reals[10:13] > 0, reals[10:13].astype(np.float64) / counts, 1.0)
+    origin = reals[49:52].astype(np.float64)
+    if not origin.any():  # CCP4's maps have whole voxels in place of an origin
+        origin = step * [words[4 + axes.index(a)] for a in "xyz"]
+    dtype, begin = np.dtype(f"{order}{_MODES[mode]}"), 1024 + int(words[23])
+    array = np.fromfile(file, dtype, offset=begin)[: np.prod(shape)].reshape(shape)
+    return [VolumeInFile(array, axes[::-1], to_world(step, origin), unit="angstrom")]
+
+
+def numpy(file: Path) -> list[VolumeInFile]:
+    """Return the array of an .npy file, or those of three axes in an .npz file."""
+    if file.suffix.lower() == ".npz":
+        with file.open("rb") as stream, np.lib.npyio.NpzFile(stream) as packed:  # no objects
+            return [_array(packed[name], name) for name in packed if packed[name].ndim > 2]
+    return [_array(np.lib.format.open_memmap(file, mode="r"))]
+
+
+def _array(array: NDArray[Any], name: str = "") -> VolumeInFile:
+    n, colors = array.ndim, array.shape[3:] == (4,) and array.dtype == np.uint8
+    axes = "zyxs" if colors else "?" * (n - 3) + "zyx"[-n:]
+    return VolumeInFile(array, axes, name=name)
+
+
+def tiff(file: Path) -> list[VolumeInFile]:
+    """Return the series of three axes; the top row is the last along y."""
+    import tifffile
+
+    def read(number: int, down: int) -> NDArray[Any]:
+        with tifffile.TiffFile(file) as again:
+            values = np.flip(again.asarray(series=number), down)
+        return values if calibrated is None else (values * slope + shift).astype(calibrated)
+
+    found = []
+    with tifffile.TiffFile(file) as opened:
+        calibrated, slope, shift = _calibration(opened)
+        many = len(opened.series) > 1
+        for number, series in enumerate(opened.series):
+            axes = _axes(series)
+            if not {*"zyx"} <= {*axes} or series.keyframe.is_reduced:
+                continue
+            lazy = partial(read, number, axes.index("y"))
+            array = Lazy(series.shape, calibrated or series.dtype, lazy)
+            size, unit, channels = _described(opened, number, series)
+            name = series.name if many else ""
+            found.append(VolumeInFile(array, axes, to_world(size), name, unit, channels))
+    return found
+
+
+def _axes(series: Any) -> str:
+    """Return the axes' letters: of those that nothing names the last is z."""
+    axes = str(series.axes).lower()
+    unnamed = next((letter for letter in "qi" if letter in axes and "z" not in axes), None)
+    return "z".join(axes.rsplit(unnamed, 1)) if unnamed else axes
+
+
+def _calibration(opened: Any) -> tuple[Any, float, float]:
+    """Return what ImageJ's values are of and by which line; it keeps signed ones as unsigned."""
+    said = (opened.imagej_metadata or {}) if opened.is_imagej else {}
+    shift, slope = float(said.get("c0", 0.0)), float(said.get("c1", 1.0))
+    function = said.get("cf", 0 if (slope, shift) != (1, 0) else -1)
+    if function not in (-1, 0, 20, 21):  # none, or of an uncalibrated density
+        warn_external(
+            f"{opened.filename} calibrates its values by ImageJ's function {function}, which is "
+            "not applied: values are those that are stored; apply it in ImageJ"
+        )
+    if function != 0:
+        return None, 1.0, 0.0
+    signed = (slope, shift) == (1, -32768) and opened.series[0].dtype == np.uint16
+    return np.dtype(np.int16 if signed else np.float32), slope, shift
+
+
+def _described(opened: Any, number: int, series: Any) -> tuple[list[float], str, tuple[str, ...]]:
+    """Return the spacing along x, y and z, its unit and the channels' names, as the file says."""
+    page, names, size, unit, alone = series.keyframe, [], [1.0, 1.0, 1.0], "", ""
+    per = page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
+    described = opened.ome_metadata if opened.is_ome else ""
+    of_ome = ET.fromstring(described).findall(".//{*}Pixels")[number:] if described else []
+    if of_ome:
+        x, y, z = (of_ome[0].get(f"PhysicalSize{axis}") for axis in "XYZ")
+        units = [of_ome[0].get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
+        names = [channel.get("Name", "") for channel in of_ome[0].findall("{*}Channel")]
+        if x:
+            size, unit = in_one_unit([float(x), float(y or 1), float(z or 1)], units)
+            alone = "" if z else f"{x} x {y}"
+    elif opened.is_imagej:
+        entries = opened.imagej_metadata or {}
+        size = [*(1 / n if n else 1.0 for n in per), float(entries.get("spacing", 1.0)) or 1.0]
+        unit = str(entries.get("unit", "")).replace("pixel", "")
+        unit = "um" if unit in _MICRONS else unit
+        names = [str(n) for n in entries.get("Labels", ())]
+    elif opened.is_lsm:  # of Zeiss, in metres
+        size, unit = [1e6 * float(opened.lsm_metadata[f"VoxelSize{a}"]) for a in "XYZ"], "um"
+    elif int(page.tags.valueof("ResolutionUnit", 1)) == 3 and all(per):
+        alone = f"{10 / per[0]:g} x {10 / per[1]:g} mm"  # an inch's are most often nobody's
+    if alone:
+        warn_external(
+            f"{opened.filename} says that pixels are {alone}, and not how far apart slices are: "
+            "spacing is taken as 1; give spacing=(x, y, z)"
+        )
+    channels = series.shape[axes.index("c")] if "c" in (axes := _axes(series)) else 0
+    each = len({*names}) == len(names) == channels and all(names)
+    return size, unit, tuple(names) if each else ()
+
+
+def slices_in(folder: Path) -> list[Path]:
+    """Return the pictures of slices in a folder, in natural order; none beside DICOM slices."""
+    files = [path for path in folder.iterdir() if path.is_file() and path.name[0] != "."]
+    found = [file for file in files if file.suffix.lower() in (*_TIFF, ".png")]
+    if found and any(head_of(file)[128:132] == b"DICM" for file in {*files} - {*found}):
+        return []  # previews of a scan
+    return sorted(found, key=lambda file: natural_key(file.name.lower()))
+
+
+def pictures(path: Path) -> list[VolumeInFile]:
+    """Return the pictures in a folder as slices along z, by the types that they have.
+
+    The top row is the last along y, as VTK has pictures.
+    """
+    files = slices_in(path) if path.is_dir() else [path]
+    if len({file.suffix.lower() == ".png" for file in files}) > 1:
+        raise InvalidVolumeError(f"{path} holds TIFF and PNG files: put those of one volume apart")
+    if len(files) < 2:
+        raise InvalidVolumeError(
+            f"{path} holds one slice, and a volume needs two: give the folder that holds all"
+        )
+    numbers = [int(n[-1]) for file in files if (n := re.findall(r"\d+", file.stem))]
+    if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
+        warn_external(
+            f"the numbers of the slices in the folder {path} are not evenly spaced "
+            f"({files[0].name} to {files[-1].name}, {len(files)} files), and are taken as if: "
+            "are some missing?"
+        )
+    slices = stack(files, _picture)
+    return [VolumeInFile(slices, "zyxs"[: len(slices.shape)])]
+
+
+def _picture(file: Path) -> NDArray[Any]:
+    try:
+        if file.suffix.lower() in _TIFF:
+            import tifffile
+
+            found = np.asarray(tifffile.imread(file))
+        else:
+            from PIL import Image
+
+            with Image.open(file) as picture:
+                found = np.asarray(picture.convert("RGBA") if picture.mode == "P" else picture)
+                if picture.mode == "I":  # of 16 bits, as older versions have them
+                    found = found.astype(np.uint16)
+    except Exception as error:  # each format has readers, and exceptions, of its own
+        raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
+    return found[::-1]
+
+
+def vtk(file: Path) -> list[VolumeInFile]:
+    """Return what PyVista reads: this room knows neither VTK nor PyVista."""
+    return registry.reader("")(file)  # type: ignore[no-any-return]
+
+
+class VolumeFormat(NamedTuple):
+    """A format: the ends of its files' names, what reads it, and what the files begin with.
+
+    ``library`` is imported by the function, and is in ``extra``.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    volumes_in: Callable[[Path], list[VolumeInFile]] | None
+    library: str
+    extra: str = "files"
+    magic: tuple[bytes, ...] = ()
+
+
+FORMATS = {
+    each.name: each
+    for each in (
+        VolumeFormat("NRRD", (".nrrd", ".nhdr"), nrrd, "nrrd", "", (b"NRRD0",)),
+        VolumeFormat("NIfTI", (".nii", ".nii.gz", ".hdr", ".img", ".img.gz"), nifti, "SimpleITK"),
+        VolumeFormat("MetaImage", (".mha", ".mhd"), itk, "SimpleITK"),
+        VolumeFormat("GIPL, MINC 2", (".gipl", ".gipl.gz", ".mnc"), itk, "SimpleITK"),
+        VolumeFormat("MRC", (".mrc", ".map", ".ccp4", ".mrcs", ".st", ".ali"), mrc, "numpy", ""),
+        VolumeFormat("DICOM", (".dcm", ".ima"), dicom, "pydicom", magic=(b"DICM",)),
+        VolumeFormat(
+            *("TIFF", (*_TIFF, ".btf", ".tf8", ".lsm"), tiff, "tifffile"),
+            magic=(b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
+        ),
+        VolumeFormat(
+            *("HDF5", (".h5", ".hdf5", ".he5", ".hdf", ".nxs"), None, "h5py"),
+            magic=(b"\x89HDF",),  # a store, which is opened
+        ),
+        VolumeFormat("NumPy", (".npy", ".npz"), numpy, "numpy", "", (b"\x93NUMPY",)),
+        VolumeFormat("PNG slices", (".png",), pictures, "PIL", ""),
+        VolumeFormat(
+            *("VTK", (".vti", ".vtr", ".vtm", ".vtk", ".pvti", ".vtkhdf"), vtk, "pyvista", "plot"),
+            magic=(b"# vtk DataFile", b"<VTKFile"),
+        ),
+    )
+}
