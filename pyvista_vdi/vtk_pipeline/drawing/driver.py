@@ -428,7 +428,7 @@ class Driver(Deciding):
             return seen
         source.set_view_if_missing(*seen)
         if source.last() is None:
-            source.look(camera_of(seen[0], matrix), self.device, None)
+            source.look(camera_of(seen[0], matrix), self.device)
         return seen
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
