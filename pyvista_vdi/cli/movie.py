@@ -22,7 +22,6 @@ from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import with_suffix
 from pyvista_vdi.vtk_pipeline import vtk
-from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 
 def turntable(options: argparse.Namespace) -> int:
@@ -47,13 +46,12 @@ def movie(options: argparse.Namespace) -> int:
         frames = options.frames or steps or max(1, round(max(len(keys) - 1, 1) * 4 * options.fps))
         along, path = np.linspace(0, 1, frames), [first] * frames
         if keys:  # VTK's spline through them
-            spline, seen = vtk.vtkCameraInterpolator(), vtk.vtkCamera()
+            spline, seen = vtk.vtkCameraInterpolator(), keys[0].to_pyvista()
             for share, key in zip(np.linspace(0, 1, len(keys)), keys, strict=True):
-                aim(seen, key)
-                spline.AddCamera(share, seen)
+                spline.AddCamera(share, key.to_pyvista())
             for k, share in enumerate(along):
                 spline.InterpolateCamera(share, seen)
-                path[k] = Camera.from_any(seen, model_transform=keys[0].model_transform)
+                path[k] = Camera.from_any(seen)
         return [view.azimuth(options.turn * s) for view, s in zip(path, along, strict=True)]
 
     return _write(options, views)
