@@ -242,12 +242,13 @@ readme_command() {
     fi
 }
 
-# The OpenCL drivers and the programs that are seen here, and that README's machine does not have
+# OpenCL drivers, programs and a library that are seen here, and that README's machine does not have
 not_of_readme() {
     local file
-    for file in /etc/OpenCL/vendors/*.icd $(type -aP mpirun mpiexec node npm Xvfb exrinfo oiiotool \
-        pvpython clang chromium{,-browser,-headless-shell} google-chrome firefox{,-esr}); do
-        [[ ! -f $file || ($file != *.icd && ! -x $file) ]] || readlink -f "$file"
+    for file in /etc/OpenCL/vendors/*.icd /usr/lib/*/libOpenEXRUtil*.so.* $(type -aP mpirun mpiexec \
+        node npm Xvfb exrinfo oiiotool pvpython clang google-chrome firefox{,-esr} \
+        chromium{,-browser,-headless-shell}); do
+        [[ ! -f $file || ($file == */bin/* && ! -x $file) ]] || readlink -f "$file"
     done | sort -u
 }
 

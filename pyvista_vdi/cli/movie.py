@@ -21,8 +21,6 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import with_suffix
-from pyvista_vdi.vtk_pipeline import vtk
-from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 
 def turntable(options: argparse.Namespace) -> int:
@@ -47,6 +45,9 @@ def movie(options: argparse.Namespace) -> int:
         frames = options.frames or steps or max(1, round(max(len(keys) - 1, 1) * 4 * options.fps))
         along, path = np.linspace(0, 1, frames), [first] * frames
         if keys:  # VTK's spline through them
+            from pyvista_vdi.vtk_pipeline import vtk
+            from pyvista_vdi.vtk_pipeline.filters.view import aim
+
             spline, seen = vtk.vtkCameraInterpolator(), vtk.vtkCamera()
             for share, key in zip(np.linspace(0, 1, len(keys)), keys, strict=True):
                 aim(seen, key)

@@ -235,7 +235,7 @@ def test_a_voxel_that_a_mask_marks_is_drawn_whole():
     # Of the octants, those in the cells: the cell above x = 0 is blank, the others are drawn
     blanked = shown(image, mask=cells.T).blanked
     assert (blanked == [0xFF, 0x55, 0, 0]).all()
-    vdi = pvdi.generate(image, pv.Camera(), (4, 3))
+    vdi = pvdi.generate(image, pvdi.Camera((8, 12, 90), (8, 12, 16), (0, 1, 0)), (4, 3))
     with pytest.raises(UnsupportedError, match="mask cannot be given with a VDI"):
         shown(vdi, mask=points.ravel())
 

@@ -141,6 +141,7 @@ class StepMaker:
         self._where = {name: options.pop(name, None) for name in ("client", "device")}
         looks = {n: v for n, v in options.items() if n not in _OTHERS}
         self._looks = Classification.composited(looks, function, (*_OTHERS, *_GRID))
+        self._described = self._looks.describe()
         asked: Any = (
             of(**{n: options[n] for n in declared(of) if n in options})
             for of in (QualityTarget, Deferral, GenerationOptions)
@@ -169,6 +170,7 @@ class StepMaker:
             self._options = {n: v for n, v in self._options.items() if n in _OTHERS}
             self._options["transfer_function"] = table
         vdi: Any = generate(volume, self._camera, self._size, **self._where, **self._options)
+        vdi.metadata["classification"] = self._described  # as the first step's was asked for
         if isinstance(vdi, DeferredVDI):
             self._options["value_range"] = vdi.value_range
         elif self._dial is not None:

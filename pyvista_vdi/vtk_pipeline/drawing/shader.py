@@ -183,5 +183,5 @@ def _replace(shader: Any, text: str) -> None:
 
 
 def _placed(shader: Any) -> dict[str, str | None]:
-    """Return what is in place now, by its tag; copies of an actor share its shader."""
+    """Return what is in place now, by its tag."""
     return vars(shader).setdefault("placed", {})  # type: ignore[no-any-return]

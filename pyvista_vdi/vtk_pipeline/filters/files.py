@@ -118,8 +118,9 @@ class VDIReader(Algorithm):
         if self._path is None:
             return
         try:
-            path, form = Path(self._path), format_of(self._path)
-            found = (path / form.head if form is not None and path.is_dir() else path).stat()
+            path = Path(self._path)
+            form = format_of(path) if path.is_dir() else None
+            found = (path if form is None else path / form.head).stat()
             seen = (self._path, found.st_ino, found.st_size, found.st_mtime_ns)
         except (OSError, ValueError):
             seen = None

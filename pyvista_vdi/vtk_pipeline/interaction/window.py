@@ -62,7 +62,17 @@ class ShownVolume(NamedTuple):
     mapper: Any
     driver: Any  # of a VDI; None behind a volume of VTK's
     assemblies: tuple[Any, ...]  # that it is a part of, the outermost first
-    shader: Any
+    behind: tuple[Any, ...]  # all of VTK's that may be of Python's classes
+
+    @classmethod
+    def of(cls, prop: Any, assemblies: tuple[Any, ...] = ()) -> ShownVolume:
+        """Return a volume with what it has now."""
+        mapper = prop.GetMapper()
+        driver = getattr(mapper, "driver", None)
+        own = driver if driver is not None and driver.actor is prop else None
+        data = None if own is None else mapper.GetDataSetInput()
+        behind = (mapper, prop.GetShaderProperty(), prop.GetProperty(), data)
+        return cls(prop, mapper, own, assemblies, behind)
 
     @property
     def visible(self) -> bool:
@@ -82,9 +92,10 @@ class ShownVolume(NamedTuple):
 class ShownVolumes:
     """The volumes of a renderer, those in assemblies too, in its order.
 
-    They are held, with the objects that Python has of them, from the first look until a list of
-    props changes. VTK holds no more than its own part of them: where Python has let go of an object
-    of one of its own classes, each look at it would make another one.
+    They are held, with the objects that Python has of them and of what is behind them, from the
+    first look until a list of props changes, or that. VTK holds no more than its own part of them:
+    where Python has let go of an object of one of its own classes, each look at it would make
+    another one.
     """
 
     def __init__(self, renderer: Any) -> None:
@@ -115,16 +126,15 @@ class ShownVolumes:
                 # draws its parts loses its place among them
                 self._look(prop.GetParts(), (*assemblies, prop), changed)
             elif isinstance(prop, vtkVolume):
-                mapper = prop.GetMapper()
-                driver = getattr(mapper, "driver", None)
-                own = driver if driver is not None and driver.actor is prop else None
-                shader = prop.GetShaderProperty()
-                self._volumes.append(ShownVolume(prop, mapper, own, assemblies, shader))
+                self._volumes.append(ShownVolume.of(prop, assemblies))
 
     def check(self) -> None:
-        """Look again where a volume has another mapper than it had."""
-        if any(each.actor.GetMapper() is not each.mapper for each in self._volumes or ()):
-            self.forget()
+        """Look again where a volume has another mapper, property or data than it had."""
+        for each in self._volumes or ():
+            now_behind = ShownVolume.of(each.actor).behind
+            if any(a is not b for a, b in zip(now_behind, each.behind, strict=True)):
+                self.forget()
+                return
 
     def forget(self) -> None:
         """Let go of them."""

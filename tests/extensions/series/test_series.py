@@ -184,6 +184,7 @@ def test_colours_stand_for_the_same_values_in_all_steps(volumes, camera, default
         volumes[1], camera, SIZE, cmap="bone", opacity="linear", clim=clim, precision="8-byte"
     )
     assert series[1].equals(alone)
+    assert [vdi.metadata["classification"] for vdi in series] == [{"cmap": "bone"}] * 2
 
 
 def test_a_dial_chooses_once(volumes, default_runtime):

@@ -149,6 +149,7 @@ KINDS = {
 LOOK = ("--size", "12x9", "--cmap", "gray", "--opacity", "linear", "--clim", "0", "255")
 
 
+@pytest.mark.filterwarnings("ignore:.*axes with coordinates, which are not read")
 @pytest.mark.every(2)
 @pytest.mark.parametrize(("make", "times"), KINDS.values(), ids=KINDS)
 def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monkeypatch):
@@ -223,7 +224,7 @@ def test_lists_that_are_none_are_refused_by_name(name, text, said, capsys, tmp_p
 def test_a_verb_of_one_volume_says_what_to_do_with_several(capsys, tmp_path):
     _pvd(tmp_path)
     error = run(capsys, "generate", tmp_path / "run.pvd", "-o", tmp_path / "a.vdi", *LOOK, status=1)
-    assert "3 time steps" in error
+    assert "lists time steps" in error
     assert "pyvista-vdi series" in error
 
 
