@@ -320,9 +320,10 @@ class SourceInput(Input):
                 self.take_size(size)
 
     def on_devices(self) -> list[Any]:
-        """Return the VDI and the volume."""
+        """Return the VDI, the volume that it was made of, and that which was read last."""
         made = self.source.GetCurrentRequest()
-        return [self.last(), None if made is None else made.volume]
+        read = self.source.GetCurrentVolume()
+        return [self.last(), read, None if made is None else made.volume]
 
 
 class ImageInput(Input):

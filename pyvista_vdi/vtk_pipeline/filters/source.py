@@ -169,6 +169,10 @@ class VDISource(SourceSettings):
         """Return the VDI made last, whether up to date or not."""
         return self._vdi
 
+    def GetCurrentVolume(self) -> Volume | None:
+        """Return the volume read last, whether up to date or not."""
+        return self._volume
+
     def GetCurrentRequest(self) -> Request | None:
         """Return what the VDI made last was made of."""
         return self._request
