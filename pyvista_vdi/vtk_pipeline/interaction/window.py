@@ -94,8 +94,7 @@ class ShownVolumes:
 
     They are held, with the objects that Python has of them and of what is behind them, from the
     first look until a list of props changes, or that. VTK holds no more than its own part of them:
-    where Python has let go of an object of one of its own classes, each look at it would make
-    another one.
+    where Python has let go of an object of its own classes, each look would make another one.
     """
 
     def __init__(self, renderer: Any) -> None:
