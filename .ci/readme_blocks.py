@@ -16,18 +16,26 @@ from pathlib import Path
 
 #: The shipped CT as a folder of slices, which README's names, and as NIfTI.
 SCANS = """
-import sys
-import nibabel, numpy as np
+import SimpleITK
 from pathlib import Path
 from pyvista_vdi import examples
-sys.path.insert(0, sys.argv[1])
-from scan_files import write_dicom
 
 ct = examples.load_ct(as_volume=True)
-Path("path/to").mkdir(parents=True)
-slices = ct.array[:11]  # as many as write_dicom has names for
-write_dicom(Path("path/to/slices"), slices, ct.spacing, np.zeros(3), np.eye(3))
-nibabel.save(nibabel.Nifti1Image(ct.array.T, np.diag([*ct.spacing, 1])), "path/to/ct.nii.gz")
+image = SimpleITK.GetImageFromArray(ct.array)
+image.SetSpacing(ct.spacing)
+Path("path/to/slices").mkdir(parents=True)
+SimpleITK.WriteImage(image, "path/to/ct.nii.gz")
+writer = SimpleITK.ImageFileWriter()
+writer.KeepOriginalImageUIDOn()
+for k in range(11):
+    slice_, place = image[:, :, k], image.TransformIndexToPhysicalPoint((0, 0, k))
+    tags = {"0008|0060": "CT", "0020|000d": "1.2.3.1", "0020|000e": "1.2.3.2"}
+    tags |= {"0008|0018": f"1.2.3.3.{k}", "0020|0013": str(k)}
+    tags["0020|0032"] = "\\\\".join(map(str, place))
+    for name, value in tags.items():
+        slice_.SetMetaData(name, value)
+    writer.SetFileName(f"path/to/slices/{k:03}.dcm")
+    writer.Execute(slice_)
 """
 
 
@@ -37,9 +45,9 @@ def run(*command: str | Path) -> None:
     subprocess.run(command, check=True)
 
 
-def view(command: str, support: Path) -> None:
+def view(command: str) -> None:
     """Run README's command on scans; what its window shows goes to a file."""
-    run("python", "-c", SCANS, support)
+    run("python", "-c", SCANS)
     for scan in ("path/to/slices", "path/to/ct.nii.gz"):
         run(*command.replace("path/to/slices", scan).split(), "--screenshot", f"{scan}.png")
         assert Path(f"{scan}.png").stat().st_size > 10_000, "an empty picture"
@@ -75,7 +83,7 @@ def main(readme: Path, wheel: Path, folder: Path) -> None:
         if kind == "python":
             run("python", "-c", block)
         elif command := re.search(r"pyvista-vdi view .*", block):
-            view(command[0], readme.parent / "tests" / "support")
+            view(command[0])
         elif command := re.search(r"pyvista-vdi serve .*", block):
             serve(command[0])
 

@@ -613,7 +613,7 @@ def test_subplots_are_where_they_are_in_the_window(open_widget):
 
 def test_what_plays_series_is_sent_with_them_alone(widget, series):
     small, large = widget._esm, VDIWidget(series)._esm
-    assert len(small) < len(large) - 20_000
+    assert len(small) < len(large) - 12_000
     widget.vdi = series
     assert widget._esm == large
 

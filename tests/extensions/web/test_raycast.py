@@ -74,7 +74,7 @@ class Raycaster:
         self.page = page
 
     def give(self, vdi):
-        self.page.evaluate("(text) => give(text)", in_base64(file_of(vdi, "none")))
+        self.page.evaluate("(text) => give(text)", in_base64(file_of(vdi)))
 
     def draw(self, camera, size, *, clipping_planes=(), opaque_depth=None, few=False):
         """Premultiplied RGBA, float32 (H, W, 4), top row first."""

@@ -27,7 +27,7 @@ def path(default_runtime, tmp_path_factory):
     looks = {"cmap": "viridis", "opacity": "linear", "clim": (0, 1)}
     made = pvdi.generate_series(ball, camera, SIZE, [0.5 * i for i in range(N)], **looks)
     path = tmp_path_factory.mktemp("series") / "ball.vdis"
-    return made.save(path, precision="8-byte")
+    return made.save(path, precision="8-byte", compression="deflate")
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def path(default_runtime, tmp_path_factory):
         for view in orbit(around, volume.bounds, directions(14))
     ]
     made = pvdi.VDISet(vdis, camera=around, window_size=SIZE)
-    return made.save(tmp_path_factory.mktemp("sets") / "lumps.vdiset")
+    return made.save(tmp_path_factory.mktemp("sets") / "lumps.vdiset", compression="deflate")
 
 
 @pytest.fixture(scope="module")
