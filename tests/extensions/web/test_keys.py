@@ -47,7 +47,9 @@ def series(default_runtime, tmp_path_factory):
     volume = soft_ball()
     camera = filling_camera(volume.bounds, SIZE)
     made = pvdi.generate_series([volume] * 3, camera, SIZE, [0.0, 0.5, 1.0], cmap="viridis")
-    path = made.save(tmp_path_factory.mktemp("series") / "ball.vdis", precision="8-byte", compression="deflate")
+    path = made.save(
+        tmp_path_factory.mktemp("series") / "ball.vdis", precision="8-byte", compression="deflate"
+    )
     return path.read_bytes()
 
 
