@@ -23,8 +23,8 @@
 #define PACKET_WIDE (LANES / BUNDLE_HIGH) // pixels
 // Each lane's pixel, from the packet's first; and the same of one lane
 #define LANE_X                                                                                     \
-    (PACKED ? (Int)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)                     \
-                 : (Int)(0, 2, 4, 6, 1, 3, 5, 7, 0, 2, 4, 6, 1, 3, 5, 7))
+    (PACKED ? (Int)(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15)                          \
+            : (Int)(0, 2, 4, 6, 1, 3, 5, 7, 0, 2, 4, 6, 1, 3, 5, 7))
 #define LANE_Y (PACKED ? (Int)(0) : (Int)(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1))
 #define X_OF(lane) ((lane) % PACKET_BUNDLES * BUNDLE_WIDE + (lane) / PACKET_BUNDLES % BUNDLE_WIDE)
 #define Y_OF(lane) ((lane) / PACKET_BUNDLES / BUNDLE_WIDE)

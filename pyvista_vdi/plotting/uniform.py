@@ -143,7 +143,7 @@ class UniformGrid(Algorithm):
         super().Update(*args)
 
     def RequestDataObject(self, request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
-        """Give PyVista's grid, in which others may choose another array."""
+        """Set PyVista's grid, in which others may choose another array."""
         outputs.GetInformationObject(0).Set(vtkDataObject.DATA_OBJECT(), self.image)
         return 1
 
@@ -459,7 +459,7 @@ def _fill(
     low: Any,
     categorical: bool,
 ) -> None:
-    """Give points outside of all cells a value: at an octant that is drawn, else any of them."""
+    """Set the values of points outside of all cells: at an octant that is drawn, else any value."""
     beside = lacking[blank[lacking] != 255]
     octant = np.unpackbits(blank[beside, None], axis=1, bitorder="little").argmin(axis=1)
     above = np.stack([octant & 1, octant >> 1 & 1, octant >> 2], axis=1)

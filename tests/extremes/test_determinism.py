@@ -91,7 +91,7 @@ print(test_determinism.digest(get_runtime(info)))
 def test_across_processes_and_thread_counts(runtime, threads, expected):
     """CPU drivers start a thread per processor that they may run on."""
     here = Path(__file__).resolve().parent
-    paths = [here.parent / "support", here, os.environ.get("PYTHONPATH", "")]
+    paths = [here.parent / "support", here.parent, here, os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths))}
     if threads != "all":
         environment |= {"POCL_MAX_PTHREAD_COUNT": threads, "OMP_NUM_THREADS": threads}

@@ -221,7 +221,7 @@ def test_another_vdi_takes_the_place_of_the_first(plotter):
     actor.vdi = other
     assert actor.vdi is other
     assert np.abs(shown(plotter) - before).max() > SEEN
-    with pytest.raises(errors.InvalidArgumentError, match="without its volume.*add the volume"):
+    with pytest.raises(errors.InvalidArgumentError, match="without a volume.*add the volume"):
         actor.regenerate()
     with pytest.raises(errors.InvalidArgumentError, match="no mapper that could show"):
         pvdi.VDIActor().vdi = other

@@ -81,7 +81,7 @@ def test_views_regenerate_below_what_was_asked_for(plotter, arguments, bound):
         ({"quality": "fast", "target_ssim": 0.9}, "give one of them"),
         ({"quality": "fast", "max_supersegments": 9}, "max_supersegments=9"),
         ({"full_fps": -1}, "target_fps must be"),
-        ({"precision": "half"}, "precision must be one of"),
+        ({"precision": "half"}, "precision must be .exact. or .8-byte."),
     ],
 )
 def test_what_contradicts_is_refused_when_it_is_added(plotter, arguments, said):

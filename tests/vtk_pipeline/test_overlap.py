@@ -363,5 +363,5 @@ def test_nothing_is_left_and_what_is_out_of_the_picture_is_not_generated(raycast
     plotter.camera_position = CAMERA
     plotter.show(auto_close=False)
     assert raycasts == [2]
-    assert away.vdi is None
+    assert away.mapper.GetSource().GetCurrentVDI() is None
     plotter.close()

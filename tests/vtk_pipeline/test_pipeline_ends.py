@@ -206,27 +206,17 @@ def test_files_are_written_as_asked_for(vdi, tmp_path):
     writer = VDIWriter()
     writer.SetInputData(vdi_to_image(vdi))
     writer.SetFileName(tmp_path / "a.vdi")
-    assert (writer.GetPrecision(), writer.GetCompression(), writer.GetTolerance()) == (
-        None,
-        None,
-        0,
-    )
+    assert (writer.GetPrecision(), writer.GetCompression()) == (None, None)
     writer.SetPrecision("8-byte")
     writer.SetCompression("zstd")
     writer.Write()
     vdi.save(tmp_path / "b.vdi", precision="8-byte", compression="zstd")
     assert (tmp_path / "a.vdi").read_bytes() == (tmp_path / "b.vdi").read_bytes()
-    with pytest.raises(errors.InvalidArgumentError, match="precision must be one of.*'4-byte'"):
+    with pytest.raises(errors.InvalidArgumentError, match="precision must be .*'4-byte'"):
         writer.SetPrecision("4-byte")
-    for change, value, message in (
-        ("Compression", "zip", "compression of .*'zip'"),
-        ("Tolerance", 0.1, "a.vdi.* tolerance"),
-    ):
-        old = getattr(writer, f"Get{change}")()
-        getattr(writer, f"Set{change}")(value)
-        with pytest.raises(errors.InvalidArgumentError, match=message):
-            writer.Write()
-        getattr(writer, f"Set{change}")(old)
+    writer.SetCompression("zip")
+    with pytest.raises(errors.InvalidArgumentError, match="compression of .*'zip'"):
+        writer.Write()
 
 
 def test_files_say_what_is_wrong(vdi, tmp_path):

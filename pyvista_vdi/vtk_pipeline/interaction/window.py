@@ -136,7 +136,7 @@ class ShownVolumes:
                 return
 
     def forget(self) -> None:
-        """Let go of them."""
+        """Forget what was looked for."""
         lists, self._lists, self._volumes = self._lists, [], None
         for props, tag in lists:
             props.RemoveObserver(tag)

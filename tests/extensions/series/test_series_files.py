@@ -77,7 +77,7 @@ def test_a_step_is_a_vdi_file_and_a_file_is_the_folder_zipped(steps, saved, tmp_
 
 @pytest.mark.every(4)
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "deflate", "none"])
-@pytest.mark.parametrize("precision", ["8-byte", "16-byte", "exact"])
+@pytest.mark.parametrize("precision", ["8-byte", "exact"])
 def test_precisions_and_compressions(precision, compression, tmp_path):
     steps = [stepped_vdi(step=k) for k in range(2)]
     options = {"precision": precision, "compression": compression}
