@@ -95,10 +95,10 @@ export class RemoteVDI extends EventTarget {
       this.hello = message;
       if (first) this.viewer.home = message.camera;
       if (first && !this.viewer.camera) this.viewer.camera = message.camera; // no link has said another
+      this._status(null, "");
+      this.dispatchEvent(new CustomEvent("hello", { detail: message })); // a panel may take room
       this._said.forEach((said) => this._send(said));
       this._sendView();
-      this._status(null, "");
-      this.dispatchEvent(new CustomEvent("hello", { detail: message }));
     } else if (message.type === "vdi") {
       this._retry = FIRST_RETRY; // not at once: a server may fail whenever it is asked for one
       // One that has not come whole is given up by the server
