@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import collections.abc
+import dataclasses
 import inspect
 import re
 import subprocess
@@ -14,20 +15,22 @@ import sys
 import typing
 from pathlib import Path
 
-import numpy.typing
+import numpy.typing as npt
 import pytest
 
 import pyvista_vdi
 from pyvista_vdi import api
 from pyvista_vdi.model import types
 from pyvista_vdi.model.arguments import Settings
+from pyvista_vdi.model.options import GenerationOptions
 
 PACKAGE = Path(pyvista_vdi.__file__).parent
 #: Modules that names in annotations are imported from; else it is where the class is.
-HOMES = (collections.abc, typing, numpy.typing, types)
+HOMES = (collections.abc, typing, npt, types)
 CLASSES = {
     "AddTransferFunctionEditor": "plotting.add_transfer_function_editor",
     "AddVDIClipPlane": "plotting.clip_plane",
+    "AmbientOcclusion": "model.ambient_occlusion",
     "DeferredVDI": "model.deferred",
     "Estimate": "generation.slices",
     "Pick": "raycasting.picking",
@@ -83,7 +86,9 @@ def stub(about, text):
             lines.append(f"from pyvista_vdi.{CLASSES[word]} import {word}")
         elif home and (word == "overload" or word[0].isupper()):
             lines.append(f"from {home} import {word}")
-    return f'"""{about}, written by tests/api/test_stubs.py."""\n\n' + "\n".join(lines) + f"\n\n{text}"
+    return (
+        f'"""{about}, written by tests/api/test_stubs.py."""\n\n' + "\n".join(lines) + f"\n\n{text}"
+    )
 
 
 def stubs():
@@ -97,7 +102,9 @@ def stubs():
     made = made.replace(parameters=[inspect.Parameter("self", 0), *made.parameters.values()])
     text += "class Settings:\n    given: dict[str, Any]\n"
     text += "".join(f"    {name}: {told.kind}\n" for name, told in Settings.declared.items())
-    text += "    " + definition(type("", (), {"__signature__": made}), "__init__", **{"return": None})
+    text += "    " + definition(
+        type("", (), {"__signature__": made}), "__init__", **{"return": None}
+    )
     yield "api/__init__.pyi", stub("The public functions and their options", text)
     pytest.importorskip("pyvista")
     from pyvista_vdi.plotting.component import AddVDI
@@ -106,6 +113,15 @@ def stubs():
     text += "    add_transfer_function_editor: AddTransferFunctionEditor\n    vdi: PlotterVDIs\n"
     text += "    " + definition(AddVDI.__call__, "add_vdi")
     yield "plotting/plotter.pyi", stub("A plotter with what this package adds", text)
+    text = "class OptionMethods:\n"
+    for each in dataclasses.fields(GenerationOptions):
+        if each.name != "lights":
+            name = each.name.title().replace("_", "")
+            kind = GenerationOptions.declared[each.name].kind
+            text += f"    def Set{name}(self, value: {kind}) -> None: ...\n"
+            text += f"    def Get{name}(self) -> {each.type}: ...\n"
+    about = "Set and Get of each option of how a VDI is made"
+    yield "vtk_pipeline/filters/option_methods.pyi", stub(about, text)
 
 
 def statements(text):

@@ -627,7 +627,7 @@ class _Session:
         made = pvdi.generate(
             *(self.volume, self.camera, self.size()),
             transfer_function=self.table,
-            sample_distance=step,
+            settings=pvdi.Settings(sample_distance=step),
             **options,
         )
         _check_valid(made)

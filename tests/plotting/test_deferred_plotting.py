@@ -118,7 +118,10 @@ def test_what_values_cannot_honour_is_refused(default_runtime, plotter, asked, e
     [
         ({"shade": True}, "shade=True needs the volume's gradients"),
         ({"categories": True}, "categories are of single values"),
-        ({"coverage": "view"}, "coverage cannot be given with classification"),
+        (
+            {"settings": pvdi.Settings(coverage="view")},
+            "coverage cannot be given with classification",
+        ),
         ({"draw": "volume"}, "draw cannot be given with classification"),
     ],
 )

@@ -144,7 +144,11 @@ def test_a_resampled_grid_is_as_thick_as_it_is(make):
             [[0, 0, 0]] * 2, [0.1, 0.1], (0, 1), unit_distance=4.0, interpolation=interpolation
         )
         picture = pvdi.render_volume(
-            volume, camera, (80, 80), transfer_function=function, sample_distance=0.05
+            volume,
+            camera,
+            (80, 80),
+            transfer_function=function,
+            settings=pvdi.Settings(sample_distance=0.05),
         )
         drawn = 4 * np.log1p(-picture[::-1, :, 3].astype(float)) / np.log1p(-0.1)
         assert drawn[seen].mean() == pytest.approx(true[seen].mean(), rel=0.02)
