@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from plugin_scenes import LOOKS, soft_ball
+from settings import with_settings
 from vtk_sources import SIZE, executions, ready_source, some_property
 from watched_windows import finish, small_vdi
 
@@ -102,7 +103,7 @@ def test_a_source_makes_what_generate_makes():
     assert source.GetDial() == QualityTarget("high", **asked)
     looks = {"volume_property": some_property()}
     expected = pvdi.generate(
-        soft_ball(12), source.GetCamera(), SIZE, quality="high", **asked, **looks
+        soft_ball(12), source.GetCamera(), SIZE, quality="high", **with_settings(**asked), **looks
     )
     assert source.GetVDI().equals(expected)
     assert source.GetVDI().metadata["dial"]["chosen"] == expected.metadata["dial"]["chosen"]
