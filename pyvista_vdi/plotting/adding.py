@@ -74,12 +74,7 @@ def _culling(given: Any) -> str | bool:
 @record
 @dataclass(frozen=True, eq=False)
 class Placement(Options):
-    """Where an actor is put in a plotter, and what is shown beside it.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """Where an actor is put in a plotter, and what is shown beside it."""
 
     reset_camera: bool | None = option(None, "whether the view is reset, as in ``add_volume``")
     name: str | None = option(None, "of the actor; another of this name is replaced")
@@ -102,12 +97,7 @@ class Placement(Options):
 @record
 @dataclass(frozen=True, eq=False)
 class Making(Options):
-    """What a VDI is made of, from where, and by what.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """What a VDI is made of, from where, and by what."""
 
     resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
     resample: str | Sequence[int] | None = option(

@@ -1,7 +1,9 @@
 """Set and Get of each option of how a VDI is made, written by tests/api/test_stubs.py."""
+# fmt: off
+# ruff: noqa: I001
 
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
-from pyvista_vdi.model.types import Criterion, MemoryLike, OcclusionLike, Precision
+from pyvista_vdi.model.ambient_occlusion import (AmbientOcclusion)
+from pyvista_vdi.model.types import (Criterion, MemoryLike, OcclusionLike, Precision)
 
 class OptionMethods:
     def SetSampleDistance(self, value: float | None) -> None: ...
