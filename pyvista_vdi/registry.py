@@ -32,7 +32,6 @@ class FileFormat:
     page: bool = False  # may hold another's file: module has begins_with and data_in
     values: bool = False  # holds deferred VDIs as well
     needs: str = ""  # what its module cannot be loaded without, and the command that installs it
-    verbs: str = ""  # module whose info(options) and convert(options) the command line runs
 
     def load(self) -> Any:
         """Return the module that reads and writes it."""

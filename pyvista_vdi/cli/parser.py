@@ -15,7 +15,7 @@ from pyvista_vdi.cli.verbs import VERBS
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
 
-#: What the command says without a verb.
+#: What the command says without a subcommand.
 _LESSON = f"""{_DESCRIPTION} Version {__version__}.
 
 A first session, with a volume that is shipped:
@@ -30,7 +30,7 @@ With your own, a file or a folder of DICOM slices:
 
   pyvista-vdi generate scans/head -o head.vdi --cmap ct-bone
 
-pyvista-vdi --help lists all verbs, pyvista-vdi generate --help explains one, and
+pyvista-vdi --help lists all subcommands, pyvista-vdi generate --help explains one, and
 pyvista-vdi devices says on what it runs.
 """
 
@@ -38,7 +38,7 @@ pyvista-vdi devices says on what it runs.
 _LISTED = 16
 
 
-#: Verbs that went, and what does their work.
+#: Subcommands that went, and what does their work.
 _GONE = {
     "benchmark": "the paper's tables are measured by a script of a checkout, benchmarks/paper.py"
 }
@@ -69,10 +69,10 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
         print(_LESSON, end="")
         return None
     if arguments[0] in _GONE:
-        raise UsageError(f"there is no verb {arguments[0]!r}: {_GONE[arguments[0]]}")
+        raise UsageError(f"there is no subcommand {arguments[0]!r}: {_GONE[arguments[0]]}")
     if not arguments[0].startswith("-") and arguments[0] not in verbs:
         raise UsageError(
-            f"there is no verb {arguments[0]!r}: {_suggestion(arguments[0], list(verbs))}"
+            f"there is no subcommand {arguments[0]!r}: {_suggestion(arguments[0], list(verbs))}"
         )
     if arguments[0] in verbs:
         _check_option_names(verbs[arguments[0]], arguments[1:])
@@ -123,31 +123,37 @@ def _suggestion(name: str, known: Sequence[str]) -> str:
 
 
 def _make_parser(asked: str) -> tuple[_Parser, dict[str, _Parser]]:
-    """Return the parser and those of all verbs, of which only the one that is asked has options."""
+    """Return the parser and those of all subcommands; only the one that is asked has options."""
+    added = registry.verbs()
+    known = {name: verb[1:3] for name, verb in VERBS.items()}
+    known |= {name: (verb.summary, verb.example) for name, verb in added.items()}
+    listed = "\n".join(f"    {name:<11}{summary}" for name, (summary, _) in known.items())
     parser = _Parser(
         prog="pyvista-vdi",
-        description=_DESCRIPTION,
-        epilog="Each verb explains itself: pyvista-vdi generate --help",
+        usage="pyvista-vdi [--version] SUBCOMMAND ...",
+        description=f"{_DESCRIPTION}\n\n{listed}",
+        epilog="Each explains itself: pyvista-vdi generate --help",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
+        add_help=False,
     )
-    parser.add_argument("--version", action="version", version=f"pyvista-vdi {__version__}")
-    subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
+    parser.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)
+    version = f"pyvista-vdi {__version__}"
+    parser.add_argument("--version", action="version", version=version, help=argparse.SUPPRESS)
+    subparsers = parser.add_subparsers(dest="verb", required=True, help=argparse.SUPPRESS)
     verbs: dict[str, _Parser] = {}
-    added = registry.verbs()
-    known = {name: verb[1:] for name, verb in VERBS.items()} | {
-        name: (verb.summary, verb.example, None) for name, verb in added.items()
-    }
-    for name, (summary, example, add_options) in known.items():
+    for name, (summary, example) in known.items():
         verbs[name] = subparsers.add_parser(
             name,
-            help=summary,
+            prog=f"pyvista-vdi {name}",
             description=summary[0].upper() + summary[1:] + ".",
             epilog=f"Example:\n  {example}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
         )
+        own = VERBS.get(name)
         if name == asked:
-            (add_options or registry.load(added[name].options))(verbs[name])
-        of_core = f"{__package__}.{VERBS[name][0]}:{name}" if name in VERBS else None
-        verbs[name].set_defaults(run=run_verb, place=of_core or added[name].run)
+            (registry.load(added[name].options) if own is None else own.options)(verbs[name])
+        place = added[name].run if own is None else f"{__package__}.{own.module}:{name}"
+        verbs[name].set_defaults(run=run_verb, place=place)
     return parser, verbs
