@@ -16,13 +16,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import (
-    QUALITIES,
-    Deferral,
-    GenerationOptions,
-    QualityTarget,
-    declared,
-)
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
@@ -130,51 +124,47 @@ class Option(NamedTuple):
 
 
 _XYZ, _RANGE = ("X", "Y", "Z"), ("LOW", "HIGH")
-#: How values are given of those options of the records for which that does not follow from their
-#: defaults, and what is put behind their texts.
-_VALUES: dict[str, tuple[Any, ...]] = {
-    "scalars": ("NAME",),
-    "cmap": ("NAME",),
-    "opacity": ("NAME|A,B,...", _opacity, ", 0 to 1"),
-    "clim": (_RANGE, NUMBER),
-    "opacity_unit_distance": ("LENGTH", NUMBER),
-    "ambient": ("X", NUMBER),
-    "value_range": (_RANGE, NUMBER),
-    "importance": ("A,B,...", numbers),
-    "sample_distance": ("LENGTH", NUMBER, " (default: half the smallest spacing)"),
-    "ambient_occlusion": ("",),
-    "memory_limit": (
-        "SIZE",
-        _bytes,
-        ", like 2GiB (default: all); what does not fit goes there in bricks",
-    ),
-    "criterion": ("NAME", None, ": least-error (default) or homogeneity"),
-    "target_ssim": ("S", NUMBER),
-    "target_fps": ("RATE", NUMBER),
-    "max_bytes": ("SIZE", _bytes, ", like 20MB"),
-    "transmittance_cutoff": ("LIGHT", NUMBER, ", 0 to below 1 (0.000001); for a single file"),
+#: How values are given, by the types of options in the records.
+_BY_KIND: dict[str, tuple[Any, ...]] = {
+    "bool": ("", None),
+    "OcclusionLike": ("", None),
+    "int": ("N", WHOLE),
+    "float": ("X", NUMBER),
+    "MemoryLike": ("SIZE", _bytes),
+    "RangeLike": (_RANGE, NUMBER),
+    "ArrayLike": ("A,B,...", numbers),
+    "OpacityLike": ("NAME|A,B,...", _opacity),
 }
 
 
 def _of_records() -> dict[str, Option]:
+    """Return the options that the records declare."""
     found = {}
     records = (RenderOptions, DrawingOptions, Classification, Deferral)
     for name, told in declared(*records, GenerationOptions, QualityTarget).items():
-        default, choices = told.default, told.choices
-        value, read, more = (*_VALUES.get(name, ()), None, None, None)[:3]
-        if value is None and not choices and not isinstance(default, bool):
-            value, read = ("N", WHOLE) if isinstance(default, int) else ("X", NUMBER)
-            value = "DEGREES" if "degrees" in told.what else value
-        shown = isinstance(default, int | float) and not isinstance(default, bool)
-        text = told.what.replace("``", "") + (more or "")
-        choices = () if name == "criterion" else choices
-        found[name] = Option(text, value or "", read, choices, usual=default if shown else None)
-    ssim = ", ".join(f"{bound:g} ({name})" for name, bound in QUALITIES.items() if bound)
-    text = f"{found['quality'].text}: an SSIM of {ssim} against volume rendering; reference asks"
-    return found | {"quality": found["quality"]._replace(text=f"{text} for nothing")}
+        value, read = _BY_KIND.get(told.kind.removesuffix(" | None"), ("NAME", None))
+        value = "DEGREES" if "degrees" in told.what else value
+        number = isinstance(told.default, int | float) and not isinstance(told.default, bool)
+        text, choices = told.what.replace("``", ""), told.choices
+        usual = told.default if number or choices else None
+        found[name] = Option(text, "" if choices else value, read, choices, usual=usual)
+    return found
 
 
-OPTIONS = _of_records() | {
+#: What is said of options of the records for people at a command line.
+_SAID = {
+    "opacity": "name, one opacity, or opacities, 0 to 1",
+    "memory_limit": "most memory to take on the device, like 2GiB; what does not fit goes there in "
+    "bricks (default: all)",
+    "max_bytes": "most bytes of the VDI on the device, like 20MB",
+    "transmittance_cutoff": "a ray ends where less light than this is left, 0 to below 1; for a "
+    "single file (default: 0.000001)",
+}
+
+OPTIONS = _of_records()
+OPTIONS |= {name: OPTIONS[name]._replace(text=text) for name, text in _SAID.items()}
+OPTIONS["max_bytes"] = OPTIONS["max_bytes"]._replace(value="SIZE", read=_bytes)
+OPTIONS |= {
     "output": Option(".vdi, .exr or .html to write", "FILE"),
     "size": Option("window size in pixels", "WxH", parse_size),
     "spacing": Option("between voxels, in place of what the file says", _XYZ, NUMBER),
@@ -249,7 +239,7 @@ _GROUPS = {
     "quality": (
         "quality",
         "Lists and precision are chosen by a short measurement; --size is that of pictures.",
-        "quality target_ssim target_fps max_bytes target_angle",
+        "quality target_ssim full_fps max_bytes target_angle",
     ),
     "file": ("file", "", "compression compression_level precision"),
 }

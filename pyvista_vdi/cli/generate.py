@@ -12,11 +12,10 @@ from pyvista_vdi.cli.inputs import (
     camera,
     classification,
     file_options,
-    generation,
     given,
-    kept_values,
     measuring,
     read_volume,
+    refuse_with_values,
     say_vdi,
 )
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -25,7 +24,7 @@ from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import QualityTarget
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import describe
@@ -35,10 +34,13 @@ def generate(options: argparse.Namespace) -> int:
     """Generate a VDI and write it."""
     # Refuse what cannot be before the volume is read
     path, file_arguments = checked_target(options.output), file_options(options)
-    target, look = given(options, QualityTarget), classification(options)
-    QualityTarget(**target)
+    target, look = (
+        QualityTarget(**given(options, QualityTarget, flat=True)),
+        classification(options),
+    )
     looks = Classification.composited(look, "generate")
-    kept, asked = kept_values(options), generation(options)
+    refuse_with_values(options)
+    how = given(options, GenerationOptions, QualityTarget, Deferral)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
     volume = as_seen(options, volume, view)
@@ -50,18 +52,17 @@ def generate(options: argparse.Namespace) -> int:
     if target and not volume.chunked:
         needed = f"pictures of {width} x {height}: settings are chosen by a measurement"
     elif not volume.chunked:
-        table = (
-            None if kept.get("classification") == "deferred" else looks.transfer_function_of(volume)
-        )
-        how = {"transfer_function": table, "device": options.device}
-        most = estimate(volume, options.size, **how, **asked).total / 2**20
+        deferred = options.classification == "deferred"
+        table = None if deferred else looks.transfer_function_of(volume)
+        flat = given(options, GenerationOptions, flat=True)
+        flat |= {"transfer_function": table, "device": options.device}
+        most = estimate(volume, options.size, **flat).total / 2**20
         needed = f"{width} x {height} lists: up to {most:.0f} MiB"
     print(f"{nx} x {ny} x {nz} points, {needed}", file=sys.stderr)
     start = time.perf_counter()
-    how = {"client": options.scheduler, "device": options.device}
+    how |= {"client": options.scheduler, "device": options.device, **look}
     with measuring("generating a VDI") as bar:
-        how |= {"progress": bar, **asked, **target, **kept, **look}
-        vdi = generate_vdi(volume, view, options.size, **how)
+        vdi = generate_vdi(volume, view, options.size, progress=bar, **how)
     seconds = time.perf_counter() - start
     file_arguments.pop("precision", None)  # which it has
     with measuring("writing it") as bar:

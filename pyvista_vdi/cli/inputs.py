@@ -20,11 +20,12 @@ from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import StoredVolume, is_store
 from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
+from pyvista_vdi.model.options import QualityTarget, declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
@@ -47,20 +48,19 @@ _SHADING = ("shade", "ambient", "diffuse", "specular", "specular_power")
 _OCCLUSION = ("ambient_occlusion", "occlusion_radius", "occlusion_strength")
 
 
-def given(options: argparse.Namespace, *records: Any) -> dict[str, Any]:
-    """Return those of the options that some records declare which were given, by their names."""
+def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dict[str, Any]:
+    """Return the options of some records that were given, as arguments of public functions.
+
+    What is seldom turned is in ``settings``, or ``flat`` beside the others.
+    """
     values = {name: getattr(options, name, None) for name in declared(*records)}
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def generation(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of generation that were given."""
-    found = given(options, GenerationOptions)
+    found = {name: value for name, value in values.items() if value is not None}
     of = {n: getattr(options, f"occlusion_{n}", None) for n in ("radius", "strength")}
     of = {name: value for name, value in of.items() if value is not None}
-    if of or "ambient_occlusion" in found:
+    if "ambient_occlusion" in values and (of or "ambient_occlusion" in found):
         found["ambient_occlusion"] = AmbientOcclusion(**of)
-    return found
+    seldom = {name: found.pop(name) for name in Settings.declared if name in found and not flat}
+    return found | ({"settings": Settings(**seldom)} if seldom else {})
 
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:
@@ -73,16 +73,11 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
-def kept_values(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that say what is kept where scalars are classified afterwards.
-
-    What goes with none of that is refused, before a volume is read.
-    """
-    kept = given(options, Deferral)
-    if kept.get("classification") != "deferred":
-        names = [name for name in ("value_range", "importance") if name in kept]
-        refuse(options, names, "--classification deferred")
-        return kept
+def refuse_with_values(options: argparse.Namespace) -> None:
+    """Refuse, before a volume is read, what does not go with when scalars are classified."""
+    if options.classification != "deferred":
+        refuse(options, ("value_range", "importance"), "--classification deferred")
+        return
     why = "--classification deferred keeps values, which have no colours yet: "
     found = format_named(options.output)
     if found is not None and not found.values and found.holds == "VDI":
@@ -91,7 +86,6 @@ def kept_values(options: argparse.Namespace) -> dict[str, Any]:
     refuse(options, names, "VDIs that have colours", why)
     looks = [name for name in LOOK if name != "interpolation"]
     refuse(options, looks, "'pyvista-vdi render', view or convert of what is written", why)
-    return kept
 
 
 def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:

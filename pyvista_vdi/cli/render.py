@@ -29,7 +29,7 @@ from pyvista_vdi.io import checked_png_target, to_bytes, write_png
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import RATE, VDICollection
-from pyvista_vdi.model.render_options import DrawingOptions
+from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.plotting.imports import import_pyvista
@@ -50,7 +50,7 @@ def render(options: argparse.Namespace) -> int:
         # A look is for those that keep values, and is over the ranges of all of them
         asks = next((k for k, vdi in enumerate(vdis) if keeps_values(vdi)), 0)
         how = look_for(options, vdis[asks], options.files[asks])
-        how |= {n: getattr(options, n) for n in ("transmittance_cutoff", "device")}
+        how |= {"device": options.device, **given(options, RenderOptions)}
         bar(0.5, "drawing")
         own, size = picture_view(vdis[0])
         shown: Any = vdis[0]
@@ -86,8 +86,8 @@ def view(options: argparse.Namespace) -> int:
     with pv.vtk_verbosity("off"):
         plotter = pv.Plotter(off_screen=off_screen, window_size=list(size))
     try:
-        how = {"status": bool(options.status), "device": options.device, **look}
-        actor = plotter.add_vdi(shown, **how, **given(options, DrawingOptions))
+        how = {"device": options.device, **given(options, DrawingOptions), **look}
+        actor = plotter.add_vdi(shown, **how)
         _show(plotter, actor, first, options)
         if target is not None:
             with warnings.catch_warnings():
@@ -116,6 +116,8 @@ def _show(plotter: Any, actor: Any, first: Camera, options: argparse.Namespace) 
 
     aim(plotter.camera, first)
     plotter.renderer.reset_camera_clipping_range()
+    if options.status:
+        actor.show_status(plotter)
     if options.time is not None:
         actor.time = options.time
     if options.screenshot is not None:

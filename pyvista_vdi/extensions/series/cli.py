@@ -20,10 +20,10 @@ from pyvista_vdi.cli.inputs import (
     PLACE,
     classification,
     file_options,
-    generation,
-    kept_values,
+    given,
     measuring,
     refuse,
+    refuse_with_values,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import mebibytes, printable
@@ -33,7 +33,7 @@ from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range,
 from pyvista_vdi.io import is_vdi_file, read, read_info
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import Deferral, declared
+from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
@@ -58,7 +58,8 @@ def series(options: argparse.Namespace) -> int:
     times = _times(steps, options.times)
     look = classification(options)
     Classification.composited(look, "series")
-    how = look | kept_values(options)
+    refuse_with_values(options)
+    how = look | given(options, GenerationOptions, Deferral)
     check_writable(with_suffix(Path(options.output), (".vdis",), "a series"))
     address = options.scheduler
     connected = nullcontext() if address is None else registry.generator("clients")(address)
@@ -67,7 +68,7 @@ def series(options: argparse.Namespace) -> int:
             first = steps[0].read()
         if not of_vdis:
             view = generating_view(options, first)
-            how |= {"device": options.device, "client": client, **generation(options)}
+            how |= {"device": options.device, "client": client}
             make = StepMaker("series", view, options.size, **how)
 
         def vdi_of(i: int) -> VDI:
@@ -86,15 +87,15 @@ def series(options: argparse.Namespace) -> int:
     return 0
 
 
-def _times(steps: Sequence[Step], given: Sequence[float] | None) -> Sequence[float]:
+def _times(steps: Sequence[Step], asked: Sequence[float] | None) -> Sequence[float]:
     """Return the times that are given, else the files' where these ascend, else numbers."""
-    if given is not None:
-        if len(given) != len(steps):
+    if asked is not None:
+        if len(asked) != len(steps):
             raise InvalidArgumentError(
                 f"--times gives a time to each step: there are {len(steps)} steps and "
-                f"{len(given)} times"
+                f"{len(asked)} times"
             )
-        return given
+        return asked
     known = [step.time for step in steps if step.time is not None]
     if len(known) == len(steps) and all(a < b for a, b in pairwise(known)):
         return known

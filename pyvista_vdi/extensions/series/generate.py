@@ -19,24 +19,20 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import (
-    GENERATION_NAMES,
-    Deferral,
-    GenerationOptions,
-    QualityTarget,
-    declared,
-)
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import bytes_of
 
 _GRID = ("spacing", "origin")
-_OTHERS = (*GENERATION_NAMES, *declared(QualityTarget), *declared(Deferral))
+_RECORDS = (QualityTarget, Deferral, GenerationOptions)
+_OTHERS = names_of(*_RECORDS)
 
 
 def generate_series(
@@ -142,11 +138,7 @@ class StepMaker:
         looks = {n: v for n, v in options.items() if n not in _OTHERS}
         self._looks = Classification.composited(looks, function, (*_OTHERS, *_GRID))
         self._described = self._looks.describe()
-        asked: Any = (
-            of(**{n: options[n] for n in declared(of) if n in options})
-            for of in (QualityTarget, Deferral, GenerationOptions)
-        )
-        target, deferral, _ = asked
+        target, deferral, _ = records_of(dict(options), function, *_RECORDS)
         if deferral.deferred:
             self._looks.require_no_look()
             deferral.refuse_target(target)

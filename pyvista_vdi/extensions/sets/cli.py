@@ -8,21 +8,22 @@ from pathlib import Path
 
 from pyvista_vdi.cli import declare
 from pyvista_vdi.cli.generate import generating_view
-from pyvista_vdi.cli.inputs import classification, generation, measuring, part, read_volume
+from pyvista_vdi.cli.inputs import classification, given, measuring, part, read_volume
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.extensions.sets.generate import generate_set
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
 
 def generate(options: argparse.Namespace) -> int:
     """Generate a set of VDIs and write it."""
     target = check_writable(with_suffix(Path(options.output), (".vdiset",), "a set"))
-    look, how = classification(options), generation(options)
+    look, how = classification(options), given(options, GenerationOptions)
     Classification.composited(look, "set")  # refused before the volume is read
     volume = read_volume(options)
-    given = {n: getattr(options, n) for n in ("views", "half_angle", "lists", "device")}
-    how |= {name: value for name, value in given.items() if value is not None}
+    asked = {n: getattr(options, n) for n in ("views", "half_angle", "lists", "device")}
+    how |= {name: value for name, value in asked.items() if value is not None}
     how |= {"window_size": options.size, "camera": generating_view(options, volume), **look}
     start = time.perf_counter()
     with measuring("generating a set") as bar:

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from pyvista_vdi.cli import declare
-from pyvista_vdi.cli.inputs import classification, generation, read_volume
+from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.errors import naming
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.volume import Volume
 
 
@@ -45,7 +46,7 @@ def serve(options: argparse.Namespace) -> int:
         token=options.token,
         hosts=options.allow_host,
         lists=math.prod(options.lists),
-        **generation(options),
+        **given(options, GenerationOptions, flat=True),
         device=options.device,
         announce=lambda line: print(line, flush=True),
         **arguments,
