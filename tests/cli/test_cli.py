@@ -19,6 +19,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io, registry
 from pyvista_vdi.cli import inputs, parser
 from pyvista_vdi.io.volumes import read_volume
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
 
 NAMES = """
@@ -525,7 +526,7 @@ def test_camera_options(folder):
 def test_looks_and_their_changes(asked, looks, occlusion):
     options = parser.parse(f"generate a -o b.vdi {asked}".split())
     assert inputs.classification(options) == looks
-    assert inputs.generation(options).get("ambient_occlusion") == occlusion
+    assert inputs.given(options, GenerationOptions).get("ambient_occlusion") == occlusion
 
 
 @pytest.mark.parametrize(
