@@ -23,7 +23,7 @@ class FileFormat:
     """A kind of file, known by the end of its name."""
 
     suffix: str  # in small letters, with the dot
-    module: str  # has read and read_info, and write or, of steps, write_steps
+    module: str  # has read, read_info and, of single VDIs, write
     holds: str = "VDI"  # or "series", "set": what is read from it
     read_options: tuple[str, ...] = ()
     write_options: tuple[str, ...] = ()  # beside compression and level

@@ -262,8 +262,8 @@ _SOURCES = {
 def add(parser: argparse._ActionsContainer, names: str, **changes: Any) -> None:
     """Add options, arguments, and groups of options, which end in a colon, in this order.
 
-    ``changes``: of an option its text, its default or all of it, in place of what stands above; of
-    a group what is put into its text.
+    ``changes``: of an option its text, its default or all of it, in place of what stands above, or
+    ``False`` where it is left out; of a group what is put into its text.
     """
     for name in names.split():
         if name in _SOURCES:
@@ -298,6 +298,8 @@ def _add_source(parser: argparse._ActionsContainer, name: str) -> None:
 
 
 def _add_option(parser: argparse._ActionsContainer, name: str, change: Any) -> None:
+    if change is False:
+        return
     option: Option = change if isinstance(change, Option) else OPTIONS[name]
     if isinstance(change, str):
         option = option._replace(text=change)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from typing import NamedTuple
 
 from pyvista_vdi.cli.declare import COUNT, FPS, NUMBER, RATE, Option, add, numbers, parse_size
@@ -59,7 +60,7 @@ def _view(parser: argparse.ArgumentParser) -> None:
         draw=Option(draw, choices=("auto", "vdi", "volume"), usual="auto"),
         status=Option(status),
     )
-    add(parser, "look: device")
+    add(parser, "look: device", transfer_function=False)
 
 
 def _frames(parser: argparse.ArgumentParser, frames: str, **own: Option) -> None:
@@ -99,6 +100,7 @@ def _compare(parser: argparse.ArgumentParser) -> None:
         angles=Option("degrees from V_O", "A,B,...", numbers, default=ANGLES),
         repeats=Option("timed frames of each kind", "N", COUNT, default=3),
         precision=Option("of the supersegments", choices=PRECISIONS, default="exact"),
+        transfer_function=False,
     )
     add(parser, "compression sample_distance device", compression="lz4")
 
@@ -130,7 +132,7 @@ class Verb(NamedTuple):
     module: str
     summary: str
     example: str
-    options: object
+    options: Callable[[argparse.ArgumentParser], None]
 
 
 VERBS = {
