@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.extensions.series.archive import SERIES, SET, write_to
+from pyvista_vdi.extensions.series.archive import SERIES, write_to
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.files import about
+from pyvista_vdi.extensions.sets.files import SET, about
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.io.progress import Progress
