@@ -7,13 +7,11 @@ import json
 import math
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi import registry
 from pyvista_vdi.cli import declare
 from pyvista_vdi.cli.files import state_of, text_of
 from pyvista_vdi.cli.generate import as_seen, generating_view
@@ -68,10 +66,8 @@ def series(options: argparse.Namespace) -> int:
     Classification.composited(looks, "series")  # refused before a volume is read
     looks |= kept_values(options)
     check_writable(with_suffix(Path(options.output), (SERIES.suffix,), "a series"))
-    address = options.scheduler
-    connected = nullcontext() if address is None else registry.generator("clients")(address)
-    with connected as client, measuring("writing a series") as bar:
-        vdi_of = _reader(steps) if of_vdis else _maker(steps, options, client, looks)
+    with measuring("writing a series") as bar:
+        vdi_of = _reader(steps) if of_vdis else _maker(steps, options, looks)
         vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
         target = vdis.save(
             options.output, progress=bar, **{"precision": "8-byte", **of_the_file(options)}
@@ -82,7 +78,7 @@ def series(options: argparse.Namespace) -> int:
 
 
 def _maker(
-    steps: Sequence[Step], options: argparse.Namespace, client: Any, looks: dict[str, Any]
+    steps: Sequence[Step], options: argparse.Namespace, looks: dict[str, Any]
 ) -> Callable[[int], VDI]:
     """Return what makes the VDI of a step's volume, all from the view that the first one has."""
     with naming(steps[0].name):
@@ -90,7 +86,7 @@ def _maker(
     view = generating_view(options, first)
     names = ("max_supersegments", "sample_distance", "memory_limit", "device")
     chosen = {name: getattr(options, name) for name in names}
-    make = StepMaker("series", view, options.size, client=client, **chosen, **looks)
+    make = StepMaker("series", view, options.size, client=options.scheduler, **chosen, **looks)
 
     def vdi_of(i: int) -> VDI:
         with naming(f"{steps[i].name}: step {i}"):
