@@ -25,23 +25,18 @@ from pyvista_vdi.extensions.large.on_mpi import (
 from pyvista_vdi.extensions.series.series import checked_time
 from pyvista_vdi.extensions.series.writer import SeriesWriter, checked_way
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
+from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_range, as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.deferred import importance_points
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.options import (
-    GENERATION_NAMES,
-    Deferral,
-    GenerationOptions,
-    GenerationRequest,
-    declared,
-)
+from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.volume import Grid, Volume
 
-_DEFERRAL = tuple(declared(Deferral))
+_RECORDS = (Deferral, GenerationOptions)
 
 
 class InSitu:
@@ -158,11 +153,11 @@ class InSitu:
                     path, precision=precision, append=append, overwrite=overwrite
                 )
 
-    def _check(self, options: dict[str, Any]) -> None:
+    def _check(self, looks: dict[str, Any]) -> None:
         """Take what generate takes, or raise."""
-        others = (*GENERATION_NAMES, *_DEFERRAL)
-        looks = {name: value for name, value in options.items() if name not in others}
-        self._deferral = Deferral(**{n: options[n] for n in _DEFERRAL if n in options})
+        self._deferral, self._options = records_of(
+            looks, "InSitu", *_RECORDS, defaults={"precision": "8-byte"}
+        )
         missing = looks.get("clim") is None and "transfer_function" not in looks
         if self._deferral.deferred:
             missing = self._deferral.value_range is None
@@ -171,14 +166,12 @@ class InSitu:
                 f"{'value_range' if self._deferral.deferred else 'clim'}=(low, high) is missing: "
                 "no step knows the range of the others"
             )
-        self._looks = Classification.composited(looks, "InSitu", others)
+        self._looks = Classification.composited(looks, "InSitu", names_of(*_RECORDS))
         if self._deferral.deferred:
             self._looks.require_no_look()
             ends = as_range(self._deferral.value_range)  # what cannot be is refused before the run
             importance_points(self._deferral.importance, ends)
             self._function = unclassified(self._looks.interpolation)
-        chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
-        self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
 
     def __call__(self, values: NDArray[Any], first: Sequence[int], at: float) -> None:
         """Write a step, unless it is one that is left out.
