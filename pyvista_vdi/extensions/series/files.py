@@ -23,7 +23,7 @@ def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Pat
     found = format_named(path)
     if found is not None and found.page:
         as_vdi(series[0])  # refuses what has no colours
-        return found.load().write_series(series, path, **options)  # type: ignore[no-any-return]
+        return found.load().write(series, path, **options)  # type: ignore[no-any-return]
     if options.get("precision") is None:
         options["precision"] = series[0].precision
     return write(path, SERIES, {"times": series.times}, series, **options)

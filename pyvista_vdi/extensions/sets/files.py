@@ -23,7 +23,7 @@ def save(vdi_set: VDISet, path: str | os.PathLike[str], **options: Any) -> Path:
     found = format_named(path)
     if found is not None and found.page:
         as_vdi(vdi_set[0])  # refuses what has no colours
-        return found.load().write_set(vdi_set, path, **options)  # type: ignore[no-any-return]
+        return found.load().write(vdi_set, path, **options)  # type: ignore[no-any-return]
     return write(path, SET, about(vdi_set), vdi_set, **options)
 
 
