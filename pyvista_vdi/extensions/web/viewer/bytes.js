@@ -69,10 +69,10 @@ function makeCrcTables() {
     tables[0][n] = c;
   }
   for (let k = 1; k < 4; ++k) {
-    for (let n = 0; n < 256; ++n) {
+    tables[k].forEach((_, n) => {
       const c = tables[k - 1][n];
       tables[k][n] = tables[0][c & 255] ^ (c >>> 8);
-    }
+    });
   }
   return tables;
 }
@@ -80,8 +80,7 @@ function makeCrcTables() {
 /** The CRC-32 of bytes, as ZIP has it. */
 export function crc32(bytes) {
   const [t0, t1, t2, t3] = (crcTables ??= makeCrcTables());
-  let c = -1;
-  let k = 0;
+  let c = -1, k = 0;
   for (; k + 4 <= bytes.length; k += 4) {
     c ^= bytes[k] | (bytes[k + 1] << 8) | (bytes[k + 2] << 16) | (bytes[k + 3] << 24);
     c = t3[c & 255] ^ t2[(c >>> 8) & 255] ^ t1[(c >>> 16) & 255] ^ t0[c >>> 24];
