@@ -219,11 +219,6 @@ export class VDIViewer extends HTMLElement {
     return { ...this.#status, supersegments: n, lists: windowSize, level, precision, pixels };
   }
 
-  /** Draw again; after a movement with few pixels first. */
-  invalidate(moves = true) {
-    this.#shown.invalidate(moves);
-  }
-
   // -- where it comes from -----------------------------------------------------------------------
 
   /**
@@ -245,7 +240,7 @@ export class VDIViewer extends HTMLElement {
         onBegin: (vdi) => this.#shown.warmUp(vdi),
         onLevel: (prepared) => {
           this.#endSeries();
-          this.setPrepared(prepared);
+          this.#show(prepared);
           this.#comeTo(prepared.bounds);
         },
         onSeries: (series) => this.#beginSeries(series),
@@ -270,8 +265,8 @@ export class VDIViewer extends HTMLElement {
     return this.load(bytes);
   }
 
-  /** Show what prepare.js has made of a VDI: swapped whole. */
-  setPrepared(prepared) {
+  // Show what prepare.js has made of a VDI: swapped whole.
+  #show(prepared) {
     this.#shown.prepared = prepared;
     if (!this.#shown.camera) this.resetCamera();
     this.#bar?.show();
@@ -337,7 +332,7 @@ export class VDIViewer extends HTMLElement {
   // Go on with what is there: what was wrong is no more.
   #recover() {
     if (this.#ready.settled) this.#renew();
-    if (this.#shown.prepared) this.setPrepared(this.#shown.prepared);
+    if (this.#shown.prepared) this.#show(this.#shown.prepared);
     else this.#tell({ state: "empty", progress: 0, message: undefined });
   }
 
@@ -396,7 +391,7 @@ export class VDIViewer extends HTMLElement {
     const player = this.#player = new (series.views ? Surround : Player)(series, {
       show: (prepared, step) => {
         this.#step = { step, time: this.series && series.times[step] };
-        this.setPrepared(prepared);
+        this.#show(prepared);
       },
       changed: () => {
         if (player !== this.#player) return;
@@ -498,11 +493,7 @@ export class VDIViewer extends HTMLElement {
     }
     if (this.#source && this.#loading.signal.aborted) this.load(this.#source).catch(() => {});
     this.#player?.resume();
-    this.#controls = playerControls?.(this.#parts.controls, () => this.series && this.#player,
-      () => this.#series.times, {
-        toggle: () => this.playing ? this.pause() : this.play(),
-        seek: (step) => this.#seek(step),
-      }, signal);
+    this.#controls = playerControls?.(this.#parts.controls, this);
     this.#controls?.show();
     this.#bar = viewerControls(this.#parts, this, {
       link: this.#address && (() => {
