@@ -19,12 +19,11 @@ export class LevelDecoder {
   #beginning = true; // whether a coarse level may still come
 
   /**
-   * @param {(vdi: object) => void} onLevel Called with the VDI of each level, "coarse" before "full".
-   * @param {(vdi: object) => void} onBegin Called before a level in 8 bytes, where that is known,
-   *   with the camera, windowSize, bounds, depthOrigin and values.
+   * @param {(vdi: object) => void} onLevel Called with the VDI of each level, "coarse" before "full";
+   *   before one of 8 bytes with an empty one, "begun", by which what draws it can be compiled.
    */
-  constructor(onLevel, onBegin) {
-    [this.onLevel, this.onBegin] = [onLevel, onBegin];
+  constructor(onLevel) {
+    this.onLevel = onLevel;
   }
 
   /** Take the bytes that follow, or base64 text. */
@@ -39,7 +38,11 @@ export class LevelDecoder {
     if (members.size < 2) return;
     this.#beginning = false;
     const coarse = members.get(COARSE), { precision, view } = described(members);
-    if (coarse || (view.values && precision === "8-byte")) this.onBegin(view);
+    if (coarse || precision === "8-byte") {
+      this.onLevel({ ...view, level: "begun", precision: "8-byte", windowSize: [1, 1], depthStep: 1,
+        offsets: new Uint32Array(2), words: new Uint32Array(0), origin: new Int32Array(1),
+        stride: new Uint16Array(1) });
+    }
     if (!coarse) return;
     const { metadata, pictureSize } = view;
     this.onLevel({ ...await decodeVDI(checkedMember(coarse), "coarse"), metadata, pictureSize });

@@ -237,8 +237,11 @@ export class VDIViewer extends HTMLElement {
     try {
       await load(source, {
         signal,
-        onBegin: (vdi) => this.#shown.warmUp(vdi),
         onLevel: (prepared) => {
+          if (prepared.level === "begun") {
+            this.#shown.warmUp(prepared);
+            return;
+          }
           this.#endSeries();
           this.#show(prepared);
           this.#comeTo(prepared.bounds);
@@ -495,13 +498,7 @@ export class VDIViewer extends HTMLElement {
     this.#player?.resume();
     this.#controls = playerControls?.(this.#parts.controls, this);
     this.#controls?.show();
-    this.#bar = viewerControls(this.#parts, this, {
-      link: this.#address && (() => {
-        this.#address.now();
-        return location.href;
-      }),
-      say: (text) => this.#hint(text),
-    }, signal);
+    this.#bar = viewerControls(this.#parts, this, (text) => this.#hint(text), signal);
     this.#listen(signal);
     this.#shown.invalidate(false);
   }

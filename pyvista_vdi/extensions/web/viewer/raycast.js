@@ -3,7 +3,7 @@ import { filledTexture, programOf } from "./graphics.js";
 import { AS_MADE } from "./look.js";
 import { TEXTURE_WIDTH } from "./prepare.js";
 import {
-  frameForms, frameOf, isParallel, listSpace, pixelRays, pixelsOfBounds, pointAlong,
+  frameForms, frameOf, isParallel, pixelRays, pixelsOfBounds, pointAlong,
 } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 import { MEAN_STEPS, SPREADS, fillTable } from "./values.js";
@@ -172,30 +172,6 @@ export class Raycaster {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     if (set) gl.scissor(...set);
     else gl.disable(gl.SCISSOR_TEST);
-  }
-
-  /**
-   * Have the program for V_O of a VDI in 8 bytes compiled, which takes longer than a frame: by a
-   * pixel of the bound framebuffer, in which no ray is left.
-   *
-   * @param {object} vdi camera, windowSize, bounds, depthOrigin and values of what will be set.
-   */
-  warmUp(vdi) {
-    const { gl } = this, { camera, windowSize } = vdi;
-    const frame = frameOf(vdi), space = listSpace(frame, vdi);
-    const rays = pixelRays(frame, camera, windowSize);
-    const { planes } = frameForms(frame, space, windowSize, rays, space.parallel, []);
-    const { program, uniforms, fresh } = this.program(space, { packed: true, values: vdi.values }, null, planes);
-    if (!fresh) return;
-    gl.useProgram(program);
-    gl.uniform3fv(uniforms.planeValue, new Float32Array(3 * planes.length).fill(-1));
-    if (uniforms.table) gl.uniform1i(uniforms.table, 1); // floats, and all others are whole numbers
-    const everything = filledTexture(gl, "RGBA32UI", 1, new Uint32Array(4));
-    gl.viewport(0, 0, 1, 1);
-    gl.bindVertexArray(this.vertices);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.bindVertexArray(null);
-    gl.deleteTexture(everything);
   }
 
   program({ parallel, shifted }, { packed, values }, opaque, { length }) {

@@ -124,14 +124,14 @@ export class Renderer {
     this.invalidate(false);
   }
 
-  /** Have the program compiled while the first lists are still being decoded. */
-  warmUp(vdi) {
+  /** Have the program compiled while the first lists are still being decoded: by an empty VDI. */
+  warmUp(begun) {
     if (!this.#raycaster || this.prepared) return;
-    const gl = this.#gl;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#pacer.screen(...this.size).framebuffer);
-    gl.enable(gl.BLEND);
-    this.#raycaster.warmUp(vdi);
-    gl.disable(gl.BLEND);
+    this.#raycaster.set(begun);
+    this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, this.#pacer.screen(...this.size).framebuffer);
+    this.#gl.enable(this.#gl.BLEND);
+    this.#raycaster.draw({ camera: begun.camera, width: 1, height: 1 });
+    this.#gl.disable(this.#gl.BLEND);
   }
 
   // -- frames ------------------------------------------------------------------------------------
@@ -249,11 +249,11 @@ export class Renderer {
       const data = new Uint8ClampedArray(4 * width * height), row = 4 * width;
       const upsideDown = new Uint8Array(data.length);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-      scene?.paintTexts(this.fitted(camera, width, height), width, height);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upsideDown);
       for (let y = 0; y < height; ++y) {
         data.set(upsideDown.subarray((height - 1 - y) * row, (height - y) * row), y * row);
       }
+      scene?.layTexts(data, this.fitted(camera, width, height), [width, height]);
       return { width, height, data };
     } finally {
       pacer.free(target);
