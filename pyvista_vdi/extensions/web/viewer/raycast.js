@@ -22,12 +22,7 @@ export class Raycaster {
     this.vertices = gl.createVertexArray();
   }
 
-  /**
-   * Take a VDI; the one before is drawn until its textures are there, and is freed then.
-   *
-   * @param {object} prepared What prepare.js makes.
-   * @throws {Error} If this machine's textures cannot hold it.
-   */
+  /** Take what prepare.js made of a VDI; the one before is freed when its textures are there. */
   set(prepared) {
     const { gl } = this, { n, windowSize, packed, stacks } = prepared;
     const largest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
@@ -69,19 +64,11 @@ export class Raycaster {
    * Draw premultiplied RGBA into the bound framebuffer, by its blending; bottom row first. A
    * scissor that is set holds.
    *
-   * @param {object} view
-   * @param {object} view.camera position, focal_point, view_up and view_angle (degrees) or
-   *   parallel_scale: VTK's meanings, world units; model_transform, if the model lies elsewhere in
-   *   the world than it did for the VDI.
-   * @param {number} view.width Pixels, as height; the viewport is set to them.
-   * @param {number[]} [view.corner] Of the viewport.
-   * @param {{origin: number[], normal: number[]}[]} [view.clippingPlanes] World; the side that the
-   *   normal points to is kept.
-   * @param {WebGLTexture} [view.depthTexture] R32F: view depth of what is opaque, world units, at
-   *   each texel of the framebuffer; rays end there.
-   * @param {object} [view.look] Of look.js.
-   * @param {number} [view.cutoff] A ray ends where less transmittance is left.
-   * @param {boolean} [view.finds] Whether t of a ray's end is written, as four bytes of a float32.
+   * Of the view the `camera` is VTK's, in world units, with a `model_transform` where the model lies
+   * elsewhere than it did for the VDI; the viewport is set to `width` and `height`, pixels, from a
+   * `corner`. `clippingPlanes`, world, keep the side of their normals; rays end at a `depthTexture`,
+   * R32F, view depths of what is opaque in world units, and where less transmittance than `cutoff` is
+   * left. `finds`: t of a ray's end is written, as four bytes of a float32.
    */
   draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null,
     look = AS_MADE, cutoff = TRANSMITTANCE_CUTOFF, finds = false }) {
@@ -129,12 +116,9 @@ export class Raycaster {
   }
 
   /**
-   * Where the ray of a pixel has lost half of the light that it loses: a point of the world, or null
-   * where hardly anything is seen. Waits for the device.
-   *
-   * @param {object} target Of a Pacer, of a pixel.
-   * @param {object} view As of {@link draw}.
-   * @param {number[]} pixel From the lower left corner.
+   * Where the ray of a pixel, from the lower left corner, has lost half of the light that it loses: a
+   * point of the world, or null where hardly anything is seen. Waits for the device, which draws into
+   * a target of a pixel.
    */
   pointAt(target, view, [x, y]) {
     const { gl, vdi } = this, { camera, width, height } = view;

@@ -43,12 +43,10 @@ export class Renderer {
   #retiring = 0; // a timer
 
   /**
-   * @param {HTMLElement} viewer
-   * @param {{canvas: HTMLCanvasElement, over: HTMLCanvasElement}} parts What is drawn into, and
-   *   what a scene's texts are drawn into.
-   * @param {object} host `busy()`: whether there will be frames without end; `took()` is called when
-   *   the next frame has another VDI, `drawn(full, latest)` after a frame: whether with all pixels,
-   *   and of what is to be shown by now; `failed(error)`.
+   * What draws into a viewer's canvas, and a scene's texts into the one over it. Of the host
+   * `busy()` says whether there will be frames without end; `took()` is called when the next frame has
+   * another VDI, `drawn(full, latest)` after a frame: whether with all pixels, and of what is to be
+   * shown by now; `failed(error)`.
    */
   constructor(viewer, { canvas, over }, host) {
     [this.#viewer, this.#canvas, this.#over, this.#host] = [viewer, canvas, over, host];
@@ -142,8 +140,8 @@ export class Renderer {
     this.#asked = true;
     this.#wake();
     const something = this.camera && (this.prepared || this.scene?.head);
-    if (this.#drawing || !something || !this.#viewer.isConnected || !this.begin()) return;
-    if (this.#drawing) return; // which may have begun with another size
+    if (this.#drawing || !something || !this.#viewer.isConnected) return;
+    if (!this.begin() || this.#drawing) return; // which may have begun to draw with another size
     this.#drawing = true;
     requestAnimationFrame(() => this.#frames());
   }
