@@ -53,11 +53,9 @@ function exactLists(vdi, frame, space, n) {
   const lists = new Uint32Array(2 * windowSize[0] * windowSize[1]);
   const faces = new Float32Array(2 * texels(n));
   const media = new Float32Array(4 * texels(n));
-  const { parallel, shifted, origin, nearest } = space;
   const coordinate = (offset) => {
-    if (parallel) return offset;
-    const depth = Math.max(offset + origin, nearest);
-    return shifted ? (depth - origin) / depth : -1 / depth;
+    const [a, b, c, d] = space.depths, x = Math.max(offset, space.nearest);
+    return (a * x + b) / (c * x + d);
   };
   const slabs = occupancy(vdi, frame);
   for (let list = 0; list < lists.length / 2; ++list) {

@@ -84,7 +84,9 @@ export class Raycaster {
       throw new Error(`A VDI is clipped to at most ${clippingPlanes.length - planes.length +
         MOST_PLANES} planes, not to ${clippingPlanes.length}.`);
     }
-    const { program, uniforms: u } = this.program(space, vdi, depthTexture, planes);
+    const defines = [vdi.packed && "PACKED", depthTexture && "OPAQUE", vdi.values && "VALUES"];
+    const shader = fragmentShader(defines.filter(Boolean), planes.length);
+    const { program, uniforms: u } = programOf(gl, VERTEX_SHADER, shader);
     gl.useProgram(program);
     gl.viewport(...corner, width, height);
     const halves = (forms) => [0, 3].map((k) => forms.flatMap((form) => form.slice(k, k + 3)));
@@ -92,12 +94,13 @@ export class Raycaster {
     const vectors = { formValue, formSlope, planeValue, planeSlope };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(u[name], value);
     const scalars = {
-      depthOrigin: space.origin, firstDepth: vdi.firstDepth, slabsPerDepth: vdi.slabsPerDepth, cutoff,
+      firstDepth: vdi.firstDepth, slabsPerDepth: vdi.slabsPerDepth, cutoff,
       brightness: look.brightness, thickness: look.opacity, codeStep: vdi.step,
-      nearest: space.parallel ? -1e30 : space.nearest - space.origin,
-      worldScale: frame.scale, reference: rays.reference,
+      nearest: space.nearest, worldScale: frame.scale, reference: rays.reference,
     };
     for (const [name, value] of Object.entries(scalars)) gl.uniform1f(u[name], value);
+    gl.uniform4fv(u.depths, space.depths);
+    gl.uniform2fv(u.reciprocals, space.reciprocals);
     gl.uniform2f(u.corner, ...corner);
     gl.uniform2f(u.middle, width / 2, height / 2);
     gl.uniformMatrix3fv(u.direction, false, rays.direction.flat());
@@ -156,12 +159,6 @@ export class Raycaster {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     if (set) gl.scissor(...set);
     else gl.disable(gl.SCISSOR_TEST);
-  }
-
-  program({ parallel, shifted }, { packed, values }, opaque, { length }) {
-    const defines = [parallel && "PARALLEL", shifted && "SHIFTED", packed && "PACKED",
-      opaque && "OPAQUE", values && "VALUES"].filter(Boolean);
-    return programOf(this.gl, VERTEX_SHADER, fragmentShader(defines, length));
   }
 
   free() {
