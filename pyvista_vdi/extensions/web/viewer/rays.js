@@ -89,10 +89,10 @@ function windowCentre(camera) {
  * The list space of a VDI's generating view.
  *
  * @returns {{rows: number[][], parallel: boolean, depths: number[], reciprocals: number[],
- *   origin: number, nearest: number, perDepth: number[][]}} `rows`: model' to u, v (pixels from the
+ *   range: number[], nearest: number, perDepth: number[][]}} `rows`: model' to u, v (pixels from the
  *   window's centre), depth coordinate and denominator; `depths`: a, b, c, d of the depth coordinate
  *   (a x + b) / (c x + d) of an offset x from the depth origin, and `reciprocals`: e, f of 1 / Z = e +
- *   f z; `origin`: depth origin, world'; `nearest`: least offset in front of the eye, world';
+ *   f z; `range`: offsets of the bounds, world'; `nearest`: the least in front of the eye;
  *   `perDepth`: rows 1, a, b of the centre rays' model' direction per unit of view depth.
  */
 export function listSpace(frame, vdi) {
@@ -119,7 +119,7 @@ export function listSpace(frame, vdi) {
       depth,
       denominator,
     ],
-    parallel, depths, reciprocals, origin,
+    parallel, depths, reciprocals, range: [near - origin, far - origin],
     nearest: parallel ? -1e30 : NEAREST_DEPTH - origin,
     perDepth: pixelRays(frame, camera, windowSize).direction,
   };
@@ -169,18 +169,11 @@ export function pointAlong(frame, rays, [a, b], t) {
 }
 
 /**
- * Forms that a frame needs: list coordinates, and planes that rays are clipped to.
- *
- * @param {object} frame Of {@link frameOf}.
- * @param {object} space Of {@link listSpace}.
- * @param {number[]} windowSize Of the VDI's lists.
- * @param {object} rays Of {@link pixelRays}, of the new view.
- * @param {boolean} parallel Of the new view.
- * @param {{origin: number[], normal: number[]}[]} clippingPlanes World; the normal's side is kept.
- * @param {number[]} [clip] The part of the bounds that is seen: low and high of x, y and z, shares.
+ * Forms that a frame needs: list coordinates, and planes that rays are clipped to, of which those of
+ * the world keep their normals' sides. `rays` and `parallel` are of the new view; `clip`: the part of
+ * the bounds that is seen, low and high of x, y and z as shares.
  */
-export function frameForms(frame, space, windowSize, rays, parallel, clippingPlanes,
-  clip = [0, 1, 0, 1, 0, 1]) {
+export function frameForms(frame, space, windowSize, rays, parallel, clippingPlanes, clip) {
   const coordinates = space.rows.map((row) => formOf(rays, row.slice(0, 3), row[3]));
   const [u, v, , denominator] = coordinates;
   const planes = [];
@@ -207,13 +200,8 @@ export function frameForms(frame, space, windowSize, rays, parallel, clippingPla
 }
 
 /**
- * The rectangle of pixels that a VDI's bounds are seen in.
- *
- * @param {object} frame Of {@link frameOf}.
- * @param {object} camera Of the new view.
- * @param {number[]} size Of its window, pixels.
- * @returns {number[][]} Ends along the width and the height, two pixels more to each side, row 0 at
- *   the bottom; all of the window where the bounds are not in front of the eye.
+ * The pixels that a VDI's bounds are seen in by a camera: ends along the width and the height, two more
+ * to each side, row 0 at the bottom; all of the window where they are not in front of the eye.
  */
 export function pixelsOfBounds(frame, camera, size) {
   const toView = modelToView(frame, camera);
