@@ -116,7 +116,7 @@ CLEAR_HITS = KernelDeclaration("raycasting/clear.cl", "clear_hits", **_CLEARED, 
 PREPARE_LISTS = KernelDeclaration(
     "raycasting/prepare.cl",
     "prepare_lists",
-    starts="OFFSET_T*",
+    starts="ulong*",
     headers="HEADER_T*",
     fronts="float*",
     backs="float*",
@@ -133,7 +133,7 @@ PREPARE_LISTS = KernelDeclaration(
 PREPARE_PACKED = KernelDeclaration(
     "raycasting/prepare_packed.cl",
     "prepare_packed",
-    starts="OFFSET_T*",
+    starts="ulong*",
     headers="OFFSET_T*",
     origins="int*",
     strides="ushort*",
@@ -159,7 +159,7 @@ CLASSIFY_VALUES = KernelDeclaration(
 PREPARE_VALUES = KernelDeclaration(
     "raycasting/prepare_values.cl",
     "prepare_values",
-    starts="OFFSET_T*",
+    starts="ulong*",
     places="ulong*",
     fronts="float*",
     backs="float*",
@@ -179,7 +179,7 @@ PREPARE_VALUES = KernelDeclaration(
 COUNT_SUPERSEGMENTS = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_supersegments",
-    offsets="OFFSET_T*",
+    starts="ulong*",
     fronts="float*",
     backs="float*",
     **_COUNTS,
@@ -187,12 +187,21 @@ COUNT_SUPERSEGMENTS = KernelDeclaration(
 COUNT_PACKED = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_packed",
-    offsets="OFFSET_T*",
+    starts="ulong*",
     origins="int*",
     strides="ushort*",
     words="uint2*",
     step="float",
     **_COUNTS,
+)
+ENDS_OF_LISTS = KernelDeclaration(
+    "raycasting/occupancy.cl",
+    "ends_of_lists",
+    starts="ulong*",
+    fronts="float*",
+    backs="float*",
+    lists="uint",
+    ends="float2*",
 )
 OCCUPIED_SLABS = KernelDeclaration(
     "raycasting/occupancy.cl", "occupied_slabs", counts="uint*", stacks="uint", masks="ulong*"

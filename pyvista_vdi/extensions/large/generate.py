@@ -14,8 +14,9 @@ from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task, light_e
 from pyvista_vdi.generation.generate import made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.model.options import GenerationRequest
+from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.ray_forms import Rectangle
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, made_vdi
 from pyvista_vdi.model.volume import Volume
 
 #: Blocks that would fit into a limit of memory: beside one there are lists, and its halo.
@@ -60,9 +61,7 @@ def vdi_of(
     """
     offsets = np.zeros(task.size[0] * task.size[1] + 1, np.uint64)
     np.cumsum(np.concatenate([part.lengths for part in rows]), out=offsets[1:])
-    front, back, color, optical_depth = (
-        np.concatenate([part[k] for part in rows]) for k in range(1, len(Rows._fields))
-    )
+    arrays = [np.concatenate([part[k] for part in rows]) for k in range(1, len(Rows._fields))]
     rays = task.rays()
     depth_origin = rays.forms(task.camera, task.size).rays.reference_depth
     made_by = made_from(
@@ -70,14 +69,10 @@ def vdi_of(
         rays,
         device_name,
     )
-    return VDI(
+    return made_vdi(
         task.camera,
         task.size,
-        offsets,
-        front,
-        back,
-        color,
-        optical_depth,
+        Arrays(offsets, *arrays),
         task.blocks.grid.bounds,
         depth_origin=depth_origin,
         metadata={**made_by, "blocks": list(task.blocks.counts), **counted, **request.metadata},

@@ -26,7 +26,7 @@ from pyvista_vdi.extensions.large.kernels import (
     OPTICAL_DEPTHS,
     OPTICAL_DEPTHS_16,
 )
-from pyvista_vdi.generation.list_arrays import growing_lists
+from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
@@ -209,7 +209,7 @@ class Task:
         slices = _slices_to_merge(self, runtime, y1 - y0)
         with (
             Records(runtime, self.rays(), self.camera, self.size, slices, options, window) as made,
-            growing_lists(
+            GrowingLists(
                 runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
             ) as lists,
         ):

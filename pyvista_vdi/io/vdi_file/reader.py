@@ -7,7 +7,7 @@ import struct
 import zipfile
 import zlib
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -44,12 +44,13 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.packing import (
+    Arrays,
     Packed8,
     check_precision,
     colors_of_differences,
-    packed_8,
+    packed_of_stored,
 )
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, with_arrays
 
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
 _SIGNATURE = b"PK\x03\x04"
@@ -179,22 +180,21 @@ class _OpenFile:
                 packing: Packed8 | None = None
                 if info.precision == "8-byte":
                     stored = self._decoded_codes(packed, pool, progress)
-                    offsets = counts.result()
-                    packing = packed_8(info.depth_step, offsets, stored, CHUNK_ROWS)
-                    media = packing.media(np.diff(offsets).astype(np.int64))
+                    packing = packed_of_stored(info.depth_step, counts.result(), stored, CHUNK_ROWS)
+                    arrays = packing.arrays()
                 else:
                     media = self._decoded_media(packed, pool, progress)
-                    offsets = counts.result()
+                    arrays = Arrays(counts.result(), **media)
             vdi = VDI(
                 info.camera,
                 info.window_size,
-                offsets,
-                **media,
-                bounds=info.bounds,
+                *arrays,
+                info.bounds,
                 depth_origin=info.depth_origin,
                 metadata=info.metadata,
             )
-            vdi.packing = packing
+            if packing is not None:
+                vdi = with_arrays(vdi, replace(packing, offsets=vdi.offsets))
             return vdi if info.deferred is None else DeferredVDI.of_lists(vdi, info.deferred)
         except DamagedChunkError as error:
             self._refuse(str(error))

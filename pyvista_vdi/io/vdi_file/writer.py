@@ -30,12 +30,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     version_of,
 )
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.packing import (
-    DEPTH_CODES,
-    Packed8,
-    channel_differences,
-    gaps_and_thicknesses,
-)
+from pyvista_vdi.model.packing import DEPTH_CODES, channel_differences, stored_rows
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import whole_file
 
@@ -132,7 +127,7 @@ def _described(
         entries |= {"format": DEFERRED_NAME, "deferred": dict(deferred)}
     metadata = entries.pop("metadata")
     packed: dict[str, Any] = {} if version < 3 else {"precision": vdi.precision}
-    if isinstance(vdi.packing, Packed8):
+    if vdi.packing is not None:
         packed["depth_step"] = vdi.packing.step
     return to_json(
         {
@@ -149,25 +144,13 @@ def _described(
 def _encoder(
     name: str, layout: Layout, vdi: VDI, counts: NDArray[Any]
 ) -> Callable[[int, int], NDArray[Any]]:
-    if isinstance(vdi.packing, Packed8) and name != "counts":
-        # Encode an array of the 8-byte form
-        packed = vdi.packing
-        assert isinstance(packed, Packed8)
+    packing = vdi.packing
+    if packing is not None and name != "counts":
 
         def encoded(first: int, last: int) -> NDArray[Any]:
-            rows: NDArray[Any]
-            if name in ("front", "back"):
-                rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
-            elif name == "color":
-                rows = packed.colors(first, last)
-                if layout.filter == "channel-difference":
-                    rows = channel_differences(rows)
-            elif name == "optical_depth":
-                rows = packed.tau_codes(first, last)
-            elif name == "origin":
-                rows = packed.origins[first:last]
-            else:
-                rows = packed.strides[first:last]
+            rows = stored_rows(packing, name, first, last)
+            if layout.filter == "channel-difference":
+                rows = channel_differences(rows)
             return np.ascontiguousarray(rows, dtype=layout.dtype)
 
         return encoded
