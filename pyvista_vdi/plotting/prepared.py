@@ -43,17 +43,19 @@ def prepared(plotter: Any, volume: Any, asked: Any) -> tuple[Any, StoredVolume |
         )
         volume = load(stored)
     made = isinstance(volume, VDI | DeferredVDI | VDICollection) or is_vdi_image(volume)
-    if made or (asked.resample is None and asked.mask is None):
+    if made or (asked.making.resample is None and asked.making.mask is None):
         return volume, stored  # of a VDI both are refused
-    grid, name = as_grid(volume, scalars, asked.resolution, uniform=asked.resample is None)
+    grid, name = as_grid(
+        volume, scalars, asked.making.resolution, uniform=asked.making.resample is None
+    )
     uniform = UniformGrid(
         grid,
         name,
         asked.array.preference,
-        resample=asked.resample,
-        mask=None if asked.mask is None else _mask(asked.mask, grid, stored),
+        resample=asked.making.resample,
+        mask=None if asked.making.mask is None else _mask(asked.making.mask, grid, stored),
         categorical=bool(asked.look.categories),
-        progress=progress_callback(asked.progress_bar, "resampling a grid"),
+        progress=progress_callback(asked.making.progress_bar, "resampling a grid"),
     )
     # It has the points of one level
     return uniform, None if stored is None else stored.at_level(stored.level)

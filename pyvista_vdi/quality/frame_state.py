@@ -14,7 +14,8 @@ from typing import Any, Literal, Protocol, TypeAlias
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, Policy
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.types import Policy
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.frame_rate import FrameRate
 

@@ -75,7 +75,7 @@ def write(path, step, time, **options):
 
 
 def series_of(vdi):
-    return pvdi.VDISeries.of([vdi, vdi])
+    return pvdi.VDISeries([vdi, vdi])
 
 
 MADE = {"volume": VOLUME, "camera": CAMERA, "window_size": SIZE}
@@ -166,11 +166,9 @@ ENTRIES = {
         for name in ("Light", "Lights", "Shading", "AmbientOcclusion")
     },
     "VDISeries": lambda vdi: (pvdi.VDISeries, {"steps": [vdi], "times": [0]}, None),
-    "VDISeries.of": lambda vdi: (pvdi.VDISeries.of, {"vdis": [vdi]}, None),
     "VDISeries.nearest": lambda vdi: (series_of(vdi).nearest, {"time": 0}, None),
     "VDISet": lambda vdi: (pvdi.VDISet, {"views": [vdi]}, None),
-    "VDISet.of": lambda vdi: (pvdi.VDISet.of, {"vdis": [vdi]}, None),
-    "VDISet.nearest": lambda vdi: (pvdi.VDISet.of([vdi]).nearest, {"camera": CAMERA}, None),
+    "VDISet.nearest": lambda vdi: (pvdi.VDISet([vdi]).nearest, {"camera": CAMERA}, None),
     "VDI": lambda vdi: (
         pvdi.VDI,
         {name: getattr(vdi, name) for name in inspect.signature(pvdi.VDI).parameters},
@@ -190,7 +188,7 @@ ENTRIES = {
         ["path", "precision", "compression", "level", "progress"],
     ),
     "VDISet.save": lambda vdi: (
-        pvdi.VDISet.of([vdi]).save,
+        pvdi.VDISet([vdi]).save,
         {"path": "v.vdiset"},
         ["precision", "compression", "level", "progress"],
     ),

@@ -138,7 +138,7 @@ def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, 
     shown, kept = volume(), deferred
     if as_series:
         one = pvdi.generate(shown, plotter.camera, (48, 36), **deferred)
-        shown, kept = pvdi.VDISeries.of([one]), {}
+        shown, kept = pvdi.VDISeries([one]), {}
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         plotter.add_vdi(shown, cmap="bone", **kept)
@@ -155,7 +155,7 @@ def test_what_is_kept_cannot_be_said_of_a_vdi_nor_values_be_set_as_one(default_r
     for vdi, says in (
         (kept, r"keeps values from 0 to 254 already: leave classification out; cmap, opacity"),
         (colours, "has its colours: leave classification out, or add the volume"),
-        (pvdi.VDISeries.of([kept]), "keeps values from 0 to 254 already"),
+        (pvdi.VDISeries([kept]), "keeps values from 0 to 254 already"),
     ):
         with pytest.raises(UnsupportedError, match=says):
             plotter.add_vdi(vdi, classification="deferred")

@@ -276,7 +276,7 @@ def a_series_plays_by_itself_and_goes_on_after_a_turn():
     """Steps follow each other without a frame being asked for, before and after a hand turns."""
     vdis = [vdi_from(soft_ball(12 + k)) for k in range(3)]
     plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
-    actor = plotter.add_vdi(pvdi.VDISeries.of(vdis), show_scalar_bar=False, regenerate="never")
+    actor = plotter.add_vdi(pvdi.VDISeries(vdis), show_scalar_bar=False, regenerate="never")
     actor.play(rate=30)
     plotter.show(interactive_update=True, auto_close=False)
     seen = {}

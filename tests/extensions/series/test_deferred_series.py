@@ -68,7 +68,7 @@ def test_what_is_read_is_what_generate_makes_of_each_step(precision, alone, save
         else:
             assert all_equal(series, made)
     assert "20 to 180" in repr(series)
-    assert all_equal(pvdi.VDISeries.of(alone)[1:3], alone[1:3])
+    assert all_equal(pvdi.VDISeries(alone)[1:3], alone[1:3])
 
 
 def test_a_look_is_that_of_each_step_alone_and_of_one_range(alone, saved):
@@ -134,7 +134,7 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
         with pytest.raises(InvalidVDIError, match="keeps values from 20"):
             out.append(alone[0])
     with pytest.raises(InvalidVDIError, match="number 1 keeps values from 0"):
-        pvdi.VDISeries.of([alone[0], other])
+        pvdi.VDISeries([alone[0], other])
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
 
 
 def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
-    series = pvdi.VDISeries.of(alone)
+    series = pvdi.VDISeries(alone)
     with pytest.raises(InvalidVDIError, match="no colours yet"):
         series.save(tmp_path / "run.html")
     for vdis in (series, series.classified(**LOOK)):
@@ -189,7 +189,7 @@ def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
 
 @pytest.mark.parametrize("wrong", [{"version": 2}, {"version": 1, "value_range": [1, 0]}])
 def test_what_is_said_of_values_is_checked(wrong, alone, tmp_path, monkeypatch):
-    series = pvdi.VDISeries.of(alone)
+    series = pvdi.VDISeries(alone)
     with monkeypatch.context() as patched:
         patched.setattr(pvdi.DeferredVDI, "about", wrong)
         path = series.save(tmp_path / "run.vdis")
