@@ -31,7 +31,7 @@ from trame_vtk.modules.vtk import get_helper
 from wslink.chunking import UnChunker, generate_chunks
 
 from pyvista_vdi.errors import VDIWarning
-from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.quality.rate import FrameRate
 
 LONG = 250.0
 WINDOW = (241, 203)
@@ -223,7 +223,7 @@ def main():
     """Run all cases, or those that are named."""
     warnings.simplefilter("error", VDIWarning)
     # Every preview as coarse as it may be, whatever frames take
-    FrameRateController.choose = lambda controller, full: 1
+    FrameRate.chosen = lambda rate, full: 1
     failed = 0
     for case in CASES:
         if len(sys.argv) > 1 and case.__name__ not in sys.argv[1:]:

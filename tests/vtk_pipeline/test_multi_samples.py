@@ -8,7 +8,7 @@ import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
 from watched_windows import MOVING, frame, on_screen, turned, watched
 
-from pyvista_vdi.quality.pace import HEADROOM
+from pyvista_vdi.quality.rate import HEADROOM
 
 pytestmark = pytest.mark.gl
 

@@ -16,7 +16,7 @@ from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.worker import Job, Worker
+from pyvista_vdi.quality.background import Job, Worker
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 
 #: Steps that are read before their time comes: what takes longer than the others finds them.
@@ -40,7 +40,7 @@ def bring(runtime: Runtime, vdi: Any) -> None:
 class Decoding(Job):
     """Work beside the frames, and not in turns with them: what it makes is what they wait for."""
 
-    def done(self) -> Any:
+    def done(self, paused: Callable[[], bool] = lambda: False) -> Any:
         """Do the work on a queue of this thread's own, and return its result."""
         runtime = get_runtime(self._device)
         with runtime.queue_scope():
