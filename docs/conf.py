@@ -14,7 +14,7 @@ from sphinx.application import Sphinx
 import pyvista_vdi
 from pyvista_vdi import __version__
 
-sys.path.insert(0, str(Path(__file__).parent))  # where live.py and terms.py are
+sys.path.insert(0, str(Path(__file__).parent))  # where live.py is
 
 project = "pyvista-vdi"
 author = "The pyvista-vdi developers"
@@ -23,7 +23,6 @@ version = release = __version__
 
 extensions = [
     "live",
-    "terms",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",

@@ -26,6 +26,7 @@ _HOMES = {
     "Pick": "raycasting.picking",
     "Plotter": "plotting.plotter",
     "Report": "device.report",
+    "Settings": "api",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",

@@ -3,6 +3,7 @@
 from pyvista_vdi import errors as errors
 from pyvista_vdi import examples as examples
 from pyvista_vdi._version import __version__ as __version__
+from pyvista_vdi.api import Settings as Settings
 from pyvista_vdi.api import estimate as estimate
 from pyvista_vdi.api import generate as generate
 from pyvista_vdi.api import pick as pick

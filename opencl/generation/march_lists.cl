@@ -1,5 +1,5 @@
 // Volume to records of runs, one march per ray (paper, section 2; docs/conventions.md, "Merging
-// samples into a supersegment"). One ray for each work-item; sixteen: cpu16/generation_march.cl.
+// samples into a supersegment"), a ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
 // -D COMPENSATED: see lib/compositing.cl; the volume's: see volume/march.cl
 //
@@ -13,75 +13,14 @@
 // DOUBLE_FLOAT_RAYS, less that of where the ray enters, until they are packed.
 #include "volume/march.cl"
 #include "volume/samples.cl"
-#include "generation/records.cl"
+#include "generation/merging.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// A record's last run, which may still grow. Its feature, the mean of its steps', is kept, which is
-// cheaper than computing it of its medium.
-typedef struct {
-    Run run;
-    Run compensation; // what its sums have rounded off in this chunk
-    float4 feature;
-    float length; // reference lengths
-} Growing;
+#define NO_RUN RUN(0.0f, -INFINITY, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f)
 
-// Sample: the next group of steps that are not all passed by, composited front to back as one run.
-// `samples`: those of the ray's steps from `first` on, or 0. Moves k behind them.
-inline Run sampled_run(const March *march, const Medium *medium, __global const float4 *samples,
-                       int first, int *k, int end, int group)
-{
-    // Skip what is transparent
-    float front = step_face(march, *k), back = step_face(march, *k + 1);
-    for (int empty; (empty = empty_steps(march, medium, 1, *k, end, group, front, back)) > 0;) {
-        *k += empty;
-        front = step_face(march, *k);
-        back = step_face(march, *k + 1);
-        if (*k >= end)
-            return RUN(front, front, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f);
-    }
-    // Classify and shade each step's midpoint, and composite
-    Run run = RUN(front, back, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f);
-    for (int left = group; left > 0 && *k < end; --left, ++*k) {
-        front = step_face(march, *k);
-        run.BACK = step_face(march, *k + 1);
-        const float4 step = samples ? samples[(*k - first) * SAMPLE_LANES]
-                                    : step_medium(march, medium, front, run.BACK);
-        const float weight = (1.0f - run.OPACITY) * opacity_of(step.w);
-        run.TAU += step.w;
-        run.COLOR += weight * step.xyz;
-        run.OPACITY += weight;
-    }
-    return run;
-}
-
-// Merge: the sample with the growing run, where that is homogeneous. Returns whether it is. The
-// error is merge_error's (generation/runs.cl) of runs that touch; cpu16/generation_march.cl has it,
-// too.
-inline bool merged_with(Growing *growing, Run sample, float4 feature, float length, float threshold,
-                        float hidden_weight)
-{
-    const float share = length / (growing->length + length);
-    const float4 difference = difference_of(feature, growing->feature);
-    const float error =
-        growing->length * share * square_of(difference) * seen_weight(growing->run, hidden_weight);
-    // A gap ends a run
-    if (!(growing->run.BACK == sample.FRONT && error <= threshold))
-        return false;
-    growing->run = COMPENSATED > 1
-                       ? merged_runs_compensated(growing->run, sample, &growing->compensation)
-                       : merged_runs(growing->run, sample);
-    growing->feature += share * difference;
-    growing->length += length;
-    return true;
-}
-
-// Work-items are the rays of the view; records are in the order of the work-items, counts and
-// offsets in the order of the lists.
-__kernel void march_lists(
-    const Classified classified, __global const VOXEL_T *voxels, __global const float4 *table,
-    __global const uchar *distances, __global const uchar *blanked, __global const float *gradient,
-    __global const float *lighting, __global const float *ambient, const RaysOfView view,
-    __global const float *forms,
+// Records are in the order of the rays, counts and offsets in the order of the lists.
+KERNEL_OF_LANES void march_lists(
+    MEDIUM_PARAMETERS, const RaysOfView view, __global const float *forms,
     __global const float4 *samples, // see volume/samples.cl; 0: steps are sampled here
     const Recording recording,
     __global const float
@@ -90,73 +29,127 @@ __kernel void march_lists(
     __global float *records,
     __global uint *counts) // runs in each record, by list
 {
-    const uint item = (uint)get_global_id(0);
-    const Rays ray = rays_of_view(&view, item);
-    if (!ray.present)
+    const uint first = (uint)get_global_id(0) * LANES;
+    const Rays rays = rays_of_view(&view, first);
+    if (!ANY(rays.present))
         return;
     March march;
-    if (!begin_march(&march, &view, &classified, forms, ray.a, ray.b, INFINITY))
+    if (!ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b, INFINITY)))
         return;
-    const int begin = march.begin + view.first_step;
-    const int end = min(begin + view.steps, march.steps);
-    if (begin >= end)
+    const Int begin = march.begin + view.first_step;
+    const Int begun = rays.present & (march.steps > begin);
+    if (!ANY(begun))
         return;
-    const Medium medium = {classified, voxels,   table,    distances,
-                           blanked,    gradient, lighting, ambient};
-    __global const float4 *sampled = samples ? samples + samples_start(item, view.steps) : 0;
-    __global float *record = records + record_start(item, recording.capacity);
-    const float per_reference = march.units * view.unit_distance / recording.reference_length;
-    const float threshold = thresholds[item];
-    const int list = ray.y * view.columns + ray.x;
+    const Int end = SELECT(begin, min(begin + view.steps, march.steps), begun);
+    const Medium medium = MEDIUM_OF_PARAMETERS;
+    const Real per_reference = march.units * view.unit_distance / recording.reference_length;
+    const Real threshold = LOAD_LANES(0, thresholds + first);
+    samples = LANES == 1 && samples ? samples + samples_start(first, view.steps) : 0;
+    records += record_start(first, recording.capacity);
+    const Int lists = rays.y * view.columns + rays.x;
+    const Int starts = LANE_NUMBERS * recording.capacity;
 
-    // Go on with the record's last run
-    int count = (int)counts[list];
-    Growing growing = {RUN(0.0f, -INFINITY, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f), (Run)(0.0f),
-                       (float4)(0.0f), 0.0f};
-    float transmittance =
-        entering ? entering[(view.first_row - recording.window_row) * view.columns + list] : 1.0f;
-    if (count > 0) {
-        growing.run = load_run(record, count - 1);
+    // Go on with the records' last runs
+    Int count = load_counts(counts, lists, rays.present);
+    const Int some = count > 0;
+    Growing growing = {NO_RUN, RUN(0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f),
+                       REAL4((Real)(0.0f), (Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), 0.0f};
+    if (ANY(some)) {
+        const Run last = load_run(records, SELECT((Int)(0), starts + count - 1, some));
+        growing.run = selected_run(growing.run, last, some);
         growing.feature = run_feature(growing.run, per_reference);
-        growing.length = (growing.run.BACK - growing.run.FRONT) * per_reference;
-        transmittance = growing.run.TRANSMITTANCE - growing.run.TRANSMITTANCE * growing.run.OPACITY;
+        const Real length = (growing.run.BACK - growing.run.FRONT) * per_reference;
+        growing.length = SELECT((Real)(0.0f), length, some);
     }
-    // A ray that cannot keep every detail asks about homogeneity once in a voxel only
-    const int group = threshold > recording.finest ? recording.grain : 1;
-    for (int k = begin; k < end;) {
-        // Sample
-        Run sample = sampled_run(&march, &medium, sampled, view.first_step, &k, end, group);
-        sample.TRANSMITTANCE = transmittance;
-        if (!(sample.OPACITY > 0.0f && sample.BACK > sample.FRONT))
-            continue;
-        // Merge it with the run before, or begin another
-        const float4 feature = run_feature(sample, per_reference);
-        const float length = (sample.BACK - sample.FRONT) * per_reference;
-        if (!merged_with(&growing, sample, feature, length, threshold, recording.hidden_weight)) {
-            if (count > 0)
-                store_run(record, count - 1, growing.run);
-            ++count;
-            growing = (Growing){sample, (Run)(0.0f), feature, length};
+    Real transmittance = 1.0f;
+    if (entering) {
+        const Places places = {
+            SELECT((Int)(0), (view.first_row - recording.window_row) * view.columns + lists,
+                   rays.present)};
+#define ENTERING(n) entering[places.each[n]]
+        transmittance = OF_LANES(Real, ENTERING);
+#undef ENTERING
+    }
+    const Real behind_last =
+        growing.run.TRANSMITTANCE - growing.run.TRANSMITTANCE * growing.run.OPACITY;
+    transmittance = SELECT(transmittance, behind_last, some);
+
+    // A ray that cannot keep every detail asks about homogeneity once in a voxel only: the steps of
+    // a group are composited without asking
+    const Int group = SELECT((Int)(1), (Int)(recording.grain), threshold > recording.finest);
+    Int k = begin;
+    Int left = group; // steps of this group
+    Run sample = RUN(step_face(&march, k), 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f);
+    // Every turn does the same for every ray, and what depends on the ray is selected: the lanes of
+    // a vector need no masks
+    for (;;) {
+        const Int active = k < end;
+        if (!ANY(active))
+            break;
+        // Sample the step's midpoint, classify and shade it; or see how far nothing is visible
+        const Real front = step_face(&march, k), back = step_face(&march, k + 1);
+        const Int empty =
+            empty_steps(&march, &medium, active & (left == group), k, end, group, front, back);
+        Real4 step = REAL4((Real)(0.0f), (Real)(0.0f), (Real)(0.0f), (Real)(0.0f));
+        if (LANES > 1 || ANY(active & (empty == 0)))
+            step = LANES == 1 && samples ? load_fours(samples, (k - view.first_step) * SAMPLE_LANES)
+                                         : step_medium(&march, &medium, front, back);
+        // Composite it with the others of its group
+        const Real tau = SELECT(step.w, (Real)(0.0f), empty > 0);
+        const Real weight = (1.0f - sample.OPACITY) * opacity_of(tau);
+        sample.BACK = back;
+        sample.TAU += tau;
+        sample.RED += weight * step.x;
+        sample.GREEN += weight * step.y;
+        sample.BLUE += weight * step.z;
+        sample.OPACITY += weight;
+        k += max(empty, 1);
+        --left;
+        const Int whole = (left == 0) | (empty > 0) | (k >= end);
+        const Int visible = active & whole & (sample.OPACITY > 0.0f) & (sample.BACK > sample.FRONT);
+        if (ANY(visible)) {
+            // Merge the group with the run before, or begin another
+            sample.TRANSMITTANCE = transmittance;
+            const Real4 feature = run_feature(sample, per_reference);
+            const Real length = (sample.BACK - sample.FRONT) * per_reference;
+            const Run before = growing.run;
+            const Int grows = grow(&growing, sample, feature, length, threshold,
+                                   recording.hidden_weight, visible);
+            const Int begins = visible & !grows;
+            // Where a run is not at its end it is stored for nothing
+            if (ANY(begins & (count > 0)))
+                store_run(records, SELECT((Int)(-1), starts + count - 1, count > 0), before);
+            count += COUNT(begins);
+            growing.run = selected_run(growing.run, sample, begins);
+            growing.lost = selected_run(growing.lost, NO_RUN, begins);
+            growing.feature = selected_feature(growing.feature, feature, begins);
+            growing.length = SELECT(growing.length, length, begins);
+            transmittance =
+                SELECT(transmittance, transmittance - transmittance * sample.OPACITY, visible);
         }
-        transmittance -= transmittance * sample.OPACITY;
+        left = SELECT(left, group, whole);
+        sample = selected_run(
+            sample, RUN(step_face(&march, k), 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f), whole);
     }
-    if (count > 0)
-        store_run(record, count - 1, growing.run);
-    counts[list] = (uint)count;
+    if (ANY(count > 0))
+        store_run(records, SELECT((Int)(-1), starts + count - 1, count > 0), growing.run);
+    store_counts(counts, lists, rays.present, count);
 }
 
 // Find the steps of the longest ray of each slice of rows.
-__kernel void longest_marches(const Classified classified, const RaysOfView view,
-                              __global const float *forms,
-                              int slice_rows,        // a multiple of a block's
-                              __global int *longest) // of each slice; 0 at first
+KERNEL_OF_LANES void longest_marches(const Classified classified, const RaysOfView view,
+                                     __global const float *forms,
+                                     int slice_rows,        // a multiple of a block's
+                                     __global int *longest) // of each slice; 0 at first
 {
-    const Rays ray = rays_of_view(&view, (uint)get_global_id(0));
+    const uint first = (uint)get_global_id(0) * LANES;
+    const Rays rays = rays_of_view(&view, first);
     March march;
-    if (!ray.present || !begin_march(&march, &view, &classified, forms, ray.a, ray.b, INFINITY))
+    if (!ANY(rays.present) ||
+        !ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b, INFINITY)))
         return;
-    __global int *of_slice = longest + ray.y / slice_rows;
-    const int steps = march.steps - march.begin;
+    __global int *of_slice = longest + block_pixel(first, view.columns).y / slice_rows;
+    const int steps = largest_lane(SELECT((Int)(0), march.steps - march.begin, rays.present));
     if (steps > *of_slice) // an old value is only lower, and does no harm
         atomic_max(of_slice, steps);
 }

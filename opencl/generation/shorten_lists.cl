@@ -1,190 +1,255 @@
 // Fit: records that have grown too long, brought to a number of runs, by merging neighbours within
 // a threshold that is raised until they fit, or, for the budget, by least error (docs/concepts.md,
-// "The budget"). One ray for each work-item; sixteen: cpu16/generation_shorten.cl.
+// "The budget"). A ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
+//
+// Of sixteen rays each merge would wait for the divisions of the one before, and for branches that
+// no processor foresees: all take the same steps, and what depends on the ray is selected. `starts`
+// says where the words of each ray's runs begin, from `records` on.
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
-#include "generation/records.cl"
+#include "generation/merging.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Errors are looked at in rows, which are loaded at once and end with INFINITY, as the number of
-// loads is what counts where work-items are the lanes of vectors.
-#define ROW_NUMBERS (int8)(0, 1, 2, 3, 4, 5, 6, 7)
+// Merge errors lie in rows of ERROR_LANES rays', so that neighbouring work-items, or lanes, touch
+// neighbouring words.
+#define ERROR_LANES 16
+#define ERRORS(k) (errors + (k) * ERROR_LANES)
 
-// Errors of a record of so many runs, in whole rows.
-inline int errors_of(int count)
+// Where the merge errors of a ray, or of a block, begin.
+inline size_t errors_start(uint ray, int capacity)
 {
-    return (count - 1 + ERRORS_AT_A_TIME - 1) / ERRORS_AT_A_TIME * ERRORS_AT_A_TIME;
+    return (size_t)(ray / ERROR_LANES) * (size_t)(capacity * ERROR_LANES) + ray % ERROR_LANES;
 }
 
-// errors[k]: what merging runs k and k + 1 costs; INFINITY where there are no two.
-inline void measure_errors(__global const float *record, __global float *errors, int count,
-                           float per_reference, float hidden_weight)
+// Errors of k: what merging runs k and k + 1 costs; INFINITY where there are no two.
+inline void measure_errors(__global const float *records, const Places *starts,
+                           __global float *errors, Int counts, int most, Real per_reference,
+                           float hidden_weight)
 {
-    Run run = load_run(record, 0);
-    float4 feature = run_feature(run, per_reference);
-    for (int k = 0; k < errors_of(count); ++k) {
-        if (k + 1 >= count) {
-            errors[k] = INFINITY;
-            continue;
-        }
-        const Run next = load_run(record, k + 1);
-        const float4 next_feature = run_feature(next, per_reference);
-        errors[k] = merge_error(1, run, feature, next, next_feature, per_reference, hidden_weight);
+    Run run = load_run_at(records, starts->each);
+    Real4 feature = run_feature(run, per_reference);
+    for (int k = 0; k < most - 1; ++k) {
+        const Run next = load_run_at(records + min(k + 1, most - 1) * RUN_WORDS, starts->each);
+        const Real4 next_feature = run_feature(next, per_reference);
+        const Int there = k + 1 < counts;
+        const Real error =
+            merge_error(there, run, feature, next, next_feature, per_reference, hidden_weight);
+        STORE_LANES(SELECT((Real)(INFINITY), error, there), 0, ERRORS(k));
         run = next;
         feature = next_feature;
     }
 }
 
-// How many errors are within a threshold.
-inline int count_within(__global const float *errors, int count, float threshold)
+// How many errors are within thresholds.
+inline Int count_within(__global const float *errors, int most, Real thresholds)
 {
-    int8 within = 0;
-    for (int k = 0; k < errors_of(count); k += ERRORS_AT_A_TIME)
-        within -= vload8(k / ERRORS_AT_A_TIME, errors) <= (float8)(threshold);
-    const int4 sums = within.lo + within.hi;
-    return sums.x + sums.y + sums.z + sums.w;
+    Int within = 0;
+    for (int k = 0; k < most - 1; ++k)
+        within += COUNT(LOAD_LANES(0, ERRORS(k)) <= thresholds);
+    return within;
 }
 
 // The pair of the least error; of equals the first.
-inline int least_error(__global const float *errors, int count)
+inline Int least_error(__global const float *errors, int most)
 {
-    float8 least = INFINITY;
-    int8 at = 0;
-    for (int k = 0; k < errors_of(count); k += ERRORS_AT_A_TIME) {
-        const float8 error = vload8(k / ERRORS_AT_A_TIME, errors);
-        const int8 less = error < least;
-        least = select(least, error, less);
-        at = select(at, k + ROW_NUMBERS, less);
+    Real least = INFINITY;
+    Int at = 0;
+    for (int k = 0; k < most - 1; ++k) {
+        const Real error = LOAD_LANES(0, ERRORS(k));
+        const Int less = error < least;
+        least = SELECT(least, error, less);
+        at = SELECT(at, (Int)(k), less);
     }
-    const float4 least4 = fmin(least.lo, least.hi);
-    const float2 least2 = fmin(least4.lo, least4.hi);
-    const int8 first = select((int8)(INT_MAX), at, least == fmin(least2.x, least2.y));
-    const int4 first4 = min(first.lo, first.hi);
-    const int2 first2 = min(first4.lo, first4.hi);
-    return min(first2.x, first2.y);
+    return at;
 }
 
-// Merge neighbours whose error is within a threshold, in one pass from front to back. Returns how
-// many runs are left.
-inline int merge_within(__global float *record, int count, float threshold, float per_reference,
-                        float hidden_weight)
+// Merge neighbours whose error is within thresholds, in one pass from front to back, for rays that
+// are chosen. Returns how many runs each ray has then.
+inline Int merge_within(__global float *records, const Places *starts, Int counts, Real thresholds,
+                        Int chosen, Real per_reference, float hidden_weight)
 {
-    int kept = 0;
-    Run run = load_run(record, 0);
-    float4 feature = run_feature(run, per_reference);
-    for (int k = 1; k < count; ++k) {
-        const Run next = load_run(record, k);
-        const float4 next_feature = run_feature(next, per_reference);
-        if (merge_error(1, run, feature, next, next_feature, per_reference, hidden_weight) >
-            threshold) {
-            store_run(record, kept++, run);
-            run = next;
-            feature = next_feature;
-        } else {
-            run = merged_runs(run, next);
-            feature = run_feature(run, per_reference);
+    const int most = largest_lane(counts);
+    Run run = load_run_at(records, starts->each);
+    Real4 feature = run_feature(run, per_reference);
+    Int kept = 0;
+    Places place = {starts->all};
+    for (int k = 1; k < most; ++k) {
+        const Run next = load_run_at(records + k * RUN_WORDS, starts->each);
+        const Real4 next_feature = run_feature(next, per_reference);
+        const Int there = chosen & (k < counts);
+        const Real error =
+            merge_error(there, run, feature, next, next_feature, per_reference, hidden_weight);
+        const Int begins = there & (error > thresholds);
+        const Int grows = there & !begins;
+        // Where a run is not at its end, or a ray at its last one, it is stored for nothing
+        if (ANY(begins))
+            store_run_at(records, place.each, run);
+        kept += COUNT(begins);
+        place.all += COUNT(begins) * RUN_WORDS;
+        const Run merged = merged_runs(run, next);
+        run = selected_run(selected_run(run, next, begins), merged, grows);
+        feature = selected_feature(run_feature(run, per_reference), next_feature, begins);
+    }
+    store_run_at(records, place.each, run);
+    return SELECT(counts, kept + 1, chosen);
+}
+
+// Raise thresholds and merge within them until at most `limit` runs of each ray are left.
+inline Int make_room(__global float *records, const Places *starts, __global float *errors,
+                     Int counts, int limit, Real *thresholds, Real per_reference,
+                     float hidden_weight)
+{
+    for (;;) {
+        const Int chosen = counts > limit;
+        if (!ANY(chosen))
+            return counts;
+        const int most = largest_lane(counts);
+        measure_errors(records, starts, errors, counts, most, per_reference, hidden_weight);
+        for (;;) {
+            const Int low = chosen & (count_within(errors, most, *thresholds) < counts - limit);
+            if (!ANY(low))
+                break;
+            *thresholds = SELECT(*thresholds, *thresholds * 4.0f, low);
         }
+        counts = merge_within(records, starts, counts, *thresholds, chosen, per_reference,
+                              hidden_weight);
     }
-    store_run(record, kept, run);
-    return kept + 1;
 }
 
-// Raise the threshold and merge within it until at most `limit` runs are left.
-inline int make_room(__global float *record, __global float *errors, int count, int limit,
-                     __global float *threshold, float per_reference, float hidden_weight)
+// Runs that others have taken in have a negative optical depth. The first behind a run says where
+// the next run is, the last before one where that is which has taken it in.
+#define NEXT_WORD 1
+#define BEFORE_WORD 0
+#define TAU_WORD 2
+
+inline Int words_at(__global const float *records, Int places, int word)
 {
-    while (count > limit) {
-        measure_errors(record, errors, count, per_reference, hidden_weight);
-        while (count_within(errors, count, *threshold) < count - limit)
-            *threshold *= 4.0f;
-        count = merge_within(record, count, *threshold, per_reference, hidden_weight);
-    }
-    return count;
+    const Places words = {places};
+    Place *at = words.each;
+#define WORD(n) as_int(records[at[n] + word])
+    return OF_LANES(Int, WORD);
+#undef WORD
 }
 
-inline int word_of(__global const float *record, int k, int word)
+// The run behind the k-th of each ray, or `counts` where there is none.
+inline Int next_of(__global const float *records, Int starts, Int k, Int counts)
 {
-    return as_int(record[k * RUN_WORDS + word]);
-}
-
-// The run behind the k-th, or `count` where there is none.
-inline int next_of(__global const float *record, int k, int count)
-{
-    if (k + 1 < count && word_of(record, k + 1, TAU_WORD) < 0)
-        return word_of(record, k + 1, NEXT_WORD);
-    return k + 1;
+    const Int behind = starts + min(k + 1, counts - 1) * RUN_WORDS;
+    const Int taken = words_at(records, behind, TAU_WORD) < 0;
+    return SELECT(k + 1, words_at(records, behind, NEXT_WORD), taken & (k + 1 < counts));
 }
 
 // The run before the k-th, or -1 where there is none.
-inline int before_of(__global const float *record, int k)
+inline Int before_of(__global const float *records, Int starts, Int k)
 {
-    if (k > 0 && word_of(record, k - 1, TAU_WORD) < 0)
-        return word_of(record, k - 1, BEFORE_WORD);
-    return k - 1;
+    const Int before = starts + max(k - 1, 0) * RUN_WORDS;
+    const Int taken = words_at(records, before, TAU_WORD) < 0;
+    return SELECT(k - 1, words_at(records, before, BEFORE_WORD), taken & (k > 0));
 }
 
-// Merge, least error first, until at most `limit` runs are left.
-inline int merge_to_limit(__global float *record, __global float *errors, int count, int limit,
-                          float per_reference, float hidden_weight)
+inline Run run_of(__global const float *records, Int starts, Int k)
 {
-    if (count <= limit)
-        return count;
-    measure_errors(record, errors, count, per_reference, hidden_weight);
-    for (int left = count; left > limit; --left) {
-        // The pair that costs least becomes one
-        const int at = least_error(errors, count);
-        const int next = next_of(record, at, count);
-        const int behind = next_of(record, next, count);
-        const int before = before_of(record, at);
-        const Run merged = merged_runs(load_run(record, at), load_run(record, next));
-        const float4 feature = run_feature(merged, per_reference);
-        store_run(record, at, merged);
-        record[next * RUN_WORDS + TAU_WORD] = -1.0f;
-        record[(at + 1) * RUN_WORDS + NEXT_WORD] = as_float(behind);
-        record[(behind - 1) * RUN_WORDS + BEFORE_WORD] = as_float(at);
-        errors[next] = INFINITY;
-        // Both its neighbours' errors have changed
-        errors[at] = INFINITY;
-        if (behind < count) {
-            const Run last = load_run(record, behind);
-            errors[at] = merge_error(1, merged, feature, last, run_feature(last, per_reference),
-                                     per_reference, hidden_weight);
+    const Places places = {starts + k * RUN_WORDS};
+    return load_run_at(records, places.each);
+}
+
+// Merge, least error first, until at most `limit` runs of each ray are left.
+inline Int merge_to_limit(__global float *records, const Places *first, __global float *errors,
+                          Int counts, int limit, Real per_reference, float hidden_weight)
+{
+    const int most = largest_lane(counts);
+    const Places many = {counts};
+    measure_errors(records, first, errors, counts, most, per_reference, hidden_weight);
+    const Int starts = first->all;
+    Int alive = counts;
+    const Int within = max(counts, 2); // so that every lane has somewhere to look
+    for (;;) {
+        const Int chosen = alive > limit;
+        if (!ANY(chosen))
+            break;
+        // The pair that costs least becomes one. Of rays that are done, and may have nothing,
+        // places are only somewhere in the record
+        const Int at = least_error(errors, most);
+        const Int next = clamp(next_of(records, starts, at, within), 0, within - 1);
+        const Int behind = clamp(next_of(records, starts, next, within), 0, within);
+        const Int before = clamp(before_of(records, starts, at), -1, within - 1);
+        const Run a = run_of(records, starts, at), b = run_of(records, starts, next);
+        const Run c = run_of(records, starts, min(behind, within - 1));
+        const Run d = run_of(records, starts, max(before, 0));
+        const Run merged = merged_runs(a, b);
+        const Places place = {starts + at * RUN_WORDS};
+        store_run_at(records, place.each, selected_run(a, merged, chosen));
+        // Both its neighbours' errors change
+        const Real4 feature = run_feature(merged, per_reference);
+        const Real ahead = merge_error(chosen & (behind < counts), merged, feature, c,
+                                       run_feature(c, per_reference), per_reference, hidden_weight);
+        const Real error_before =
+            merge_error(chosen & (before >= 0), d, run_feature(d, per_reference), merged, feature,
+                        per_reference, hidden_weight);
+        const Real error_after = SELECT((Real)(INFINITY), ahead, behind < counts);
+        const Places taking = {at}, taken = {next}, last = {behind}, earlier = {before},
+                     who = {chosen};
+        const float *after_each = (const float *)&error_after;
+        const float *before_each = (const float *)&error_before;
+        for (int lane = 0; lane < LANES; ++lane) {
+            if (!who.each[lane])
+                continue;
+            __global float *record = records + first->each[lane];
+            record[taken.each[lane] * RUN_WORDS + TAU_WORD] = -1.0f;
+            record[(taking.each[lane] + 1) * RUN_WORDS + NEXT_WORD] = as_float(last.each[lane]);
+            record[(last.each[lane] - 1) * RUN_WORDS + BEFORE_WORD] = as_float(taking.each[lane]);
+            ERRORS(taken.each[lane])[lane] = INFINITY;
+            ERRORS(taking.each[lane])[lane] = after_each[lane];
+            if (earlier.each[lane] >= 0)
+                ERRORS(earlier.each[lane])[lane] = before_each[lane];
         }
-        if (before >= 0) {
-            const Run first = load_run(record, before);
-            errors[before] = merge_error(1, first, run_feature(first, per_reference), merged,
-                                         feature, per_reference, hidden_weight);
-        }
+        alive -= COUNT(chosen);
     }
     // Close the gaps
-    for (int to = 1, from = 1; to < limit; ++to, ++from) {
-        if (record[from * RUN_WORDS + TAU_WORD] < 0.0f)
-            from = word_of(record, from, NEXT_WORD);
-        store_run(record, to, load_run(record, from));
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (many.each[lane] <= limit)
+            continue;
+        __global ulong4 *record = (__global ulong4 *)(records + first->each[lane]);
+        int from = 1;
+        for (int to = 1; to < limit; ++to) {
+            __global const float *words = (__global const float *)(record + from);
+            if (words[TAU_WORD] < 0.0f)
+                from = as_int(words[NEXT_WORD]);
+            record[to] = record[from++];
+        }
     }
-    return limit;
+    return min(counts, limit);
 }
 
 // Shorten records of more than recording.limit runs: with `exactly`, by least error; otherwise by
 // raising the rays' thresholds.
-__kernel void shorten_lists(const RaysOfView view, __global const float *forms,
-                            const Recording recording, int exactly, __global float *thresholds,
-                            __global float *records, __global float *errors, __global uint *counts)
+KERNEL_OF_LANES void shorten_lists(const RaysOfView view, __global const float *forms,
+                                   const Recording recording, int exactly,
+                                   __global float *thresholds, __global float *records,
+                                   __global float *errors, __global uint *counts)
 {
-    const uint item = (uint)get_global_id(0);
-    const Rays ray = rays_of_view(&view, item);
-    if (!ray.present)
+    const uint first = (uint)get_global_id(0) * LANES;
+    const Rays rays = rays_of_view(&view, first);
+    if (!ANY(rays.present))
         return;
-    const int list = ray.y * view.columns + ray.x, count = (int)counts[list],
-              limit = recording.limit;
-    if (count <= limit)
+    const int limit = recording.limit;
+    const Int lists = rays.y * view.columns + rays.x;
+    Int runs = load_counts(counts, lists, rays.present);
+    if (!ANY(runs > limit))
         return;
-    const float per_reference = march_speed(forms, ray.a, ray.b) / recording.reference_length;
-    __global float *record = records + record_start(item, recording.capacity);
-    errors += errors_start(item, recording.capacity);
-    counts[list] = (uint)(exactly ? merge_to_limit(record, errors, count, limit, per_reference,
-                                                   recording.hidden_weight)
-                                  : make_room(record, errors, count, limit, thresholds + item,
-                                              per_reference, recording.hidden_weight));
+    const Real per_reference = march_speed(forms, rays.a, rays.b) / recording.reference_length;
+    records += record_start(first, recording.capacity);
+    errors += errors_start(first, recording.capacity);
+    const Places starts = {LANE_NUMBERS * (recording.capacity * RUN_WORDS)};
+    if (exactly) {
+        runs = merge_to_limit(records, &starts, errors, runs, limit, per_reference,
+                              recording.hidden_weight);
+    } else {
+        Real raised = LOAD_LANES(0, thresholds + first);
+        runs = make_room(records, &starts, errors, runs, limit, &raised, per_reference,
+                         recording.hidden_weight);
+        STORE_LANES(raised, 0, thresholds + first);
+    }
+    store_counts(counts, lists, rays.present, runs);
 }

@@ -1,5 +1,5 @@
 // The optical depth of the steps of each ray in part of a grid: the first of the two passes over a
-// volume in blocks. One ray for each work-item; sixteen: cpu16/generation_optical_depths.cl.
+// volume in blocks. A ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
 // -D GRID_PART and those of volume/march.cl. It decides by how much an error counts, and no colour:
 // one step in `stride` is sampled, and at the faces of a block whose neighbours are not at hand the
@@ -7,30 +7,38 @@
 #include "volume/march.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-__kernel void optical_depths(const Classified classified, __global const VOXEL_T *voxels,
-                             __global const float4 *table, __global const uchar *distances,
-                             __global const uchar *blanked, __global const float *gradient,
-                             __global const float *lighting, __global const float *ambient,
-                             const RaysOfView view, __global const float *forms,
-                             int stride,             // steps
-                             __global float *depths) // of each ray, rows of columns
+KERNEL_OF_LANES void optical_depths(MEDIUM_PARAMETERS, const RaysOfView view,
+                                    __global const float *forms,
+                                    int stride,             // steps
+                                    __global float *depths) // of each ray, rows of columns
 {
-    const Rays ray = rays_of_view(&view, (uint)get_global_id(0));
-    if (!ray.present)
+    const Rays rays = rays_of_view(&view, (uint)get_global_id(0) * LANES);
+    if (!ANY(rays.present))
         return;
-    float depth = 0.0f;
+    Real depth = 0.0f;
     March march;
-    if (begin_march(&march, &view, &classified, forms, ray.a, ray.b, INFINITY)) {
-        const Medium medium = {classified, voxels,   table,    distances,
-                               blanked,    gradient, lighting, ambient};
+    if (ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b, INFINITY))) {
+        const Medium medium = MEDIUM_OF_PARAMETERS;
         // The same steps whatever the blocks
-        for (int k = (march.begin + (stride - 1)) / stride * stride; k < march.steps;) {
-            const float front = step_face(&march, k), back = step_face(&march, k + 1);
-            const int empty = empty_steps(&march, &medium, 1, k, march.steps, stride, front, back);
-            if (empty == 0)
-                depth += step_medium(&march, &medium, front, back).w * (float)stride;
+        Int k = (march.begin + (stride - 1)) / stride * stride;
+        for (;;) {
+            const Int active = rays.present & (k < march.steps);
+            if (!ANY(active))
+                break;
+            const Real front = step_face(&march, k), back = step_face(&march, k + 1);
+            const Int empty =
+                empty_steps(&march, &medium, active, k, march.steps, stride, front, back);
+            const Int here = active & (empty == 0);
+            if (ANY(here)) {
+                const Real of_step = step_medium(&march, &medium, front, back).w;
+                depth += SELECT((Real)(0.0f), of_step * (float)stride, here);
+            }
             k += max(empty, stride);
         }
     }
-    depths[ray.y * view.columns + ray.x] = depth;
+    const Places places = {rays.y * view.columns + rays.x}, wanted = {rays.present};
+    const float *of_ray = (const float *)&depth;
+    for (int lane = 0; lane < LANES; ++lane)
+        if (wanted.each[lane])
+            depths[places.each[lane]] = of_ray[lane];
 }

@@ -3,7 +3,7 @@
 //
 // -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
-#include "generation/records.cl"
+#include "generation/merging.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // A slice's records, one behind the other in the order of its lists.

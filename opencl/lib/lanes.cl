@@ -2,7 +2,7 @@
 //
 // -D LANES  1 (default): a work-item follows one ray, and what vectors there are is the compiler's
 // business
-//           16: it follows that many together, in vectors that are written out (cpu16/)
+//           16: it follows that many together, in vectors that are written out, as CPUs do
 // -D VECTOR_FUNCTIONS  0, or 1: the driver's functions round a vector as they round a number, as
 // Intel's do: of sixteen they
 //           are asked for vectors
@@ -14,6 +14,9 @@
 // and SELECT want (Real)(x).
 #pragma OPENCL FP_CONTRACT OFF
 
+#ifndef LANES
+#define LANES 1
+#endif
 #ifndef VECTOR_FUNCTIONS
 #define VECTOR_FUNCTIONS 0
 #endif
@@ -85,7 +88,6 @@ typedef const volatile int Place;
                       of_number(of_x[15]));                                                        \
     }
 #else
-#define LANES 1
 typedef float Real;
 typedef int Int;
 typedef uint Uint;

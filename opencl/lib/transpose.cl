@@ -37,8 +37,34 @@ inline Real4 load_fours(__global const float4 *from, Int at)
 #undef FOURS
 }
 #define load_halves load_fours
+
+// Store four numbers of each lane as the `at`-th four, but of lanes whose place is negative.
+inline void store_fours(__global float4 *to, Int at, Real4 fours)
+{
+    const Places places = {at};
+    Place *each = places.each;
+    const Real4 rows = transpose(fours);
+#define STORE(n, c, four)                                                                          \
+    if (each[n] >= 0)                                                                              \
+        to[each[n]] = rows.c.four;
+#define STORE_ROW(g, four)                                                                         \
+    STORE(4 * g, x, four)                                                                          \
+    STORE(4 * g + 1, y, four) STORE(4 * g + 2, z, four) STORE(4 * g + 3, w, four)
+    STORE_ROW(0, s0123)
+    STORE_ROW(1, s4567)
+    STORE_ROW(2, s89ab)
+    STORE_ROW(3, scdef)
+#undef STORE
+#undef STORE_ROW
+}
 #else
 #define load_fours(from, at) ((from)[at])
+
+inline void store_fours(__global float4 *to, int at, float4 four)
+{
+    if (at >= 0)
+        to[at] = four;
+}
 
 // The same in two loads, where a vector's lanes load from different places, and not in four.
 inline float4 load_halves(__global const float4 *from, int at)

@@ -43,6 +43,15 @@ typedef struct {
     __global const float *ambient;   // see volume/occlusion.cl; 0: there is none
 } Medium;
 
+// A kernel's parameters that are a classified volume, and the medium of them.
+#define MEDIUM_PARAMETERS                                                                          \
+    const Classified classified, __global const VOXEL_T *voxels, __global const float4 *table,     \
+        __global const uchar *distances, __global const uchar *blanked,                            \
+        __global const float *gradient, __global const float *lighting,                            \
+        __global const float *ambient
+#define MEDIUM_OF_PARAMETERS                                                                       \
+    {classified, voxels, table, distances, blanked, gradient, lighting, ambient}
+
 // An index position of the grid in the part of it that is at hand.
 #define IN_PART(numbers, position, axis)                                                           \
     (GRID_PART ? (position) - (float)(numbers).part_first.axis : (position))

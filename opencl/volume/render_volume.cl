@@ -1,18 +1,16 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as
-// generation. One ray for each work-item; sixteen: cpu16/volume_render.cl.
+// generation. A ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
 // -D CROPPED: see lib/cropping.cl; COMPENSATED: see lib/compositing.cl; the volume's: see
 // volume/march.cl
 #include "volume/cropped_march.cl"
 #include "volume/samples.cl"
 #include "lib/compositing.cl"
+#include "lib/pixels.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-__kernel void render_volume(
-    const Classified classified, __global const VOXEL_T *voxels, __global const float4 *table,
-    __global const uchar *distances, __global const uchar *blanked, __global const float *gradient,
-    __global const float *lighting, __global const float *ambient, const RaysOfView view,
-    __global const float *forms,
+KERNEL_OF_LANES void render_volume(
+    MEDIUM_PARAMETERS, const RaysOfView view, __global const float *forms,
     __global const float
         *opaque_depth,              // t at which each pixel's ray ends, top row first; 0: none does
     float transmittance_cutoff,     // a ray ends where no more than this is left; negative: never
@@ -23,50 +21,58 @@ __kernel void render_volume(
                              // steps are taken
     __global float4 *image)  // premultiplied RGBA, top row first
 {
-    const uint item = (uint)get_global_id(0);
-    const Rays ray = rays_of_view(&view, item);
-    if (!ray.present)
+    const uint first = (uint)get_global_id(0) * LANES;
+    const Rays rays = rays_of_view(&view, first);
+    if (!ANY(rays.present))
         return;
-    const size_t place = (size_t)(view.height - 1 - (view.first_row + ray.y)) * view.width + ray.x;
+    const Int pixels =
+        places_in_picture(rays.x, view.first_row + rays.y, rays.present, view.width, view.height);
+    const bool in_parts = LANES == 1 && states;
     Seen seen = nothing_seen();
-    if (states && view.first_step > 0) {
-        seen.sums = states[2 * (size_t)item];
-        seen.compensation = states[2 * (size_t)item + 1];
+    if (in_parts && view.first_step > 0) {
+        seen.sums = load_fours(states, 2 * (int)first);
+        seen.compensation = load_fours(states, 2 * (int)first + 1);
     }
     March march;
-    if (begin_march(&march, &view, &classified, forms, ray.a, ray.b,
-                    opaque_depth ? opaque_depth[place] : INFINITY)) {
-        const Medium medium = {classified, voxels,   table,    distances,
-                               blanked,    gradient, lighting, ambient};
-        __global const float4 *sampled = samples + samples_start(item, view.steps);
+    if (ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b,
+                        opaque_ends(pixels, opaque_depth)))) {
+        const Medium medium = MEDIUM_OF_PARAMETERS;
+        const size_t sampled = samples_start(first, view.steps);
         Kept kept;
         if (CROPPED)
-            kept = kept_march(&march, forms + (6 + view.planes) * FORM_SIZE, ray.a, ray.b, regions);
-        const int end = min(view.first_step + view.steps, march.steps);
-        bool look = true;
-        for (int k = view.first_step; k < end && seen.sums.w > transmittance_cutoff;) {
-            // Skip what is transparent, but not where something was seen in the step before
-            const float front = step_face(&march, k), back = step_face(&march, k + 1);
-            const int empty = look ? empty_steps(&march, &medium, 1, k, end, 1, front, back) : 0;
-            if (empty > 0) {
-                k += empty;
-                continue;
+            kept =
+                kept_march(&march, forms + (6 + view.planes) * FORM_SIZE, rays.a, rays.b, regions);
+        const Int end = min(view.first_step + view.steps, march.steps);
+        Int k = view.first_step;
+        bool look = true; // for empty space: not where something was seen in the turn before
+        for (;;) {
+            const Int active = (k < end) & (seen.sums.w > transmittance_cutoff);
+            if (!ANY(active))
+                break;
+            // Skip what is transparent
+            const Real front = step_face(&march, k), back = step_face(&march, k + 1);
+            const Int empty =
+                look ? empty_steps(&march, &medium, active, k, end, 1, front, back) : (Int)(0);
+            const Int here = active & (empty == 0);
+            if (ANY(here)) {
+                // Sample the step's midpoint, classify and shade it
+                Real4 step =
+                    LANES == 1 && samples
+                        ? load_fours(samples + sampled, (k - view.first_step) * SAMPLE_LANES)
+                        : step_medium(&march, &medium, front, back);
+                if (CROPPED)
+                    step.w *= kept_share(&kept, front, back);
+                step.w *= opacity_multiplier;
+                look = !ANY(here & (step.w > 0.0f));
+                // Composite it behind what has been seen
+                composite_medium(&seen, step.w, step, here);
             }
-            // Sample the step's midpoint, classify and shade it
-            float4 step = samples ? sampled[(k - view.first_step) * SAMPLE_LANES]
-                                  : step_medium(&march, &medium, front, back);
-            if (CROPPED)
-                step.w *= kept_share(&kept, front, back);
-            step.w *= opacity_multiplier;
-            look = !(step.w > 0.0f);
-            // Composite it behind what has been seen
-            composite_medium(&seen, step.w, step, 1);
-            ++k;
+            k += max(empty, 1);
         }
     }
-    if (states) {
-        states[2 * (size_t)item] = seen.sums;
-        states[2 * (size_t)item + 1] = seen.compensation;
+    if (in_parts) {
+        store_fours(states, 2 * (int)first, seen.sums);
+        store_fours(states, 2 * (int)first + 1, seen.compensation);
     }
-    image[place] = composited(&seen);
+    store_fours(image, pixels, composited(&seen));
 }

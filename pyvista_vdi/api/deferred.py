@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
-from pyvista_vdi.model.classification import Classification, refuse_unknown
+from pyvista_vdi.model.arguments import refuse_unknown
+from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import declared

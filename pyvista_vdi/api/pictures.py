@@ -2,61 +2,46 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.arguments import Raw, refuse_unknown, takes
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag
-from pyvista_vdi.model.classification import BLENDINGS, IN_PLACE, Classification, refuse_keywords
+from pyvista_vdi.model.classification import BLENDINGS, IN_PLACE, Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, as_volume
 from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
-from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.types import (
-    CameraLike,
-    ColorMapLike,
-    CroppingLike,
-    DeviceLike,
-    LightsLike,
-    MemoryLike,
-    OcclusionLike,
-    OpacityLike,
-    RangeLike,
-    ScalarsLike,
-    VDILike,
-    VolumeLike,
-    VTKObject,
-    WindowSize,
-)
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions, SceneOptions
+from pyvista_vdi.model.types import CameraLike, DeviceLike, ShownLike, VolumeLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 
 if TYPE_CHECKING:
     from pyvista_vdi.raycasting.picking import Pick
 
-#: What is shown for one VDI: of a set that which is nearest to the view.
-Shown: TypeAlias = VDILike | VDICollection
 
-
+@takes(
+    options=Raw(RenderOptions),
+    kinds={
+        "clipping_planes": "ArrayLike | Sequence[ArrayLike | None] | None",
+        "opacity_multiplier": "float | Sequence[float]",
+    },
+)
 def render(
-    vdi: Shown | DeferredVDI | Sequence[Shown | DeferredVDI],
+    vdi: ShownLike | Sequence[ShownLike],
     camera: CameraLike,
+    options: dict[str, Any],
     window_size: WindowSize | None = None,
     *,
     opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | Sequence[ArrayLike | None] | None = None,
-    cropping: CroppingLike | None = None,
-    opacity_multiplier: float | Sequence[float] = 1.0,
     model_transforms: Sequence[ArrayLike] | None = None,
-    skip_empty: bool = True,
-    preview_samples: int | None = None,
-    transmittance_cutoff: float | None = None,
     device: DeviceLike | None = None,
     **look: Any,
 ) -> NDArray[np.float32]:
@@ -80,32 +65,22 @@ def render(
     opaque_depth : array_like of float32, shape (H, W), optional
         Depth at which each ray ends: distance from the eye along the view direction, world
         units, top row first; infinity where nothing is opaque.
-    clipping_planes : array_like of float, shape (k, 6), optional
+    clipping_planes : array_like of float, shape (k, 6), or list of these, optional
         Origin and normal of each plane, world coordinates; the side that the normal points to
         is kept, as with VTK's mappers. They cut all of several VDIs; a list of such arrays, or of
         ``None``, cuts each by its own.
-    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, optional
+    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, or list, optional
         Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
         :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, z_low and z_high of a box, or
         a pair of those planes and the regions (flags, or ``"fence"``, ``"cross"`` ...). For
         several VDIs a list with one of these, or ``None``, for each.
-    opacity_multiplier : float, default: 1.0
+    opacity_multiplier : float or list of float, default: 1.0
         Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
         the same as dividing the opacity unit distance by it. For several VDIs one for all, or a
         list with one for each.
     model_transforms : sequence of array_like of float, shape (4, 4), optional
         Where the model frame of each of several VDIs is; the camera's model transform for all by
         default.
-    skip_empty : bool, default: True
-        Pass by what is empty; the picture is the same to the last bit.
-    preview_samples : int, optional
-        Look a VDI up at so many points of each ray instead of intersecting its supersegments: an
-        approximation (paper section 5). A smaller ``window_size`` is the better one: see
-        docs/decisions/previews.md. For a single VDI only.
-    transmittance_cutoff : float, optional
-        A ray ends where less light than this is left, 0 to below 1; 10⁻⁶ by default. No channel
-        loses more than that: 0.004 changes a picture of 8 bits by one step at most, and saves a
-        fifth to two fifths of the work where things are opaque. For a single VDI only.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
 
@@ -134,28 +109,24 @@ def render(
         ]
         vdi = given if isinstance(vdi, list | tuple) else given[0]
     else:
-        refuse_keywords(look, render)
-    how = (clipping_planes, cropping, opacity_multiplier, skip_empty)
+        refuse_unknown(look, "render", _names(render))
     if isinstance(vdi, list | tuple) or model_transforms is not None:
-        if preview_samples is not None:
-            raise InvalidArgumentError(
-                "preview_samples is for a single VDI: give several a smaller window_size"
-            )
-        if transmittance_cutoff is not None:
-            raise InvalidArgumentError(
-                "transmittance_cutoff is for a single VDI: leave it out for several"
-            )
+        remedies = {
+            "preview_samples": "give several a smaller window_size",
+            "transmittance_cutoff": "leave it out for several",
+        }
+        for name in RenderOptions.checked(**{name: options.pop(name) for name in remedies}).given:
+            raise InvalidArgumentError(f"{name} is for a single VDI: {remedies[name]}")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
         several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
         seen = _seen_in_scene(several, view, model_transforms)
-        placed = placed_vdis(seen, view, model_transforms, *how)
+        placed = placed_vdis(seen, view, model_transforms, **options)
         size: Any = common_window_size(placed) if window_size is None else window_size
         return render_vdis(placed, FrameRequest(view, size, RenderOptions(), opaque_depth, device))
-    options = RenderOptions.checked(*how, preview_samples, transmittance_cutoff)
     shown: Any = vdi if _is_of_views(vdi) else as_vdi(vdi)
     size = shown.picture_size if window_size is None else window_size
-    request = FrameRequest(view, size, options, opaque_depth, device)
+    request = FrameRequest(view, size, RenderOptions(**options), opaque_depth, device)
     if _is_of_views(shown):
         from pyvista_vdi.raycasting.multi_vdi import blended
 
@@ -165,18 +136,16 @@ def render(
     return render_fitting(shown, request)
 
 
+@takes(options=SceneOptions)
 def render_depth(
-    vdi: Shown | DeferredVDI,
+    vdi: ShownLike,
     camera: CameraLike,
+    options: SceneOptions,
     window_size: WindowSize | None = None,
     *,
     opacity_threshold: float = DEFAULT_OPACITY,
     accumulated: bool = True,
     opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | None = None,
-    cropping: CroppingLike | None = None,
-    opacity_multiplier: float = 1.0,
-    skip_empty: bool = True,
     device: DeviceLike | None = None,
     **look: Any,
 ) -> NDArray[np.float32]:
@@ -184,9 +153,7 @@ def render_depth(
 
     Parameters
     ----------
-    vdi, camera, window_size, opaque_depth, clipping_planes, cropping, opacity_multiplier
-        As for :func:`render`.
-    skip_empty, device
+    vdi, camera, window_size, opaque_depth, device
         As for :func:`render`.
     opacity_threshold, accumulated
         What counts as a hit: as for :func:`pick`.
@@ -208,28 +175,26 @@ def render_depth(
     if look and _keeps_values(vdi):
         vdi = vdi.classified(**look, device=device)  # type: ignore[union-attr]
     else:
-        refuse_keywords(look, render_depth)
+        refuse_unknown(look, "render_depth", _names(render_depth))
     seen = _seen(vdi, view)
-    options = RenderOptions.checked(clipping_planes, cropping, opacity_multiplier, skip_empty)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size
-    request = FrameRequest(view, size, options, opaque_depth, device)
+    request = FrameRequest(view, size, options.drawn(), opaque_depth, device)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
     return render_first_hits(seen, request, FirstHit.of(opacity_threshold, accumulated))
 
 
+@takes(options=SceneOptions)
 def pick(
-    vdi: Shown | DeferredVDI,
+    vdi: ShownLike,
     camera: CameraLike,
     pixel: Sequence[float],
+    options: SceneOptions,
     window_size: WindowSize | None = None,
     *,
     opacity_threshold: float = DEFAULT_OPACITY,
     accumulated: bool = True,
     opaque_depth: float | None = None,
-    clipping_planes: ArrayLike | None = None,
-    cropping: CroppingLike | None = None,
-    opacity_multiplier: float = 1.0,
     **look: Any,
 ) -> Pick | None:
     """Return what a pixel shows of a VDI: the first supersegment that reaches an opacity.
@@ -257,8 +222,6 @@ def pick(
         the ray runs across the lists, it crosses little of each.
     opaque_depth : float, optional
         View depth at which the ray ends, world units.
-    clipping_planes, cropping, opacity_multiplier
-        As for :func:`render`.
 
     Returns
     -------
@@ -280,51 +243,27 @@ def pick(
     if kept is not None and look:
         near = kept.classified(**look)
     else:
-        refuse_keywords(look, pick)
+        refuse_unknown(look, "pick", _names(pick))
     seen = _seen(near, view)
-    options = RenderOptions.checked(clipping_planes, cropping, opacity_multiplier)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size
     from pyvista_vdi.raycasting.picking import pick_vdi
 
-    request = FrameRequest(view, size, options, opaque_depth)
+    request = FrameRequest(view, size, options.drawn(), opaque_depth)
     return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated), kept)
 
 
+@takes(look=Classification, medium=MediumOptions, options=SceneOptions)
 def render_volume(
     volume: VolumeLike,
     camera: CameraLike,
     window_size: WindowSize,
+    look: Classification,
+    medium: MediumOptions,
+    options: SceneOptions,
     *,
-    sample_distance: float | None = None,
     opaque_depth: ArrayLike | None = None,
-    clipping_planes: ArrayLike | None = None,
-    cropping: CroppingLike | None = None,
-    opacity_multiplier: float = 1.0,
     early_termination: bool = True,
-    skip_empty: bool = True,
-    lights: LightsLike | None = None,
-    ambient_occlusion: OcclusionLike | None = None,
-    memory_limit: MemoryLike | None = None,
     device: DeviceLike | None = None,
-    scalars: ScalarsLike | None = None,
-    preference: str = "point",
-    clim: RangeLike | None = None,
-    n_colors: int = 256,
-    opacity: OpacityLike = "linear",
-    cmap: ColorMapLike | None = None,
-    flip_scalars: bool = False,
-    opacity_unit_distance: float | None = None,
-    log_scale: bool = False,
-    shade: bool = False,
-    ambient: float | None = None,
-    diffuse: float | None = 0.7,
-    specular: float | None = 0.2,
-    specular_power: float | None = 10.0,
-    blending: str = "composite",
-    interpolation: str = "nearest",
-    volume_property: VTKObject | None = None,
-    transfer_function: TransferFunction | None = None,
-    **unknown: NoReturn,
 ) -> NDArray[np.float32]:
     """Raycast the volume itself: direct volume rendering, the baseline of a VDI.
 
@@ -336,33 +275,12 @@ def render_volume(
         The view.
     window_size : (int, int)
         Width and height in pixels.
-    sample_distance : float, optional
-        Length of a step along a ray, model units; half the smallest spacing by default.
-    opaque_depth, clipping_planes, cropping, opacity_multiplier
+    opaque_depth : array_like of float32, shape (H, W), optional
         As for :func:`render`.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
-    skip_empty : bool, default: True
-        Pass by what is empty: blocks of the volume that are transparent. The picture is the same to
-        the last bit.
-    lights : renderer, or sequence of Light, vtkLight or pyvista.Light, optional
-        As for :func:`generate`; lights that move with the camera are those of this view.
-    ambient_occlusion : bool, float or AmbientOcclusion, optional
-        As for :func:`generate`.
-    memory_limit : int, float or str, optional
-        As for :func:`generate`; the picture is the same to the last bit.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
-    scalars, preference, clim, n_colors, opacity, cmap, flip_scalars, opacity_unit_distance
-        As for :func:`generate`.
-    log_scale, shade, ambient, diffuse, specular, specular_power, interpolation
-        As for :func:`generate`.
-    blending : {"composite", "maximum", "minimum", "average", "additive"}
-        What becomes of the scalars along a ray, as in ``add_volume``: the greatest or the least is
-        classified; or opacity times scalar, which is 0 to 1 over the volume's range, is averaged
-        or integrated over opacity unit distances, as a grey value.
-    volume_property, transfer_function
-        As for :func:`generate`.
 
     Returns
     -------
@@ -382,33 +300,29 @@ def render_volume(
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
         If there is no device, or it fails.
     """
-    refuse_keywords(unknown, render_volume)
-    look = Classification.checked(
-        *(scalars, preference, blending, clim, n_colors, opacity, cmap, flip_scalars),
-        *(opacity_unit_distance, log_scale, shade, ambient, diffuse, specular, specular_power),
-        *(interpolation, volume_property, transfer_function),
-    )
-    view, read = Camera.from_any(camera), as_volume(volume, scalars, preference)
-    cutoff = None if as_flag(early_termination, "early_termination") else 0.0
-    options = RenderOptions.checked(
-        clipping_planes, cropping, opacity_multiplier, skip_empty, None, cutoff
-    )
+    view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
+    drawn = options.drawn()
+    if not as_flag(early_termination, "early_termination"):
+        drawn = drawn.replace(transmittance_cutoff=0.0)
     table = look.transfer_function_of(read)
     request = FrameRequest(
         view,
         window_size,  # type: ignore[arg-type]  # which it checks
-        options,
+        drawn,
         opaque_depth,
         device,
     )
-    medium = MediumOptions.checked(sample_distance, lights, ambient_occlusion, memory_limit)
-    if blending != BLENDINGS[0]:
+    if look.blending != BLENDINGS[0]:
         from pyvista_vdi.volume.render import project_volume
 
-        return project_volume(read, table, request, blending, medium)
+        return project_volume(read, table, request, look.blending, medium)
     from pyvista_vdi.volume.render import raycast_volume
 
     return raycast_volume(read, table, request, medium)
+
+
+def _names(function: Any) -> list[str]:
+    return [name for name in inspect.signature(function).parameters if name != "look"]
 
 
 def _keeps_values(vdi: Any) -> bool:

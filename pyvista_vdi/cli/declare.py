@@ -423,7 +423,7 @@ def target(parser: argparse.ArgumentParser) -> None:
     named = f": an SSIM of {', '.join(goals)} against volume rendering; reference asks for nothing"
     known(group, "quality", more=named, choices=tuple(QUALITIES))
     known(group, "target_ssim", "S", parse_number)
-    known(group, "target_fps", "RATE", parse_number)
+    known(group, "full_fps", "RATE", parse_number)
     known(group, "max_bytes", "SIZE", parse_bytes, ", like 20MB")
     known(group, "target_angle", "DEGREES", parse_number, default=...)
 

@@ -17,11 +17,13 @@ from pyvista_vdi.cli.inputs import (
     measuring,
     read_volume,
     say_vdi,
+    settings,
 )
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, QualityTarget, declared
@@ -73,15 +75,11 @@ def generate(options: argparse.Namespace) -> int:
             view,
             options.size,
             max_supersegments=options.max_supersegments,
-            criterion=options.criterion,
-            sample_distance=options.sample_distance,
-            tolerance=options.tolerance,
-            view_cone=options.view_cone,
             precision=precision,
-            **asked,
+            **{name: value for name, value in asked.items() if name not in Settings.declared},
             **kept,
             ambient_occlusion=occlusion,
-            memory_limit=options.memory_limit,
+            settings=settings(options),
             client=options.scheduler,
             device=options.device,
             progress=bar,

@@ -23,6 +23,7 @@ from pyvista_vdi.io.stores import StoredVolume, is_store
 from pyvista_vdi.io.volumes import list_volumes
 from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -187,6 +188,12 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
+def settings(options: argparse.Namespace) -> Settings:
+    """Return what is seldom turned, as far as there are options of it."""
+    given = {name: getattr(options, name, None) for name in Settings.declared}
+    return Settings(**{name: value for name, value in given.items() if value is not None})
+
+
 def kept_values(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments that say what is kept where scalars are classified afterwards.
 
@@ -204,7 +211,7 @@ def kept_values(options: argparse.Namespace) -> dict[str, Any]:
                 f"{as_option(name)} {values} says what is kept to be classified afterwards: give "
                 f"--classification deferred as well, or leave {as_option(name)} out"
             )
-    return kept
+    return {name: value for name, value in kept.items() if name not in Settings.declared}
 
 
 def _refuse_with_values(options: argparse.Namespace) -> None:
@@ -238,7 +245,7 @@ def _refuse_with_values(options: argparse.Namespace) -> None:
             f"{occlusion}: ambient occlusion follows from opacities, which --classification "
             "deferred does not keep: leave it out"
         )
-    if target := given("quality", "target_ssim", "target_fps", "max_bytes"):
+    if target := given("quality", "target_ssim", "full_fps", "max_bytes"):
         raise UnsupportedError(
             f"{target}: settings are chosen by a look, which --classification deferred does not "
             "have: give --max-supersegments"

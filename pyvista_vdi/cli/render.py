@@ -22,6 +22,7 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
     refuse,
     require_vdi,
+    settings,
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -29,6 +30,7 @@ from pyvista_vdi.io import checked_png_target, to_bytes, write_png
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import RATE, VDICollection
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.model.volume import Volume
@@ -64,7 +66,7 @@ def render(options: argparse.Namespace) -> int:
             view,
             options.size or size,
             model_transforms=transforms if several else None,
-            transmittance_cutoff=options.transmittance_cutoff,
+            settings=settings(options),
             device=options.device,
             **look,
         )
@@ -103,7 +105,7 @@ def view(options: argparse.Namespace) -> int:
     return 0
 
 
-def _at(found: VDI | VDICollection, time: float | None) -> Any:
+def _at(found: VDI | DeferredVDI | VDICollection, time: float | None) -> Any:
     """Return a VDI or a set, or of a series the step nearest in time, by default the first."""
     if isinstance(found, VDICollection) and found.times is not None:
         return found[0 if time is None else found.nearest(time)]
@@ -111,7 +113,7 @@ def _at(found: VDI | VDICollection, time: float | None) -> Any:
 
 
 def _show(
-    shown: VDI | VDICollection | Volume,
+    shown: VDI | DeferredVDI | VDICollection | Volume,
     camera: Camera,
     size: tuple[int, int],
     looks: dict[str, Any],
@@ -133,10 +135,11 @@ def _show(
             target_fps=options.target_fps,
             regenerate=options.regenerate,
             draw=options.draw,
-            status=options.status,
             device=options.device,
             **looks,
         )
+        if options.status:
+            actor.show_status(plotter)
         if isinstance(shown, VDICollection) and shown.times is not None:
             _begin(actor, plotter, options, slider=screenshot is None)
         aim(plotter.camera, camera)

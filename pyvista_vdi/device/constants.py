@@ -16,10 +16,8 @@ CELL_ITEMS = CELL * CELL
 
 #: Logarithm to base 2 of the points along each edge of a macrocell (``volume/macrocells.cl``).
 MACROCELL_SHIFT = 3
-#: float32 numbers of a recorded run (``generation/runs.cl``).
+#: float32 numbers of a recorded run (``generation/records.cl``).
 RUN_WORDS = 8
-#: Merge errors of a ray that are looked at in one step: records have room for a multiple of them.
-ERRORS_AT_A_TIME = 8
 #: Lists whose lengths a work-item sums up (``generation/offsets.cl``).
 LISTS_PER_ITEM = 16
 
@@ -47,7 +45,7 @@ SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 #: By folder of ``opencl/``, those that programs with a file of it know.
 OF_FOLDERS: dict[str, str] = {
     "cpu16": "STEEPEST",
-    "generation": "RUN_WORDS ERRORS_AT_A_TIME LISTS_PER_ITEM",
+    "generation": "RUN_WORDS LISTS_PER_ITEM",
     "large": "RUN_WORDS",
     "lib": "STRIP COLUMN_ITEMS CELL CELL_ITEMS PLANE_FORMS",
     "multi_vdi": "CELL CELL_ITEMS SEGMENT_SIZE SPARE_SLOTS",

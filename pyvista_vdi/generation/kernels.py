@@ -14,38 +14,37 @@ RECORDING = Struct(
     reference_length="float",
     hidden_weight="float",
 )
-_RECORDED: dict[str, str | Struct] = {
-    "recording": RECORDING,
-    "entering": "float*",
-    "thresholds": "float*",
-    "records": "float*",
-    "counts": "uint*",
-}
 MARCH_LISTS = KernelDeclaration(
-    "generation/march_lists.cl", "march_lists", **MEDIUM, **VIEW, samples="float4*", **_RECORDED
-)
-MARCH_LISTS_16 = KernelDeclaration(
-    "cpu16/generation_march.cl", "march_lists", **MEDIUM, **VIEW, **_RECORDED
-)
-_LONGEST: dict[str, str | Struct] = {
-    "classified": CLASSIFIED,
+    "generation/march_lists.cl",
+    "march_lists",
+    **MEDIUM,
     **VIEW,
-    "slice_rows": "int",
-    "longest": "int*",
-}
-LONGEST_MARCHES = KernelDeclaration("generation/march_lists.cl", "longest_marches", **_LONGEST)
-LONGEST_MARCHES_16 = KernelDeclaration("cpu16/generation_march.cl", "longest_marches", **_LONGEST)
-_SHORTENED: dict[str, str | Struct] = {
+    samples="float4*",
+    recording=RECORDING,
+    entering="float*",
+    thresholds="float*",
+    records="float*",
+    counts="uint*",
+)
+LONGEST_MARCHES = KernelDeclaration(
+    "generation/march_lists.cl",
+    "longest_marches",
+    classified=CLASSIFIED,
     **VIEW,
-    "recording": RECORDING,
-    "exactly": "int",
-    "thresholds": "float*",
-    "records": "float*",
-    "errors": "float*",
-    "counts": "uint*",
-}
-SHORTEN_LISTS = KernelDeclaration("generation/shorten_lists.cl", "shorten_lists", **_SHORTENED)
-SHORTEN_LISTS_16 = KernelDeclaration("cpu16/generation_shorten.cl", "shorten_lists", **_SHORTENED)
+    slice_rows="int",
+    longest="int*",
+)
+SHORTEN_LISTS = KernelDeclaration(
+    "generation/shorten_lists.cl",
+    "shorten_lists",
+    **VIEW,
+    recording=RECORDING,
+    exactly="int",
+    thresholds="float*",
+    records="float*",
+    errors="float*",
+    counts="uint*",
+)
 CUT_LISTS = KernelDeclaration(
     "generation/homogeneity.cl",
     "cut_lists",

@@ -13,13 +13,10 @@ from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
 from pyvista_vdi.generation.kernels import (
     CUT_LISTS,
     LONGEST_MARCHES,
-    LONGEST_MARCHES_16,
     MARCH_LISTS,
-    MARCH_LISTS_16,
     PACK_LISTS,
     RECORDING,
     SHORTEN_LISTS,
-    SHORTEN_LISTS_16,
 )
 from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
@@ -89,7 +86,6 @@ class Records:
         self._shorten = RayLaunch(
             runtime,
             SHORTEN_LISTS,
-            SHORTEN_LISTS_16,
             self.defines,
             **records,
             thresholds=self.thresholds,
@@ -188,7 +184,6 @@ class March:
             self._launch = RayLaunch(
                 runtime,
                 MARCH_LISTS,
-                MARCH_LISTS_16,
                 variant.defines,
                 one_by_one=variant.one_by_one or bricks,
                 **arguments,
@@ -236,7 +231,6 @@ class March:
             launch = RayLaunch(
                 runtime,
                 LONGEST_MARCHES,
-                LONGEST_MARCHES_16,
                 variant.defines,
                 one_by_one=one_by_one,
                 classified=medium["classified"],

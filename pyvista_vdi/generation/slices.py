@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from pyvista_vdi.device import Runtime, get_runtime
-from pyvista_vdi.device.constants import ERRORS_AT_A_TIME, RUN_WORDS, block_items
+from pyvista_vdi.device.constants import RUN_WORDS, block_items
 from pyvista_vdi.generation.list_arrays import SUPERSEGMENT_BYTES, blocks_to_sum
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.options import GenerationOptions
@@ -60,7 +60,7 @@ class Slices:
         self.kept = max(2 * limit, limit + 12)
         if options.criterion == "homogeneity":
             self.kept = max(self.kept, _UNMERGED_RUNS)
-        self.capacity = -(-(self.kept + more) // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
+        self.capacity = self.kept + more
         width, self._height = size
         most = _SLICE_BYTES
         if not runtime.is_cpu:

@@ -7,28 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+#: Powers of ten that prefixes of units stand for.
+_POWERS = {"k": 3, "d": -1, "c": -2, "m": -3, "u": -6, "µ": -6, "n": -9, "p": -12}
+_POWERS |= {"kilo": 3, "deci": -1, "centi": -2, "milli": -3, "micro": -6, "nano": -9, "pico": -12}
+
 #: Units of length in metres, as OME-Zarr and OME-TIFF write them.
-METRES = {
-    "km": 1e3,
-    "m": 1.0,
-    "cm": 1e-2,
-    "mm": 1e-3,
-    "µm": 1e-6,
-    "um": 1e-6,
-    "nm": 1e-9,
-    "pm": 1e-12,
-    "Å": 1e-10,
-    "angstrom": 1e-10,
-    "picometer": 1e-12,
-    "nanometer": 1e-9,
-    "micrometer": 1e-6,
-    "micron": 1e-6,
-    "millimeter": 1e-3,
-    "centimeter": 1e-2,
-    "decimeter": 1e-1,
-    "meter": 1.0,
-    "kilometer": 1e3,
-    "inch": 0.0254,
+METRES = {"m": 1.0, "meter": 1.0, "Å": 1e-10, "angstrom": 1e-10, "micron": 1e-6, "inch": 0.0254}
+METRES |= {
+    prefix + ("m" if len(prefix) == 1 else "meter"): float(f"1e{power}")
+    for prefix, power in _POWERS.items()
 }
 
 

@@ -4,9 +4,11 @@ Range checks that are written so that NaN fails them then refuse it, in the word
 asked for it.
 """
 
+import difflib
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -58,18 +60,50 @@ def as_flag(value: Any, name: str) -> bool:
     raise InvalidArgumentTypeError(f"{name} must be True or False; got {value!r}")
 
 
-def one_of(value: Any, name: str, names: Sequence[str]) -> str:
-    """Return a text that is one of some.
+@dataclass(frozen=True)
+class Number:
+    """A check of a number from ``low`` to ``high``, finite; without these if ``open_ended``.
+
+    ``wanted`` says so in an error. ``whole``: whether it is a whole number; ``none``: whether None
+    passes.
+    """
+
+    wanted: str
+    low: float = 0.0
+    high: float = math.inf
+    whole: bool = False
+    open_ended: bool = False
+    name: str = ""
+    none: bool = False
+
+    def __call__(self, value: Any) -> Any:
+        """Return a value as a float or an int; raises InvalidArgumentError."""
+        if self.none and value is None:
+            return None
+        number = as_whole(value) if self.whole else as_number(value)
+        inside = self.low < number if self.open_ended else self.low <= number
+        below = (
+            number < self.high if self.open_ended or self.high == math.inf else number <= self.high
+        )
+        if not (inside and below):
+            raise not_taken(value)(f"{self.name} must be {self.wanted}; got {value!r}")
+        return int(number) if self.whole else number
+
+
+def one_of(value: Any, name: str, names: Sequence[str], none: bool = False) -> Any:
+    """Return a text that is one of some, or None where ``none`` is true.
 
     Raises InvalidArgumentError if it is not.
     """
-    if isinstance(value, str) and value in names:
+    if (isinstance(value, str) and value in names) or (none and value is None):
         return value
     error = InvalidArgumentError if isinstance(value, str) else InvalidArgumentTypeError
+    near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else ()
+    hint = f": did you mean {near[0]!r}?" if near else ""
     known = f"one of {', '.join(names[:-1])} and {names[-1]}"
     if len(names) == 2:
         known = " or ".join(map(repr, names))
-    raise error(f"{name} must be {known}; got {value!r}")
+    raise error(f"{name} must be {known}; got {value!r}{hint}")
 
 
 def check_callback(function: Any, name: str = "progress") -> None:

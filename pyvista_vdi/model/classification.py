@@ -1,36 +1,51 @@
 """The classification arguments: ``Plotter.add_volume``'s, or what may stand in their place."""
 
-import difflib
-import inspect
+from __future__ import annotations
+
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidArgumentError,
+    InvalidArgumentTypeError,
     InvalidVolumeError,
     MissingDependencyError,
     UnsupportedError,
 )
-from pyvista_vdi.model.options import (
-    GenerationOptions,
-    Options,
-    QualityTarget,
-    declared,
-    option,
-    record,
-)
+from pyvista_vdi.model.arguments import refuse_unknown
+from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.options import Options, declared, option, record
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.types import ColorMapLike, OpacityLike, RangeLike, ScalarsLike, VTKObject
+from pyvista_vdi.model.types import (
+    Blending,
+    ColorMapLike,
+    Interpolation,
+    OpacityLike,
+    Preference,
+    RangeLike,
+    ScalarsLike,
+    VTKObject,
+)
 from pyvista_vdi.model.volume import Volume
 
 #: What may become of the scalars along a ray, as ``add_volume`` names it; the first is the default.
-BLENDINGS = ("composite", "maximum", "minimum", "average", "additive")
+BLENDINGS: tuple[Blending, ...] = get_args(Blending)
+
+#: PyVista's other names and VTK's numbers of blending modes.
+_BLENDING_NAMES: dict[Any, str] = dict(enumerate(BLENDINGS)) | {
+    "comp": "composite",
+    "max": "maximum",
+    "min": "minimum",
+    "avg": "average",
+    **{f"{name}_intensity": name for name in ("maximum", "minimum", "average")},
+    **dict.fromkeys(("add", "sum"), "additive"),
+}
 
 #: What may be given in place of the arguments above.
 IN_PLACE = ("volume_property", "transfer_function")
@@ -48,6 +63,14 @@ def range_to_classify(scalars: ScalarsLike | None, clim: RangeLike | None) -> Ra
     return float(np.nanmin(scalars)), float(np.nanmax(scalars))
 
 
+def _blending(mode: Any) -> str:
+    """Return a blending mode, as PyVista's mappers understand names and VTK's numbers."""
+    if not isinstance(mode, str | int):
+        raise InvalidArgumentTypeError(f"blending must be a name; got {mode!r}")
+    name = mode.lower() if isinstance(mode, str) else mode
+    return one_of(str(_BLENDING_NAMES.get(name, name)), "blending", BLENDINGS)
+
+
 class Described(Options):
     """Options of which metadata tell those that are given."""
 
@@ -61,14 +84,22 @@ class Described(Options):
 class ArrayChoice(Described):
     """``add_volume``'s arguments that say which scalars are seen, and how along a ray."""
 
-    scalars: ScalarsLike | None = option(None, "name of an array, or the values")
-    preference: str = option(
-        "point",
-        "which array, where points and cells both have one of that name",
-        choices=("point", "cell"),
+    scalars: ScalarsLike | None = option(
+        None,
+        "name of an array, or the values, per point or per cell",
+        "RGBA as uint8 (n, 4). By default the active ones.",
     )
-    blending: str = option(
-        "composite", "what becomes of the scalars along a ray", choices=BLENDINGS
+    preference: Preference = option(
+        "point", "which array, where points and cells both have one of that name"
+    )
+    blending: Blending = option(
+        "composite",
+        "what becomes of the scalars along a ray",
+        'As in ``add_volume``; a VDI has ``"composite"`` alone. Of the others the greatest or the '
+        "least is classified; or opacity times scalar, which is 0 to 1 over the volume's range, is "
+        "averaged or integrated over opacity unit distances, as a grey value.",
+        check=_blending,
+        takes="Blending | str | int",
     )
 
     def require_composite(self) -> None:
@@ -90,11 +121,21 @@ class Look(Described):
     checked here is refused where a table is built of it.
     """
 
+    elsewhere = (
+        "this VDI's colours are fixed: give it to generate, or generate with "
+        "classification='deferred', which keeps values"
+    )
+
     clim: RangeLike | None = option(
         None, "range of the colour map; that of all values by default", aliases=("rng",)
     )
     n_colors: int = option(256, "entries of the colour map")
-    opacity: OpacityLike = option("linear", "name, one opacity, or opacities")
+    opacity: OpacityLike = option(
+        "linear",
+        "name, one opacity, or opacities",
+        "As in ``add_volume``: an array of length ``n_colors`` is taken as it is, 0 to 255; a "
+        "shorter one is 0 to 1 and interpolated.",
+    )
     cmap: ColorMapLike | None = option(
         None, "colour map; the theme's by default", aliases=("colormap",)
     )
@@ -106,15 +147,20 @@ class Look(Described):
         aliases=("unit_distance",),
     )
     log_scale: bool = option(False, "map values to colours by their logarithm")
-    shade: bool = option(False, "light the volume")
+    shade: bool = option(
+        False,
+        "light the volume",
+        "A shaded VDI has the lights of its generating view: a plotter's, as they stand there, so "
+        "that lights that follow the camera move in the picture when the VDI is regenerated; other "
+        "lights, and another place among lights of the scene, regenerate it.",
+    )
     ambient: float | None = option(None, "ambient light that is reflected, where shaded")
     diffuse: float | None = option(0.7, "diffuse light that is reflected, where shaded")
     specular: float | None = option(0.2, "specular light that is reflected, where shaded")
     specular_power: float | None = option(10.0, "how narrow highlights are, where shaded")
-    interpolation: str = option(
+    interpolation: Interpolation = option(
         "nearest",
         'between voxels; ``add_volume`` draws ``"nearest"``',
-        choices=("nearest", "linear"),
         aliases=("interpolation_type",),
     )
 
@@ -152,7 +198,7 @@ class Classification(Look, ArrayChoice):
     @classmethod
     def composited(
         cls, given: Mapping[str, Any], function: str, others: Sequence[str] = ()
-    ) -> "Classification":
+    ) -> Classification:
         """Return the classification of a VDI by arguments that a function was given.
 
         ``others`` are the function's other keyword arguments: a TypeError for an unknown name
@@ -184,7 +230,7 @@ class Classification(Look, ArrayChoice):
         """Whether a transfer function or a property stands in place of ``add_volume``'s."""
         return any(getattr(self, name) is not None for name in IN_PLACE)
 
-    def changed(self, changes: Mapping[str, Any]) -> "Classification":
+    def changed(self, changes: Mapping[str, Any]) -> Classification:
         """Return these arguments with some of them changed."""
         return replace(self, **changes)
 
@@ -228,51 +274,6 @@ def _checked_transfer_function(table: object) -> TransferFunction:
         "transfer_function must be a pyvista_vdi.TransferFunction; "
         f"got {type(table).__name__}{hint}"
     )
-
-
-#: Names that are not ours, and what is meant: ``add_volume``'s aliases and near misses.
-_MEANT = {
-    "size": "window_size",
-    **{
-        alias: each.name
-        for each in declared(Classification, GenerationOptions, QualityTarget).values()
-        for alias in each.aliases
-    },
-}
-
-
-def refuse_keywords(
-    given: Mapping[str, Any],
-    function: Callable[..., object],
-    called: str | None = None,
-    aliases: Sequence[str] = (),
-) -> None:
-    """Raise TypeError for the first keyword that a function was given and does not know."""
-    if not given:
-        return
-    parameters = inspect.signature(function).parameters.values()
-    named = [each.name for each in parameters if each.kind is not each.VAR_KEYWORD]
-    known = (*aliases, *(name for name in named if name != "self"))
-    refuse_unknown(given, called or function.__name__, known)
-
-
-def refuse_unknown(given: Mapping[str, Any], function: str, known: tuple[str, ...]) -> None:
-    """Raise TypeError for the first argument whose name is not known, and suggest the nearest."""
-    for name in given:
-        if name in known:
-            continue
-        near = difflib.get_close_matches(name, known, n=1)
-        meant = _MEANT.get(name)
-        suggestion = meant if meant in known else near[0] if near else None
-        hint = f"did you mean {suggestion!r}?" if suggestion else f"known are {', '.join(known)}"
-        if name in ("classification", "value_range", "importance"):
-            hint = "values in place of colours are kept by generate, generate_series and InSitu"
-        elif (meant or name) not in known and (meant or name) in (*Look.declared, *IN_PLACE):
-            hint = (
-                "this VDI's colours are fixed: give it to generate, or generate with "
-                "classification='deferred', which keeps values"
-            )
-        raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
 
 
 def _plain(value: Any) -> Any:

@@ -6,13 +6,13 @@ import mmap
 from typing import Any
 
 import numpy as np
+import psutil
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.errors import DeviceMemoryError
 
+#: Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied.
 HOST_ALIGNMENT = 4096
-"""Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied."""
-
 #: Bytes of a huge page; on other processors than x86 it is at least a whole number of pages.
 _HUGE_PAGE = 2**21
 #: Bytes from which lasting arrays have mappings of their own.
@@ -25,33 +25,24 @@ def aligned_empty(
     """Return an uninitialised C-contiguous array that a CPU device can use without a copy.
 
     Its data begin at a multiple of 4096 bytes. ``lasting``: it is made seldom and kept for long, so
-    that memory of its own pays.
+    that memory of its own pays, which Linux may give in huge pages. NumPy asks for them as well,
+    but also where it uses a part of one, which then takes all of it.
     """
-    dtype = np.dtype(dtype)
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
-    nbytes = math.prod(shape) * dtype.itemsize
+    nbytes = math.prod(shape) * np.dtype(dtype).itemsize
     if lasting and nbytes >= _LARGE and hasattr(mmap, "MADV_HUGEPAGE"):
-        raw, start = _in_huge_pages(nbytes)
+        try:
+            memory = mmap.mmap(-1, nbytes + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+        except OSError as exc:
+            raise MemoryError(f"no memory for an array of {nbytes} bytes: {exc}") from exc
+        raw = np.frombuffer(memory, np.uint8)  # holds the mapping
+        start = -raw.ctypes.data % _HUGE_PAGE
+        with contextlib.suppress(OSError):  # a kernel without them
+            memory.madvise(mmap.MADV_HUGEPAGE, start, nbytes // _HUGE_PAGE * _HUGE_PAGE)
     else:
         raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
         start = -raw.ctypes.data % HOST_ALIGNMENT
     return raw[start : start + nbytes].view(dtype).reshape(shape)
-
-
-def _in_huge_pages(nbytes: int) -> tuple[NDArray[np.uint8], int]:
-    """Return memory that Linux may give in huge pages, and where in it to begin; bytes.
-
-    NumPy asks for them as well, but also where it uses a part of one, which then takes all of it.
-    """
-    try:
-        memory = mmap.mmap(-1, nbytes + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    except OSError as exc:
-        raise MemoryError(f"no memory for an array of {nbytes} bytes: {exc}") from exc
-    raw = np.frombuffer(memory, np.uint8)  # holds the mapping
-    start = -raw.ctypes.data % _HUGE_PAGE
-    with contextlib.suppress(OSError):  # a kernel without them
-        memory.madvise(mmap.MADV_HUGEPAGE, start, nbytes // _HUGE_PAGE * _HUGE_PAGE)
-    return raw, start
 
 
 class GrowingArray:
@@ -94,23 +85,13 @@ class GrowingArray:
 
 def physical_memory() -> int:
     """Return the host's memory, bytes."""
-    import psutil  # where it is asked for: importing the package loads little
-
     return int(psutil.virtual_memory().total)
-
-
-def free_memory() -> int:
-    """Return the bytes that can be had without swapping."""
-    import psutil
-
-    return int(psutil.virtual_memory().available)
 
 
 def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
     """Refuse (DeviceMemoryError) what the host cannot hold beside what is running; see below."""
     require_host_memory(nbytes, what, remedy)
-    free = free_memory()
-    if nbytes > free:
+    if nbytes > (free := psutil.virtual_memory().available):
         raise DeviceMemoryError(
             f"{what} needs {nbytes / 2**30:.2f} GiB on the host, of which {free / 2**30:.2f} GiB "
             f"are free: close other programs, or {remedy}"
@@ -122,8 +103,7 @@ def require_host_memory(nbytes: int, what: str, remedy: str) -> None:
 
     ``what`` needs them, and how large it is; ``remedy`` is what the caller can do.
     """
-    available = physical_memory()
-    if nbytes > available:
+    if nbytes > (available := physical_memory()):
         raise DeviceMemoryError(
             f"{what} needs {nbytes / 2**30:.2f} GiB on the host, which has "
             f"{available / 2**30:.2f} GiB: {remedy}"

@@ -1,35 +1,45 @@
 """The options: each declared once, in records that are checked where they are made.
 
 A field that is made by :func:`option` declares an option: its name, type and default as in any
-dataclass, and beside them what it means in a sentence, what it is checked by, its choices and other
-names. The public functions write the same names and defaults out, which ``tests/api/test_options``
-compares; the command line and ParaView's properties are made of :func:`declared`.
+dataclass, and beside them what it means, what it is checked by, its choices and other names. All
+else follows: arguments of functions, their docstrings and stubs (``model/arguments.py``), options
+of the command line, Set and Get of VTK's filters, and ParaView's properties.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Callable, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.model import types
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import (
+    Number,
     as_flag,
-    as_float,
     as_range,
-    as_whole,
     check_callback,
     memory_limit_bytes,
     one_of,
 )
 from pyvista_vdi.model.lighting import Lights
-from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.types import DeviceLike, Metadata, Progress
+from pyvista_vdi.model.types import (
+    Criterion,
+    DeviceLike,
+    Metadata,
+    Precision,
+    Progress,
+    Quality,
+    When,
+)
 from pyvista_vdi.model.volume import Volume
 
 #: Most supersegments that a list may be allowed.
@@ -37,7 +47,7 @@ MAX_SUPERSEGMENTS = 4096
 
 #: What may decide where a list is cut that must be shortened; ``docs/concepts.md`` says what each
 #: means. The first is the default.
-CRITERIA = ("least-error", "homogeneity")
+CRITERIA: tuple[Criterion, ...] = get_args(Criterion)
 
 #: The SSIM that a name asks for. "reference" asks for nothing: it is what is made without a target.
 QUALITIES: dict[str, float | None] = {
@@ -52,51 +62,101 @@ _INDISTINGUISHABLE = 1e-6
 
 _Record = TypeVar("_Record", bound="Options")
 
+#: The records that are declared.
+RECORDS: list[type[Options]] = []
+
 
 @dataclass(frozen=True)
 class Option:
     """An option, as it is declared: an argument's ``name``, its ``default``, ``what`` it means.
 
-    ``what`` is a sentence that begins small and has no full stop. ``check`` returns a value as it
-    is kept, or raises InvalidArgumentError; without one a value is one of the choices, a truth
-    value where the default is one, and else whatever is given. ``choices`` are the texts that are
-    taken, where these are all; ``aliases`` other names by which users may call it; ``standard`` is
-    the default as it is kept.
+    ``what`` is a sentence that begins small and has no full stop, ``more`` are sentences that
+    documentation has behind it. ``kind`` is the type of the argument, as it is written in Python.
+    ``check`` returns a value as it is kept, or raises InvalidArgumentError; without one a value is
+    one of the choices, a truth value where the default is one, and else whatever is given.
+    ``choices`` are the texts that are taken, where these are all; ``aliases`` other names by which
+    users may call it; a ``setting`` is seldom turned, and stands in :class:`Settings`;
+    ``standard`` is the default as it is kept.
     """
 
     name: str
     default: Any
     what: str
+    more: str = ""
+    kind: str = "Any"
     check: Callable[[Any], Any] | None = None
     choices: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
+    setting: bool = False
     standard: Any = None
 
-    def named(self, name: str) -> "Option":
-        """Return it with its name, and with a check that follows from choices and default."""
-        check = self.check
-        if check is None and self.choices:
-            check = partial(one_of, name=name, names=self.choices)
-        elif check is None and isinstance(self.default, bool):
+    def named(self, name: str, kind: str) -> Option:
+        """Return it with its name, its type, and a check that follows from these."""
+        check, kind = self.check, self.kind or kind
+        alias = getattr(types, kind.removesuffix(" | None"), None)
+        choices = get_args(alias) if get_origin(alias) is Literal else ()
+        if isinstance(check, Number):
+            check = replace(check, name=name, none="None" in kind)
+        elif check is None and choices:
+            check = partial(one_of, name=name, names=choices, none="None" in kind)
+        elif check is None and isinstance(self.default, bool) and kind == "bool":
             check = partial(as_flag, name=name)
         standard = self.default if check is None else check(self.default)
-        return replace(self, name=name, check=check, standard=standard)
+        told: dict[str, Any] = {
+            "kind": kind,
+            "check": check,
+            "choices": choices,
+            "standard": standard,
+        }
+        return replace(self, name=name, **told)
+
+    @property
+    def entry(self) -> tuple[str, str]:
+        """Type and text in a docstring."""
+        words = [_WORDS.get(part, part) for part in self.kind.split(" | ") if part != "None"]
+        said = "{" + ", ".join(f'"{each}"' for each in self.choices) + "}" * bool(self.choices)
+        said = said if self.choices else " or ".join(words)
+        optional = ", optional" if self.default is None and "None" in self.kind else ""
+        return said + optional, f"{self.what[0].upper()}{self.what[1:]}. {self.more}".rstrip()
+
+
+#: What documentation calls the types of ``model/types.py``.
+_WORDS = {
+    "ArrayLike": "array_like of float",
+    "Blending": '{"composite", "maximum", "minimum", "average", "additive"}',
+    "CameraLike": "pyvista.Camera or vtkCamera or Camera",
+    "ColorMapLike": "str, list, matplotlib colour map or pyvista.LookupTable",
+    "CroppingLike": "Cropping or vtkVolumeMapper or sequence of six numbers or pair",
+    "DeviceLike": "str or int",
+    "LightsLike": "renderer, or sequence of Light, vtkLight or pyvista.Light",
+    "MatrixLike": "array_like, shape (4, 4)",
+    "MemoryLike": "int, float or str",
+    "OcclusionLike": "bool, float or AmbientOcclusion",
+    "OpacityLike": "str or float or array_like",
+    "Policy": '{"auto", "never"} or callable',
+    "RangeLike": "float or (float, float)",
+    "ScalarsLike": "str or numpy.ndarray",
+    "VolumeLike": "pyvista.DataSet, Volume, path",
+    "VTKObject": "vtkVolumeProperty",
+}
 
 
 def option(
     default: Any,
     what: str,
-    check: Callable[[Any], Any] | None = None,
+    more: str = "",
     *,
-    choices: Sequence[str] = (),
+    check: Callable[[Any], Any] | None = None,
+    takes: str = "",
     aliases: Sequence[str] = (),
+    setting: bool = False,
 ) -> Any:
-    """Declare an option as a field of a record."""
-    told = Option("", default, what, check, tuple(choices), tuple(aliases))
+    """Declare an option as a field of a record; it ``takes`` a type, by default the field's."""
+    told = Option("", default, what, more, takes, check, (), tuple(aliases), setting)
     return field(default=default, metadata={"option": told})
 
 
-def declared(*records: "type[Options]") -> dict[str, Option]:
+def declared(*records: type[Options]) -> dict[str, Option]:
     """Return the options that some records declare, by their names."""
     return {name: told for record in records for name, told in record.declared.items()}
 
@@ -107,6 +167,8 @@ class Options:
 
     #: The options, by their names.
     declared: ClassVar[Mapping[str, Option]] = {}
+    #: What is said of one where it is not taken.
+    elsewhere: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for name, told in self.declared.items():
@@ -142,70 +204,37 @@ class Options:
 
 def record(cls: type[_Record]) -> type[_Record]:
     """Gather the options that a record's fields declare; for classes, above ``@dataclass``."""
-    told = {each.name: each.metadata.get("option") for each in fields(cls)}
-    cls.declared = {name: each.named(name) for name, each in told.items() if each}
+    told = {each.name: (each.metadata.get("option"), str(each.type)) for each in fields(cls)}
+    cls.declared = {name: each.named(name, kind) for name, (each, kind) in told.items() if each}
+    RECORDS.append(cls)
+    listed = "".join(["\n\n    Attributes\n    ----------\n", *entries(cls.declared.values())])
+    about, raises, tail = (cls.__doc__ or "").partition("\n    Raises\n")
+    cls.__doc__ = about.rstrip() + listed + raises + tail
     return cls
 
 
-def check_max_supersegments(max_supersegments: Any) -> int:
-    """Return ``max_supersegments`` as an int between 1 and :data:`MAX_SUPERSEGMENTS`."""
-    limit = as_whole(max_supersegments)
-    if not 1 <= limit <= MAX_SUPERSEGMENTS:
-        raise InvalidArgumentError(
-            f"max_supersegments must be a whole number from 1 to {MAX_SUPERSEGMENTS}; "
-            f"got {max_supersegments!r}"
+def entries(options: Iterable[Option], indent: int = 4) -> Iterator[str]:
+    """Yield what documentation has of options, as numpydoc's parameters or attributes."""
+    margin = " " * indent
+    for each in options:
+        kind, text = each.entry
+        yield f"{margin}{each.name} : {kind}\n"
+        yield (
+            textwrap.fill(
+                text,
+                100,
+                initial_indent=margin + "    ",
+                subsequent_indent=margin + "    ",
+                break_long_words=False,
+            )
+            + "\n"
         )
-    return int(limit)
-
-
-def _tolerance(tolerance: Any) -> float:
-    difference = as_float(tolerance)
-    if not 0 <= difference < np.inf:
-        raise InvalidArgumentError(f"tolerance must be a number >= 0; got {tolerance!r}")
-    return difference
-
-
-def _view_cone(view_cone: Any) -> float:
-    angle = as_float(view_cone)
-    if not 0 <= angle <= 90:
-        raise InvalidArgumentError(
-            f"view_cone must be an angle between 0 and 90 degrees; got {view_cone!r}"
-        )
-    return angle
-
-
-def _within(name: str, high: float, what: str) -> Callable[[Any], float | None]:
-    """Return a check of a number above 0 and below another; ``None`` passes."""
-
-    def check(value: Any) -> float | None:
-        number = as_float(value)
-        if value is not None and (isinstance(value, bool) or not 0 < number < high):
-            raise InvalidArgumentError(f"{name} must be {what}; got {value!r}")
-        return None if value is None else number
-
-    return check
 
 
 @record
 @dataclass(frozen=True)
 class MediumOptions(Options):
     """How a classified volume is sampled: what generation and volume rendering both need.
-
-    Attributes
-    ----------
-    sample_distance : float, optional
-        Length of a step along a ray, model units; half the smallest spacing by default. What a
-        volume allows is checked with the volume.
-    lights : Lights
-        What a shaded volume is lit by; one headlight by default. Whatever
-        :meth:`Lights.from_any` takes may be given.
-    ambient_occlusion : AmbientOcclusion, optional
-        Darkens what is hidden from the light around it; whatever
-        :meth:`AmbientOcclusion.from_any` takes may be given.
-    memory_limit : int, optional
-        Most bytes to take on the device, or a text such as ``"2 GiB"``; by default what the device
-        has. A volume that does not fit goes there brick by brick, which takes more time and
-        changes no bit.
 
     Raises
     ------
@@ -214,13 +243,37 @@ class MediumOptions(Options):
     """
 
     sample_distance: float | None = option(
-        None, "length of a step along a ray, model units", aliases=("step",)
+        None,
+        "length of a step along a ray, model units; half the smallest spacing by default",
+        aliases=("step",),
+        setting=True,
     )
-    lights: Lights = option(None, "what a shaded volume is lit by", Lights.from_any)
+    lights: Lights = option(
+        None,
+        "what a shaded volume is lit by; one headlight by default, which is VTK's",
+        "PyVista's plotters have a light kit: pass ``plotter.renderer`` for its lights. A VDI has "
+        "them in its colours as they stand at its generating view.",
+        check=Lights.from_any,
+        takes="LightsLike | None",
+    )
     ambient_occlusion: AmbientOcclusion | None = option(
-        None, "darken what is hidden from the light around it", AmbientOcclusion.from_any
+        None,
+        "darken what is hidden from the light around it",
+        "``True``, or the radius up to which something hides, model units. It is the same from "
+        "every view.",
+        check=AmbientOcclusion.from_any,
+        takes="OcclusionLike | None",
     )
-    memory_limit: int | None = option(None, "most memory to take on the device", memory_limit_bytes)
+    memory_limit: int | None = option(
+        None,
+        "most memory to take on the device",
+        'Bytes, or a text such as ``"2 GiB"``; by default what the device has. A volume that does '
+        "not fit goes there brick by brick: that takes more time, and changes no bit. Of a chunked "
+        'volume blocks are smaller. See docs/performance.md, "Larger than memory".',
+        check=memory_limit_bytes,
+        takes="MemoryLike | None",
+        setting=True,
+    )
 
     def occlusion_bytes(self, volume: Volume) -> int:
         """Return what the grid of the ambient occlusion takes on the device, bytes."""
@@ -234,51 +287,55 @@ class MediumOptions(Options):
 class GenerationOptions(MediumOptions):
     """How a VDI is made.
 
-    Attributes
-    ----------
-    max_supersegments : int
-        Longest list, 1 to 4096; never exceeded, and nothing that is not transparent is dropped.
-    criterion : {"least-error", "homogeneity"}
-        What decides where a list that must be shortened is cut. ``"least-error"``: neighbours are
-        merged where the error is least. ``"homogeneity"`` (the paper's, after Frey et al. 2013): a
-        supersegment goes on while the medium is like its mean so far, by the least threshold that
-        keeps the budget on this ray. It records up to 512 runs of a ray before unlike ones are
-        merged, which takes more time and, in wide windows, memory. By both, neighbours within
-        ``tolerance`` are merged.
-    tolerance : float
-        Neighbours are merged even under budget where this changes (opacity-weighted colour,
-        opacity) per voxel, in the root of the sum of squares along the ray, by no more than this.
-        0 merges only what is homogeneous.
-    view_cone : float
-        Half angle in degrees, 0 to 90, of the cone of views that must be served: what V_O cannot
-        see at all counts ``1 - cos(view_cone)`` as much as what it sees when neighbours are merged
-        by least error or within ``tolerance``. ``"homogeneity"`` cuts without regard to it.
-    precision : {"exact", "8-byte"}
-        What a supersegment takes; see :meth:`VDI.with_precision`.
-    sample_distance, lights, ambient_occlusion, memory_limit
-        As for :class:`MediumOptions`. The light is baked into the colours: it stays as it is where
-        V_O has it. So is the occlusion, which is the same from every view.
-
     Raises
     ------
     InvalidArgumentError
         If a value is out of range.
     """
 
-    # A new field goes behind the others: the public functions give them by their order
     max_supersegments: int = option(
-        20, "longest list, 1 to 4096", check_max_supersegments, aliases=("n_supersegments",)
+        20,
+        f"longest list, 1 to {MAX_SUPERSEGMENTS}",
+        "A promise: never exceeded, and nothing that is not transparent is dropped for it.",
+        check=Number(
+            f"a whole number from 1 to {MAX_SUPERSEGMENTS}", 1, MAX_SUPERSEGMENTS, whole=True
+        ),
+        aliases=("n_supersegments",),
     )
-    criterion: str = option(
+    criterion: Criterion = option(
         "least-error",
         "what decides where a list that must be shortened is cut",
-        choices=CRITERIA,
+        '``"least-error"``: neighbours are merged where the error is least. ``"homogeneity"`` (the '
+        "paper's, after Frey et al. 2013): a supersegment goes on while the medium is like its "
+        "mean so far, by the least threshold that keeps the budget on this ray. It records up to "
+        "512 runs of a ray before unlike ones are merged, which takes more time and, in wide "
+        "windows, memory. By both, neighbours within ``tolerance`` are merged.",
+        setting=True,
     )
-    tolerance: float = option(0.0, "error that may be traded for shorter lists", _tolerance)
+    tolerance: float = option(
+        0.0,
+        "error that may be traded for shorter lists",
+        "Neighbours are merged even under budget where this changes (opacity-weighted colour, "
+        "opacity) per voxel, in the root of the sum of squares along the ray, by no more than "
+        "this. 0 merges only what is homogeneous.",
+        check=Number("a number >= 0"),
+        setting=True,
+    )
     view_cone: float = option(
-        60.0, "half angle of the cone of new views that must be served, degrees", _view_cone
+        60.0,
+        "half angle of the cone of new views that must be served, degrees",
+        "The wider, the more of the budget goes to what the generating view cannot see: hidden "
+        "completely, that counts ``1 - cos(view_cone)`` as much as what is seen when neighbours "
+        'are merged by least error or within ``tolerance``. ``"homogeneity"`` cuts without regard '
+        "to it.",
+        check=Number("an angle between 0 and 90 degrees", 0, 90),
+        setting=True,
     )
-    precision: str = option("exact", "what a supersegment takes", choices=PRECISIONS)
+    precision: Precision = option(
+        "exact",
+        "what a supersegment takes",
+        "On devices and in files: see :meth:`VDI.with_precision`.",
+    )
 
     @property
     def hidden_weight(self) -> float:
@@ -297,28 +354,37 @@ class GenerationOptions(MediumOptions):
 class Deferral(Options):
     """When scalars are classified, and what is kept of them until then: docs/deferred.md.
 
-    Attributes
-    ----------
-    classification : {"baked", "deferred"}
-        When scalars are classified: as the VDI is made, or by whoever shows it.
-    value_range : (float, float), optional
-        Least and largest scalar to keep; all by default.
-    importance : array_like of float, optional
-        Weights over the range, or points (scalar, weight), by which errors count; 1 by default.
-
     Raises
     ------
     InvalidArgumentError
         If a range or an importance is given and nothing is deferred.
     """
 
-    classification: str = option(
+    elsewhere = "values in place of colours are kept by generate, generate_series and InSitu"
+
+    classification: When = option(
         "baked",
         "when scalars are classified: as the VDI is made, or by whoever shows it",
-        choices=("baked", "deferred"),
+        "A deferred one keeps values in place of colours, is a :class:`DeferredVDI`, and "
+        "``classified(cmap=..., opacity=...)`` makes a VDI of it, without the volume: "
+        "docs/deferred.md. Of the look it takes ``interpolation`` only. In a plotter, "
+        "``actor.prop`` and its lookup table classify it: what is changed there is seen in the "
+        "next frame, and nothing is generated again.",
     )
-    value_range: Any = option(None, "least and largest scalar to keep, where deferred")
-    importance: Any = option(None, "how much errors count over the range, where deferred")
+    value_range: Any = option(
+        None,
+        "least and largest scalar to keep, where deferred",
+        "All by default. What is outside is empty.",
+        takes="RangeLike | None",
+    )
+    importance: Any = option(
+        None,
+        "how much errors count over the range, where deferred",
+        "Points (scalar, weight), or weights at equal distances over ``value_range``; 1 by "
+        "default. Scalars of weight 0 are empty.",
+        takes="ArrayLike | None",
+        setting=True,
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -339,7 +405,7 @@ class Deferral(Options):
         """Whether values are kept."""
         return self.classification == "deferred"
 
-    def refuse_target(self, target: "QualityTarget") -> None:
+    def refuse_target(self, target: QualityTarget) -> None:
         """Refuse, where values are kept, a target by which settings would be chosen."""
         if self.deferred and target:
             raise UnsupportedError(
@@ -353,48 +419,48 @@ class Deferral(Options):
 class QualityTarget(Options):
     """What is asked of a VDI in place of settings, which are chosen to reach it: docs/dial.md.
 
-    Attributes
-    ----------
-    quality : {"reference", "high", "balanced", "fast"}, optional
-        A name for an SSIM; ``"reference"`` asks for nothing.
-    target_ssim : float, optional
-        Goal: SSIM of a picture at ``target_angle`` against volume rendering.
-    target_fps : float, optional
-        Limit: frames per second of full frames, at least.
-    max_bytes : int, optional
-        Limit: bytes of the VDI on the device.
-    target_angle : float
-        Degrees from V_O.
-
     Raises
     ------
     InvalidArgumentError
         If one is out of range, or they contradict each other.
     """
 
-    quality: str | None = option(
+    quality: Quality | None = option(
         None,
         "choose the settings by how good pictures are to be",
-        lambda name: name if name is None else one_of(name, "quality", tuple(QUALITIES)),
-        choices=tuple(QUALITIES),
+        "An SSIM of 0.98, 0.96 or 0.93 against volume rendering, and with the first two no squares "
+        'of lists. ``"reference"`` is what is made where nothing is given. This and the other '
+        "targets have the scene measured on the device, once, and then choose the lists of the "
+        "window, ``max_supersegments`` and ``precision``, so that these and ``tolerance`` cannot "
+        "be given as well. ``window_size`` is then that of the pictures, and the VDI's own may be "
+        'smaller or larger. ``vdi.metadata["dial"]``, or ``actor.status.dial``, says what was '
+        "chosen and what it is predicted to give; docs/dial.md, how well.",
     )
     target_ssim: float | None = option(
-        None, "the same by a number, 0 to 1", _within("target_ssim", 1, "an SSIM between 0 and 1")
-    )
-    target_fps: float | None = option(
         None,
-        "least full frames per second",
-        _within("target_fps", math.inf, "frames per second above 0"),
+        "the same by a number, 0 to 1",
+        "In place of ``quality``: SSIM at ``target_angle`` against volume rendering.",
+        check=Number("an SSIM between 0 and 1", 0, 1, open_ended=True),
+    )
+    full_fps: float | None = option(
+        None,
+        "least rate of still frames, per second",
+        "Predicted for this device. Goes before quality.",
+        check=Number("frames per second above 0", open_ended=True),
     )
     max_bytes: int | None = option(
         None,
         "most bytes of the VDI on the device",
-        _within("max_bytes", math.inf, "a number of bytes above 0"),
+        "Not of files. Goes before all others. Limits without a quality give the best that is "
+        "within them.",
+        check=Number("a number of bytes above 0", open_ended=True),
+        takes="float | None",
     )
     target_angle: float = option(
         30.0,
         "degrees by which the view is turned from V_O for which the SSIM is predicted",
-        _within("target_angle", 180, "an angle between 0 and 180 degrees"),
+        check=Number("an angle between 0 and 180 degrees", 0, 180, open_ended=True),
+        setting=True,
     )
 
     def __post_init__(self) -> None:
@@ -406,9 +472,9 @@ class QualityTarget(Options):
         super().__post_init__()
         if self.max_bytes is not None:
             object.__setattr__(self, "max_bytes", int(self.max_bytes))
-        if self.quality == "reference" and (self.target_fps, self.max_bytes) != (None, None):
+        if self.quality == "reference" and (self.full_fps, self.max_bytes) != (None, None):
             raise InvalidArgumentError(
-                "quality='reference' is what is made without a dial, so that target_fps and "
+                "quality='reference' is what is made without a dial, so that full_fps and "
                 "max_bytes have nothing to choose: leave them out, or ask for 'high'"
             )
 
@@ -419,7 +485,7 @@ class QualityTarget(Options):
 
     def __bool__(self) -> bool:
         """Whether anything is asked for, so that settings are to be chosen."""
-        return (self.ssim, self.target_fps, self.max_bytes) != (None, None, None)
+        return (self.ssim, self.full_fps, self.max_bytes) != (None, None, None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what was asked for, by the names of the arguments."""
@@ -474,6 +540,6 @@ class GenerationRequest:
         object.__setattr__(self, "camera", Camera.from_any(self.camera))
         object.__setattr__(self, "window_size", check_window_size(self.window_size))
 
-    def replace(self, **changes: Any) -> "GenerationRequest":
+    def replace(self, **changes: Any) -> GenerationRequest:
         """Return the same request but for some of its fields."""
         return replace(self, **changes)

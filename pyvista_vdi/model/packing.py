@@ -6,7 +6,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.host_memory import aligned_empty
 
 #: What a supersegment takes: 24 bytes as it was made, or less.
-PRECISIONS = ("exact", "8-byte")
+Precision: TypeAlias = Literal["exact", "8-byte"]
+PRECISIONS: tuple[Precision, ...] = get_args(Precision)
 
 #: Largest code of a depth in a list, 14 bits: those of ``opencl/raycasting/supersegments.cl``, as
 #: are the colours' steps and the optical depths' base.

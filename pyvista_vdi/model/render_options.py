@@ -4,19 +4,20 @@ One record goes from the public functions, from VTK's mapper and from the measur
 kernels. It is checked once, where it is made.
 """
 
-import math
-from collections.abc import Callable
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_whole
+from pyvista_vdi.model.checks import Number
 from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
 from pyvista_vdi.model.options import Options, option, record
+from pyvista_vdi.model.types import Coverage, Draw, Policy
 
 #: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
 #: more than that.
@@ -49,61 +50,75 @@ def checked_planes(planes: Any) -> Planes:
     return tuple(map(tuple, table.tolist()))
 
 
-def checked_preview_samples(samples: Any) -> int | None:
-    """Return a number of samples per ray as an int between 1 and :data:`MAX_PREVIEW_SAMPLES`."""
-    if samples is None:
-        return None
-    number = as_whole(samples)
-    if not 1 <= number <= MAX_PREVIEW_SAMPLES:
-        raise InvalidArgumentError(
-            f"preview_samples must be a whole number from 1 to {MAX_PREVIEW_SAMPLES}; "
-            f"got {samples!r}"
-        )
-    return int(number)
-
-
-def checked_transmittance_cutoff(cutoff: Any) -> float:
-    """Return a transmittance at which rays end, as a float from 0 to below 1."""
-    number = as_float(cutoff)
-    if not 0 <= number < 1:
-        raise InvalidArgumentError(
-            "transmittance_cutoff must be a number from 0 to below 1, such as 0.004 for a "
-            f"difference of 1/255 at most; got {cutoff!r}"
-        )
-    return number
+_RATE = Number("a number of frames per second, 0 or above")
 
 
 @record
 @dataclass(frozen=True)
-class RenderOptions(Options):
-    """How a VDI, or a volume, is drawn; the public functions' arguments of these names.
-
-    Options that compare equal give the same picture of the same view. Clipping planes are held as
-    tuples; the side of each to which its normal points is kept.
-    """
+class SceneOptions(Options):
+    """What of a VDI, or of a volume, is drawn, and how dense it is."""
 
     clipping_planes: Any = option(
-        None, "origin and normal of each plane, world coordinates", checked_planes
+        None,
+        "origin and normal of each plane, world coordinates",
+        "Shape (k, 6); the side that the normal points to is kept, as with VTK's mappers.",
+        check=checked_planes,
+        takes="ArrayLike | None",
     )
     cropping: Any = option(
-        None, "which of 27 regions of the data's own coordinates are drawn", Cropping.from_any
+        None,
+        "which of 27 regions of the data's own coordinates are drawn",
+        "As in ``vtkVolumeMapper``: a :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, "
+        "z_low and z_high of a box, or a pair of those planes and the regions (flags, or "
+        '``"fence"``, ``"cross"`` ...).',
+        check=Cropping.from_any,
+        takes="CroppingLike | None",
     )
     opacity_multiplier: float = option(
-        1.0, "factor of the extinction, 0 or above", checked_opacity_multiplier
-    )
-    skip_empty: bool = option(True, "pass by what is empty")
-    preview_samples: int | None = option(
-        None, "look a VDI up at so many points of each ray", checked_preview_samples
-    )
-    transmittance_cutoff: float = option(
-        None,
-        "a ray ends where less light than this is left",
-        lambda cutoff: checked_transmittance_cutoff(
-            TRANSMITTANCE_CUTOFF if cutoff is None else cutoff
-        ),
+        1.0,
+        "factor of the extinction, 0 or above",
+        "2 is twice as dense. For what is not opaque it is the same as dividing the opacity unit "
+        "distance by it.",
+        check=checked_opacity_multiplier,
     )
 
-    def replace(self, **changes: Any) -> "RenderOptions":
+    def drawn(self) -> RenderOptions:
+        """Return how it is drawn where nothing else is said."""
+        return RenderOptions(**{name: getattr(self, name) for name in self.declared})
+
+
+@record
+@dataclass(frozen=True)
+class RenderOptions(SceneOptions):
+    """How a VDI, or a volume, is drawn.
+
+    Options that compare equal give the same picture of the same view.
+    """
+
+    preview_samples: int | None = option(
+        None,
+        "look a VDI up at so many points of each ray",
+        "In place of intersecting its supersegments: an approximation (paper section 5). A smaller "
+        "``window_size`` is the better one: see docs/decisions/previews.md. For a single VDI only.",
+        check=Number(
+            f"a whole number from 1 to {MAX_PREVIEW_SAMPLES}", 1, MAX_PREVIEW_SAMPLES, whole=True
+        ),
+    )
+    transmittance_cutoff: float = option(
+        TRANSMITTANCE_CUTOFF,
+        "a ray ends where less light than this is left, 0 to below 1",
+        "No channel loses more than that: 0.004 changes a picture of 8 bits by one step at most, "
+        "and saves a fifth to two fifths of the work where things are opaque. For a single VDI "
+        "only.",
+        check=Number(
+            "a number from 0 to below 1, such as 0.004 for a difference of 1/255 at most",
+            high=np.nextafter(1.0, 0.0),
+        ),
+        setting=True,
+    )
+    skip_empty: bool = True
+
+    def replace(self, **changes: Any) -> RenderOptions:
         """Return the same options but for some of them."""
         return replace(self, **changes)
 
@@ -136,23 +151,14 @@ class FrameRequest:
                 f"out must be float32 of the image's shape {shape}; got {out.dtype}, {out.shape}"
             )
 
-    def replace(self, **changes: Any) -> "FrameRequest":
+    def replace(self, **changes: Any) -> FrameRequest:
         """Return the same request but for some of its fields."""
         return replace(self, **changes)
 
 
-#: When a view gets a VDI of its own; a function gets the actor's status.
-Policy: TypeAlias = Literal["auto", "never"] | Callable[[Any], object]
-
-
 def checked_rate(name: str, value: Any) -> float:
     """Return a rate in frames per second; 0 or above, finite."""
-    rate = as_float(value)
-    if isinstance(value, bool) or not 0 <= rate < math.inf:
-        raise InvalidArgumentError(
-            f"{name} must be a number of frames per second, 0 or above; got {value!r}"
-        )
-    return rate
+    return replace(_RATE, name=name)(value)  # type: ignore[no-any-return]
 
 
 def checked_policy(policy: Any) -> Policy:
@@ -165,42 +171,68 @@ def checked_policy(policy: Any) -> Policy:
     )
 
 
-def checked_bound(ssim: Any) -> float:
-    """Return an SSIM between 0 and 1."""
-    bound = as_float(ssim)
-    if isinstance(ssim, bool) or not 0 <= bound <= 1:
-        raise InvalidArgumentError(
-            f"regenerate_below must be an SSIM between 0 and 1; got {ssim!r}"
-        )
-    return bound
-
-
-def checked_draw(draw: Any) -> Literal["auto", "vdi", "volume"]:
-    """Return what is drawn, ``"auto"``, ``"vdi"`` or ``"volume"``; refuse anything else."""
-    if draw in ("auto", "vdi", "volume"):
-        return draw  # type: ignore[no-any-return]
-    raise InvalidArgumentError(f"draw must be 'auto', 'vdi' or 'volume'; got {draw!r}")
-
-
 @record
 @dataclass(frozen=True)
 class DrawingOptions(Options):
-    """How frames are drawn, with the names and defaults of :meth:`AddVDI.__call__`."""
+    """How frames are drawn."""
+
+    elsewhere = "it is of add_vdi, how it draws; the least rate of still frames is full_fps"
 
     target_fps: float | None = option(
         30.0,
         "frames per second to be kept while the view moves",
-        lambda rate: None if rate is None else checked_rate("target_fps", rate),
+        "By drawing fewer pixels. ``None``: the interactor's ``DesiredUpdateRate``, as for VTK's "
+        "own levels of detail; 0: every frame is full.",
+        check=_RATE,
     )
     adjust_multi_samples: bool = option(
-        True, "go without multisampling while the view moves and frames would be late"
+        True,
+        "go without multisampling while the view moves and frames would be late",
+        "It smooths the edges of meshes. At rest, and in pictures that are kept, it is as the "
+        "plotter has it.",
+        setting=True,
     )
-    regenerate: Policy = option("auto", "when a view gets a VDI of its own", checked_policy)
+    regenerate: Policy = option(
+        "auto",
+        "when a view gets a VDI of its own",
+        '``"auto"``: where the estimated SSIM of its picture against volume rendering is below '
+        "``regenerate_below``; in windows on the screen only, and a VDI without its volume says "
+        "once that it is seen from where it does not serve. A callable gets ``actor.status`` once "
+        "per frame and returns whether to regenerate; it is asked off-screen, too, and the VDI is "
+        'then made before the frame. ``"never"``: only ``actor.regenerate()``. Changed data and '
+        "transfer functions are always made anew.",
+        check=checked_policy,
+    )
     regenerate_below: float | None = option(
         None,
         "estimated SSIM, 0 to 1, below which a VDI does not do for a view",
-        lambda ssim: None if ssim is None else checked_bound(ssim),
+        '``regenerate="auto"`` makes another, by default below 0.95 (while the view moves, twice '
+        'the error is borne), and ``draw="auto"`` draws the volume in its place, by default below '
+        "0.98 or without the detail of the picture's pixels.",
+        check=Number("an SSIM between 0 and 1", 0, 1),
+        setting=True,
     )
-    draw: Literal["auto", "vdi", "volume"] = option(
-        "auto", "what is raycast where the volume is at hand", checked_draw
+    draw: Draw = option(
+        "auto",
+        "what is raycast where the volume is at hand",
+        '``"auto"``: in windows on the screen, each frame by what is expected to give the better '
+        "picture within ``target_fps``, the VDI near its generating view and the volume far from "
+        "it; at rest by what is there sooner, where the VDI does. Off-screen the volume, until so "
+        "many pictures of nearly the same view are taken that a VDI costs less, and then that "
+        'where it does; never by measured time. ``"vdi"``: always the VDI. ``"volume"``: always '
+        "the volume, by :func:`pyvista_vdi.render_volume`'s kernel, right from every view. Volumes "
+        "that overlap are drawn by VDIs. ``actor.status.drawn`` says what was.",
     )
+    coverage: Coverage = option(
+        "bounds",
+        "what the VDI's window covers",
+        '``"bounds"``: the whole volume, so that neither panning nor zooming out shows a cut edge. '
+        '``"view"``: the window.',
+        setting=True,
+    )
+
+
+# Checks of VTK's setters of the same
+checked_bound: Any = DrawingOptions.declared["regenerate_below"].check
+checked_draw: Any = DrawingOptions.declared["draw"].check
+checked_transmittance_cutoff: Any = RenderOptions.declared["transmittance_cutoff"].check

@@ -7,14 +7,18 @@ neither.
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Union
 
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+from pyvista_vdi.model.packing import Precision as Precision
 
 if TYPE_CHECKING:
     import os
 
     from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
     from pyvista_vdi.model.camera import Camera
+    from pyvista_vdi.model.collection import VDICollection
     from pyvista_vdi.model.cropping import Cropping
+    from pyvista_vdi.model.deferred import DeferredVDI
     from pyvista_vdi.model.lighting import Light, Lights
     from pyvista_vdi.model.vdi import VDI
     from pyvista_vdi.model.volume import Volume
@@ -58,6 +62,10 @@ Progress: TypeAlias = Callable[[float], object]
 VolumeLike: TypeAlias = Union["Volume", VTKObject, str, "os.PathLike[str]"]
 CameraLike: TypeAlias = Union["Camera", VTKObject, Sequence[ArrayLike]]
 VDILike: TypeAlias = Union["VDI", VTKObject]
+#: What is shown for one VDI: of a set that which is nearest to the view.
+ShownLike: TypeAlias = Union[VDILike, "VDICollection", "DeferredVDI"]
+#: What a plotter shows: a volume, or what is made of one already.
+AnyVolume: TypeAlias = VolumeLike | NDArray[Any] | ShownLike
 LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]
 CroppingLike: TypeAlias = Union["Cropping", VTKObject, Sequence[float], Sequence[object]]
 OcclusionLike: TypeAlias = Union[bool, float, "AmbientOcclusion"]
@@ -79,10 +87,14 @@ RangeLike: TypeAlias = ArrayLike
 MatrixLike: TypeAlias = ArrayLike | VTKObject
 
 Criterion: TypeAlias = Literal["least-error", "homogeneity"]
-Precision: TypeAlias = Literal["exact", "8-byte"]
 Quality: TypeAlias = Literal["reference", "high", "balanced", "fast"]
 Preference: TypeAlias = Literal["point", "cell"]
 Interpolation: TypeAlias = Literal["nearest", "linear"]
 Coverage: TypeAlias = Literal["bounds", "view"]
 Draw: TypeAlias = Literal["auto", "vdi", "volume"]
+#: When scalars are classified.
+When: TypeAlias = Literal["baked", "deferred"]
+Blending: TypeAlias = Literal["composite", "maximum", "minimum", "average", "additive"]
+#: When a view gets a VDI of its own; a function gets the actor's status.
+Policy: TypeAlias = Literal["auto", "never"] | Callable[[Any], object]
 Metadata: TypeAlias = Mapping[str, Any]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import cycle
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, get_type_hints
 
 import numpy as np
 import pyvista as pv
+from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
@@ -20,13 +21,15 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
+    Option,
     Options,
     QualityTarget,
+    declared,
     option,
     record,
 )
 from pyvista_vdi.model.render_options import DrawingOptions
-from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
+from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike, VolumeLike
 from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
@@ -42,6 +45,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_imag
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
+from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
 
 #: What ``add_actor`` understands as culling, besides nothing.
 _CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
@@ -73,17 +77,56 @@ def _culling(given: Any) -> str | bool:
 class Placement(Options):
     """Where an actor is put in a plotter, and what is shown beside it."""
 
-    name: str | None = option(None, "of the actor")
-    culling: str | bool = option(False, "of faces, which a volume has none of", _culling)
-    reset_camera: bool | None = option(None, "whether the view is reset")
-    pickable: bool = option(True, "whether it can be picked")
-    render: bool | None = option(True, "whether the plotter renders at once")
-    user_matrix: MatrixLike | None = option(None, "places the actor in the world")
-    scalar_bar_args: Mapping[str, Any] = option(None, "of the scalar bar", _scalar_bar_args)
-    show_scalar_bar: bool | None = option(None, "whether there is a scalar bar")
-    status: bool = option(False, "show ``actor.status`` in the upper left corner")
+    reset_camera: bool | None = option(None, "whether the view is reset, as in ``add_volume``")
+    name: str | None = option(None, "of the actor; another of this name is replaced")
+    culling: bool | str = option(False, "of faces, which a volume has none of", check=_culling)
     multi_colors: bool = option(
         False, "give each block of a ``MultiBlock`` a colour map of its own"
+    )
+    scalar_bar_args: Mapping[str, Any] = option(
+        None,
+        "of the scalar bar, as in ``add_volume``",
+        check=_scalar_bar_args,
+        takes="dict[str, Any] | None",
+    )
+    show_scalar_bar: bool | None = option(None, "whether there is a scalar bar; as the theme says")
+    pickable: Any = option(True, "whether it can be picked", takes="bool")
+    render: bool | None = option(True, "whether the plotter renders at once")
+    user_matrix: MatrixLike | None = option(None, "places the actor in the world")
+
+
+@record
+@dataclass(frozen=True, eq=False)
+class Making(Options):
+    """What a VDI is made of, from where, and by what."""
+
+    resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
+    resample: str | Sequence[int] | None = option(
+        None,
+        "resample any grid, and blocks of them, to a uniform one",
+        'Of so many points along x, y and z; ``"auto"``: voxels as large as the mean cell, a '
+        "uniform grid as it is. What lies outside their cells is not drawn. With ``categories``, "
+        "by the nearest value.",
+    )
+    mask: VolumeLike | NDArray[Any] | None = option(
+        None,
+        "labels of the volume's points, or of its cells: where they are 0, nothing is drawn",
+        "A grid may have its axes mirrored or in another order.",
+    )
+    camera: CameraLike | None = option(
+        None,
+        "the generating view",
+        "By default that of the first picture, and that of the frame where ``regenerate`` says so.",
+    )
+    device: DeviceLike | None = option(
+        None,
+        "the OpenCL device; by default ``PYVISTA_VDI_DEVICE``, else the best one found",
+    )
+    progress_bar: bool | Callable[[float], object] | None = option(
+        None,
+        "whether a bar shows how much is done; by default on a terminal, after a second of work",
+        "``True`` shows it elsewhere, too, ``False`` never; a callable gets the fraction done, and "
+        "stops the work if it returns ``False``. Ctrl-C stops it as well.",
     )
 
 
@@ -93,18 +136,25 @@ class Addition:
 
     array: ArrayChoice
     look: Looks
+    place: Placement
+    making: Making
     options: GenerationOptions
     target: QualityTarget
+    deferral: Deferral
     drawing: DrawingOptions
-    place: Placement
-    resolution: Sequence[float] | None
-    resample: str | Sequence[int] | None
-    mask: Any
-    camera: CameraLike | None
-    coverage: str
-    device: DeviceLike | None
-    progress_bar: bool | Callable[[float], object] | None
-    deferral: Deferral = field(default_factory=Deferral)
+
+    #: The options of all of them.
+    declared: ClassVar[Mapping[str, Option]]
+
+    @classmethod
+    def checked(cls, **given: Any) -> Addition:
+        """Return what was asked for by names of options."""
+        return cls(
+            *(
+                each.checked(**{n: given[n] for n in each.declared if n in given})
+                for each in _RECORDS
+            )
+        )
 
     def __post_init__(self) -> None:
         if self.target:
@@ -115,14 +165,11 @@ class Addition:
 
         ``looks``: those of the look that are not honoured; all by default.
         """
-        target = {"full_fps" if n == "target_fps" else n for n in self.target.given}
         given = self.look.given if looks is None else looks
-        changed = {*self.array.given, *given, *self.options.given, *target, *self.deferral.given}
+        changed = {*self.array.given, *given, *self.options.given, *self.deferral.given}
+        changed |= {*self.making.given, *self.target.given} - {"device", "progress_bar"}
+        changed |= {*self.drawing.given} & {"coverage"}
         changed -= {"lights", "annotations"}
-        changed |= {
-            n for n in ("resolution", "resample", "mask", "camera") if getattr(self, n) is not None
-        }
-        changed |= {"coverage"} if self.coverage != "bounds" else set()
         if changed:
             raise UnsupportedError(
                 f"{', '.join(sorted(changed))} cannot be given with a VDI: its classification, "
@@ -132,6 +179,10 @@ class Addition:
             raise UnsupportedError(
                 "draw='volume' draws the volume, and this is a VDI without one: leave draw out"
             )
+
+
+_RECORDS: list[Any] = [each for each in get_type_hints(Addition).values() if isinstance(each, type)]
+Addition.declared = {n: told for n, told in declared(*_RECORDS).items() if n != "lights"}
 
 
 class _Shown(NamedTuple):
@@ -145,18 +196,19 @@ class _Shown(NamedTuple):
     bar: bool | None = None  # whether there is a scalar bar; None: as the theme says
 
 
-def added(
-    plotter: Any, volume: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
-) -> PlotterVDIActor:
-    """Add a volume, or what is made of one already, to a plotter, and return its actor."""
-    get_runtime(asked.device)  # a missing device is said here, not while a frame is drawn
+def added(plotter: Any, volume: Any, asked: Addition) -> Any:
+    """Add a volume, or what is made of one already, to a plotter, and return its actor.
+
+    Of blocks a list is returned.
+    """
+    if isinstance(volume, vtkMultiBlockDataSet):
+        return _blocks(plotter, pv.wrap(volume), asked)
+    get_runtime(asked.making.device)  # a missing device is said here, not while a frame is drawn
     volume, stored = prepared(plotter, volume, asked)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
         first = vdi_from_image(first)
-    if asked.deferral.given and (several is not None or isinstance(first, VDI | DeferredVDI)):
-        _refuse_deferral(first, asked.deferral)
     if isinstance(first, DeferredVDI):
         asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
         title = str(first.metadata.get("scalars") or "Data")
@@ -184,7 +236,6 @@ def added(
     actor.mapper = mapper
     place = asked.place
     actor.user_matrix = np.eye(4) if place.user_matrix is None else place.user_matrix
-    remember(actor)
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
     render = not plotter._first_time if place.render is None else place.render
     camera = plotter.renderer.camera  # plotter.camera would set it
@@ -210,25 +261,20 @@ def added(
         themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
         if themed if shown.bar is None else shown.bar:
             plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
-        if place.status:
-            actor.show_status(plotter)
     if stored is not None:
         actor._refinement = Refinement(actor, plotter.renderer, stored)
     plotter.renderer.Modified()
     return actor
 
 
-def added_blocks(
-    plotter: Any, blocks: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
-) -> list[Any]:
+def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
     """Add each block of a ``MultiBlock``; return their actors, lists of those within blocks.
 
     Blocks that are missing are left out, and a name gets the block's number. A block that is no
     uniform grid, and cannot be resampled to one, is refused before anything is added.
     """
-    blocks = pv.wrap(blocks)
     for block in blocks.recursive_iterator(skip_none=True):
-        require_grid(block, uniform=asked.resample is None)
+        require_grid(block, uniform=asked.making.resample is None)
     actors: list[Any] = []
     maps = cycle(_MAPS)
     with _all_or_nothing(plotter, actors):
@@ -240,8 +286,7 @@ def added_blocks(
                 own = replace(own, look=replace(own.look, cmap=next(maps)))
             if asked.place.name is not None:
                 own = replace(own, place=replace(own.place, name=f"{asked.place.name}-{i}"))
-            add = added_blocks if isinstance(block, pv.MultiBlock) else added
-            actors.append(add(plotter, block, own, remember))
+            actors.append(added(plotter, block, own))
     return actors
 
 
@@ -273,28 +318,12 @@ def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
     return _Shown(shown, table, table.scalar_range, title, bar=bar)
 
 
-def _refuse_deferral(vdi: VDI | DeferredVDI, deferral: Deferral) -> None:
-    """Refuse to change what is kept: it was decided when a VDI was made of the volume."""
-    names = ", ".join(sorted(deferral.given))
-    if isinstance(vdi, DeferredVDI):
-        low, high = vdi.value_range
-        what = f"this one keeps values from {low:g} to {high:g} already"
-        remedy = "; cmap, opacity and clim say how it looks"
-    else:
-        what = "this one has its colours"
-        remedy = ", or add the volume, or a file of it that keeps values, in its place"
-    raise UnsupportedError(
-        f"{names} cannot be given with a VDI: what is kept is said where one is made of a volume, "
-        f"and {what}: leave {names} out{remedy}"
-    )
-
-
 def _deferred(volume: Any, asked: Addition) -> _Shown:
     """Return the values of a volume, which the first picture has made for its view."""
     asked.array.require_composite()
     asked.deferral.refuse_target(asked.target)
     _refuse_of_values(asked.look)
-    fixed = {"coverage": asked.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
+    fixed = {"coverage": asked.drawing.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
     refused = " and ".join(each for each, given in fixed.items() if given)
     if refused:
         raise UnsupportedError(
@@ -346,7 +375,7 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source, preference = VDISource(), asked.array.preference
     uniform = volume if isinstance(volume, UniformGrid) else None
     if uniform is None:
-        image, array_name = as_image(volume, asked.array.scalars, asked.resolution)
+        image, array_name = as_image(volume, asked.array.scalars, asked.making.resolution)
         data = held(image)
     else:
         data, array_name = uniform.image, uniform.name
@@ -363,10 +392,10 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source.SetScalars(array_name, preference)
     source.SetOptions(asked.options)
     source.SetTarget(asked.target)
-    source.SetDevice(asked.device)
-    source.SetProgressCallback(progress_callback(asked.progress_bar))
-    if asked.camera is not None:
-        source.SetCamera(asked.camera)
+    source.SetDevice(asked.making.device)
+    source.SetProgressCallback(progress_callback(asked.making.progress_bar))
+    if asked.making.camera is not None:
+        source.SetCamera(asked.making.camera)
     return source
 
 
@@ -375,7 +404,7 @@ def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | N
     scalars, look, source = asked.array.scalars, asked.look, _source(volume, asked)
     told = {name: value for name, value in look.describe().items() if name in Look.declared}
     source.SetMetadata({"classification": {**asked.array.describe(), **told}})
-    source.SetCoverage(asked.coverage)
+    source.SetCoverage(asked.drawing.coverage)
     read = source.GetVolume()
     bar = asked.place.show_scalar_bar
     if read.rgba:
@@ -383,7 +412,7 @@ def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | N
     look = replace(look, clim=range_to_classify(scalars, look.clim))
     unit_distance = (read if stored is None else stored).default_unit_distance
     values = read.array
-    if isinstance(volume, UniformGrid) and asked.resample is not None:
+    if isinstance(volume, UniformGrid) and asked.making.resample is not None:
         # As add_volume, of the grid itself
         values, unit_distance = volume.values, volume.unit_distance
     table = look.lookup_table(values)
@@ -406,7 +435,7 @@ def _mapper(shown: _Shown, asked: Addition, theme: Any) -> Any:
     mapper = PlotterVDIMapper(theme=theme)
     mapper.scalar_range = shown.scalar_range  # before there is a table that it would change
     mapper.lookup_table = shown.table
-    mapper.SetDevice(asked.device)
+    mapper.SetDevice(asked.making.device)
     mapper.SetTargetFrameRate(drawing.target_fps)
     mapper.SetAutoAdjustMultiSamples(drawing.adjust_multi_samples)
     mapper.SetRegenerate(drawing.regenerate)

@@ -22,7 +22,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.model.checks import as_float, not_taken
 from pyvista_vdi.model.chunked import ChunkedArray
-from pyvista_vdi.model.classification import BLENDINGS, Look
+from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.model.options import option, record
 from pyvista_vdi.model.presets import presets
@@ -40,16 +40,6 @@ _MAX_COLORS = 16384
 #: ``add_volume``'s names of VTK's mappers.
 _MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
 
-#: PyVista's other names and VTK's numbers of blending modes.
-_BLENDING_NAMES = dict(enumerate(BLENDINGS)) | {
-    "comp": "composite",
-    "max": "maximum",
-    "min": "minimum",
-    "avg": "average",
-    **{f"{name}_intensity": name for name in ("maximum", "minimum", "average")},
-    **dict.fromkeys(("add", "sum"), "additive"),
-}
-
 
 def _categories(count: Any) -> bool | int:
     if count and not isinstance(count, int | np.integer):
@@ -65,7 +55,7 @@ class Looks(Look):
     """What a scalar looks like in a plotter, whose ``theme`` has the default colour map."""
 
     categories: bool | int = option(
-        False, "as many colours as there are different values", _categories
+        False, "as many colours as there are different values, or this many", check=_categories
     )
     annotations: dict[float, str] | None = option(None, "texts beside the scalar bar, by value")
     theme: Any = None
@@ -201,14 +191,6 @@ def stored_table(vdi: VDI) -> pv.LookupTable | None:
     table.values = np.round(colors * 255).astype(np.uint8)
     table.scalar_range = stored.scalar_range
     return table
-
-
-def blending_name(mode: Any) -> str:
-    """Return a blending mode's name, as PyVista's mappers understand names and VTK's numbers."""
-    if not isinstance(mode, str | int):
-        raise InvalidArgumentTypeError(f"blending must be a name; got {mode!r}")
-    name = mode.lower() if isinstance(mode, str) else mode
-    return str(_BLENDING_NAMES.get(name, name))
 
 
 def _scalar_range(scalars: Any, clim: float | ArrayLike | None) -> tuple[float, float]:

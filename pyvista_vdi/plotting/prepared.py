@@ -19,7 +19,6 @@ from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import first_camera
-from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import load
 from pyvista_vdi.plotting.uniform import UniformGrid
 from pyvista_vdi.plotting.volumes import as_grid
@@ -43,17 +42,18 @@ def prepared(plotter: Any, volume: Any, asked: Any) -> tuple[Any, StoredVolume |
         )
         volume = load(stored)
     made = isinstance(volume, VDI | DeferredVDI | VDICollection) or is_vdi_image(volume)
-    if made or (asked.resample is None and asked.mask is None):
+    if made or (asked.making.resample is None and asked.making.mask is None):
         return volume, stored  # of a VDI both are refused
-    grid, name = as_grid(volume, scalars, asked.resolution, uniform=asked.resample is None)
+    grid, name = as_grid(
+        volume, scalars, asked.making.resolution, uniform=asked.making.resample is None
+    )
     uniform = UniformGrid(
         grid,
         name,
         asked.array.preference,
-        resample=asked.resample,
-        mask=None if asked.mask is None else _mask(asked.mask, grid, stored),
+        resample=asked.making.resample,
+        mask=None if asked.making.mask is None else _mask(asked.making.mask, grid, stored),
         categorical=bool(asked.look.categories),
-        progress=progress_callback(asked.progress_bar, "resampling a grid"),
     )
     # It has the points of one level
     return uniform, None if stored is None else stored.at_level(stored.level)

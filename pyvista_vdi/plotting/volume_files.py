@@ -39,10 +39,9 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         with contextlib.suppress(UnsupportedError):
             data, _ = as_image(data, None, None)
     if not isinstance(data, pv.ImageData):
-        raise UnsupportedError(
-            f"{file} holds {with_article(type(data).__name__)}, not a uniform grid: resample "
-            "it to a pyvista.ImageData first"
-        )
+        kind = with_article(type(data).__name__)
+        remedy = "resample it to a pyvista.ImageData first"
+        raise UnsupportedError(f"{file} holds {kind}, not a uniform grid: {remedy}")
     if is_vdi_image(data):
         raise InvalidVolumeError(
             f"{file} is a VDI in its VTK form, not a volume: "
@@ -73,11 +72,9 @@ def _read(file: Path) -> Any:
     written = window.GetOutput()
     # A warning that says Error is one
     said = re.findall(r"(?s)(?:ERROR|(?i:warning)): In [^\n]*\n(.*?)(?=\n\n|\Z)", written)
-    texts = [" ".join(one.split()).split("): ", 1)[-1] for one in said]
-    if errors := [text for text in texts if "rror" in text or "ERROR" in written]:
-        raise InvalidVolumeError(
-            f"{file} cannot be read as a volume: {errors[0]}: is it whole? Write it anew"
-        )
+    for text in (" ".join(one.split()).split("): ", 1)[-1] for one in said):
+        if "rror" in text or "ERROR" in written:
+            raise InvalidVolumeError(f"{file} cannot be read as a volume: {text}: is it whole?")
     return data
 
 
@@ -86,13 +83,11 @@ def steps_of(path: str | os.PathLike[str]) -> tuple[Sequence[Any], tuple[float, 
 
     There are none where its reader announces none, or it cannot be read.
     """
-    try:
+    with contextlib.suppress(Exception):  # of each format; reading one volume says what is wrong
         reader: Any = pv.get_reader(path)
         if hasattr(reader, "time_values"):
             return steps_and_times(reader)
         # That of legacy .vtk files announces others
         if Path(path).suffix.lower() in (".vti", ".pvti", ".vtkhdf"):
             return steps_and_times(reader.reader)
-    except Exception:  # of each format; reading it as one volume says what is wrong
-        return (), ()
     return (), ()

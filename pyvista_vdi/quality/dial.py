@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, warn_external
 from pyvista_vdi.model.options import GenerationOptions, QualityTarget
+from pyvista_vdi.model.packing import Precision
 from pyvista_vdi.model.vdi import VDI
 
 #: Edges along lists, see :func:`~pyvista_vdi.model.metrics.list_edges`, that a picture from V_O may
@@ -63,7 +64,7 @@ class Setting:
 
     lists: float
     max_supersegments: int
-    precision: str = "8-byte"
+    precision: Precision = "8-byte"
 
     def window_size(self, window_size: tuple[int, int]) -> tuple[int, int]:
         """Return the VDI's window for pictures of ``window_size``."""
@@ -230,11 +231,11 @@ def chosen(
                 f"is predicted to have {ladder[0].nbytes} bytes; allow more, or ask for a smaller "
                 "window"
             )
-    if target.target_fps is not None:
-        fast = sum(rung.fps >= target.target_fps for rung in ladder[:within])
+    if target.full_fps is not None:
+        fast = sum(rung.fps >= target.full_fps for rung in ladder[:within])
         if fast == 0:
             missed.append(
-                f"{target.target_fps:g} full frames per second cannot be reached on this device: "
+                f"{target.full_fps:g} full frames per second cannot be reached on this device: "
                 f"for {window_size[0]} x {window_size[1]} pixels {ladder[0].fps:.3g} are predicted "
                 "at most; ask for fewer, or for a smaller window (a plotter keeps target_fps while "
                 "the view moves by drawing fewer pixels)"
@@ -247,7 +248,7 @@ def chosen(
     wanted = next((i for i, reached in enumerate(reaching) if reached), len(ladder) - 1)
     rung = ladder[min(wanted, within - 1)]
     name = f"quality={target.quality!r}" if target.quality else "target_ssim"
-    limits = [f"{n}={v}" for n, v in target.to_dict().items() if n in ("max_bytes", "target_fps")]
+    limits = [f"{n}={v}" for n, v in target.to_dict().items() if n in ("max_bytes", "full_fps")]
     if rung.ssim < target.ssim:
         held = within <= wanted
         missed.append(

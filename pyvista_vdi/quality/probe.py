@@ -54,7 +54,7 @@ def generate_anywhere(
     if request.volume.chunked:
         if target and client is not None:
             raise UnsupportedError(
-                "quality, target_ssim, target_fps and max_bytes measure the scene on this "
+                "quality, target_ssim, full_fps and max_bytes measure the scene on this "
                 f"machine, and {name!r} is left to a client: give max_supersegments, or leave "
                 "client out"
             )

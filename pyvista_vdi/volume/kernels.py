@@ -48,36 +48,30 @@ VIEW: dict[str, str | Struct] = {"view": RAYS, "forms": "float*"}
 #: How a volume is cut into bricks.
 BRICKS = Struct("Bricks", counts="int4", shift="int", points="int", margin="int")
 
-_DRAWN: dict[str, str | Struct] = {
-    **MEDIUM,
-    **VIEW,
-    "opaque_depth": "float*",
-    "transmittance_cutoff": "float",
-    "opacity_multiplier": "float",
-    "regions": "uint",
-}
 RENDER_VOLUME = KernelDeclaration(
     "volume/render_volume.cl",
     "render_volume",
-    **_DRAWN,
+    **MEDIUM,
+    **VIEW,
+    opaque_depth="float*",
+    transmittance_cutoff="float",
+    opacity_multiplier="float",
+    regions="uint",
     samples="float4*",
     states="float4*",
     image="float4*",
 )
-RENDER_VOLUME_16 = KernelDeclaration(
-    "cpu16/volume_render.cl", "render_volume", **_DRAWN, image="float4*"
-)
-_PROJECTED: dict[str, str | Struct] = {
+PROJECT = KernelDeclaration(
+    "volume/project.cl",
+    "project",
     **MEDIUM,
     **VIEW,
-    "opaque_depth": "float*",
-    "regions": "uint",
-    "per_range": "float",
-    "at_zero": "float",
-    "image": "float4*",
-}
-PROJECT = KernelDeclaration("volume/project.cl", "project", **_PROJECTED)
-PROJECT_16 = KernelDeclaration("cpu16/volume_project.cl", "project", **_PROJECTED)
+    opaque_depth="float*",
+    regions="uint",
+    per_range="float",
+    at_zero="float",
+    image="float4*",
+)
 WANT_BRICKS = KernelDeclaration(
     "volume/bricks.cl",
     "want_bricks",

@@ -185,30 +185,27 @@ class Variant:
 
 
 class RayLaunch:
-    """A launch of a kernel for rays: one for each work-item, or sixteen (``opencl/cpu16/``).
+    """A launch of a kernel for rays: one for each work-item, or sixteen (``LANES``).
 
     CPUs follow sixteen, unless there is no way but ``one_by_one``; the bits are the same. Other
-    arguments are those of :meth:`Runtime.bind`; a null pointer that the other form alone takes is
-    left out.
+    arguments are those of :meth:`Runtime.bind`.
     """
 
     def __init__(
         self,
         runtime: Runtime,
-        one: KernelDeclaration,
-        sixteen: KernelDeclaration,
+        declaration: KernelDeclaration,
         defines: Mapping[str, Define],
         *,
         one_by_one: bool = False,
         **arguments: Any,
     ) -> None:
-        in_blocks = runtime.is_cpu and not one_by_one
-        declaration, self._rays = (sixteen, BLOCK_RAYS) if in_blocks else (one, 1)
-        if in_blocks and runtime.info.platform.startswith("Intel"):
+        self._rays = BLOCK_RAYS if runtime.is_cpu and not one_by_one else 1
+        if self._rays > 1:
             # PoCL rounds functions of a vector otherwise than of a number, in one of 10^5 values
-            defines = {**defines, "VECTOR_FUNCTIONS": 1}
-        given = {k: v for k, v in arguments.items() if v is not None or k in declaration.arguments}
-        self._launch = runtime.bind(declaration, defines, **given)
+            vector_functions = runtime.info.platform.startswith("Intel")
+            defines = {**defines, "LANES": self._rays, "VECTOR_FUNCTIONS": vector_functions}
+        self._launch = runtime.bind(declaration, defines, **arguments)
 
     def __call__(self, rays: int, **arguments: Any) -> None:
         """Launch it for so many rays, a multiple of a group's."""

@@ -18,7 +18,7 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.kernels import PROJECT, PROJECT_16, RENDER_VOLUME, RENDER_VOLUME_16
+from pyvista_vdi.volume.kernels import PROJECT, RENDER_VOLUME
 from pyvista_vdi.volume.rays import RayLaunch
 
 #: Steps of a ray that are sampled at a time where the volume is on the device brick by brick.
@@ -138,7 +138,6 @@ def draw_medium(
             RayLaunch,
             runtime,
             RENDER_VOLUME,
-            RENDER_VOLUME_16,
             clipped.variant.defines,
             one_by_one=clipped.variant.one_by_one or bricks is not None,
             **medium_arguments,
@@ -204,7 +203,6 @@ def project_volume(
         launch = RayLaunch(
             runtime,
             PROJECT,
-            PROJECT_16,
             {**clipped.variant.defines, "BLEND_MODE": _BLEND_MODES.index(blending) + 1},
             one_by_one=clipped.variant.one_by_one,
             **medium.medium_arguments(request.camera),

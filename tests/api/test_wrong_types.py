@@ -75,7 +75,7 @@ def write(path, step, time, **options):
 
 
 def series_of(vdi):
-    return pvdi.VDISeries.of([vdi, vdi])
+    return pvdi.VDISeries([vdi, vdi])
 
 
 MADE = {"volume": VOLUME, "camera": CAMERA, "window_size": SIZE}
@@ -86,6 +86,8 @@ OF_GENERATE = [
     for each in inspect.signature(pvdi.generate).parameters.values()
     if each.name not in (*MADE, *LOOK) and each.kind is not each.VAR_KEYWORD
 ]
+#: Settings that generate has no use for.
+_OF_PICTURES = ("transmittance_cutoff", "adjust_multi_samples", "regenerate_below", "coverage")
 #: For each entry: the function, what is right, and further arguments.
 ENTRIES = {
     "generate": lambda vdi: (pvdi.generate, TABLED, OF_GENERATE),
@@ -97,16 +99,21 @@ ENTRIES = {
     "estimate": lambda vdi: (
         pvdi.estimate,
         {"volume": VOLUME, "window_size": SIZE, "transfer_function": TABLE},
-        ["max_supersegments", "criterion", "ambient_occlusion", "memory_limit", "device"],
+        ["max_supersegments", "ambient_occlusion", "settings", "device"],
     ),
     "render_volume": lambda vdi: (
         pvdi.render_volume,
         TABLED,
         [
-            *("sample_distance", "opaque_depth", "clipping_planes", "cropping", "lights"),
-            *("early_termination", "skip_empty", "ambient_occlusion", "memory_limit"),
-            "opacity_multiplier",
+            *("opaque_depth", "clipping_planes", "cropping", "lights"),
+            *("early_termination", "ambient_occlusion", "opacity_multiplier", "settings"),
         ],
+    ),
+    "Settings": lambda vdi: (pvdi.Settings, {}, None),
+    "Settings of a VDI": lambda vdi: (
+        lambda **given: pvdi.generate(**TABLED, settings=pvdi.Settings(**given)),
+        {},
+        [name for name in pvdi.Settings.declared if name not in _OF_PICTURES],
     ),
     "render": lambda vdi: (pvdi.render, {"vdi": vdi, "camera": CAMERA}, None),
     "several": lambda vdi: (pvdi.render, {"vdi": [vdi, vdi], "camera": CAMERA}, None),
@@ -166,11 +173,9 @@ ENTRIES = {
         for name in ("Light", "Lights", "Shading", "AmbientOcclusion")
     },
     "VDISeries": lambda vdi: (pvdi.VDISeries, {"steps": [vdi], "times": [0]}, None),
-    "VDISeries.of": lambda vdi: (pvdi.VDISeries.of, {"vdis": [vdi]}, None),
     "VDISeries.nearest": lambda vdi: (series_of(vdi).nearest, {"time": 0}, None),
     "VDISet": lambda vdi: (pvdi.VDISet, {"views": [vdi]}, None),
-    "VDISet.of": lambda vdi: (pvdi.VDISet.of, {"vdis": [vdi]}, None),
-    "VDISet.nearest": lambda vdi: (pvdi.VDISet.of([vdi]).nearest, {"camera": CAMERA}, None),
+    "VDISet.nearest": lambda vdi: (pvdi.VDISet([vdi]).nearest, {"camera": CAMERA}, None),
     "VDI": lambda vdi: (
         pvdi.VDI,
         {name: getattr(vdi, name) for name in inspect.signature(pvdi.VDI).parameters},
@@ -190,7 +195,7 @@ ENTRIES = {
         ["path", "precision", "compression", "level", "progress"],
     ),
     "VDISet.save": lambda vdi: (
-        pvdi.VDISet.of([vdi]).save,
+        pvdi.VDISet([vdi]).save,
         {"path": "v.vdiset"},
         ["precision", "compression", "level", "progress"],
     ),

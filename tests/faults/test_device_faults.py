@@ -138,11 +138,11 @@ def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
     ("operation", "broken"),
     [
         ("generate", "volume/macrocells.cl"),
-        ("generate", "generation/march_lists.cl cpu16/generation_march.cl"),
+        ("generate", "generation/march_lists.cl"),
         ("render", "raycasting/prepare.cl"),
         ("render", "raycasting/occupancy.cl"),
         ("render", "raycasting/raycast.cl cpu16/raycast.cl cpu16/packets.cl"),
-        ("render_volume", "volume/render_volume.cl cpu16/volume_render.cl"),
+        ("render_volume", "volume/render_volume.cl"),
     ],
 )
 def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch):

@@ -20,7 +20,7 @@ import tempfile
 import tracemalloc
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -609,8 +609,7 @@ class _Session:
         return np.full(size[::-1], self.choices.number(), np.float64)
 
     def cuts(self, size: Any) -> dict[str, Any]:
-        ends = {"clipping_planes": self.planes(), "opaque_depth": self.ends(size)}
-        return {**ends, "skip_empty": self.choices.chance(2)}
+        return {"clipping_planes": self.planes(), "opaque_depth": self.ends(size)}
 
     def options(self, known: dict[str, tuple[Any, ...]]) -> dict[str, Any]:
         given = {}
@@ -623,11 +622,12 @@ class _Session:
         options = self.options(
             {"max_supersegments": (1, 5, 20), "tolerance": (0.1,), "view_cone": (0, 90, 30)}
         )
+        seldom = {name: options.pop(name) for name in ("tolerance", "view_cone") if name in options}
         step = self.choices.pick((None, 0.5, 3, 0, "x", float("nan"), 1e300, -1))
         made = pvdi.generate(
             *(self.volume, self.camera, self.size()),
             transfer_function=self.table,
-            sample_distance=step,
+            settings=pvdi.Settings(sample_distance=step, **seldom),
             **options,
         )
         _check_valid(made)
@@ -777,7 +777,10 @@ _SAID = (
     {"type": "look", "opacity": "linear"},
     {"type": "time", "step": 1},
 )
-_OFFERS = (messages.Offer(2, ("bone", "hot"), ("linear",)), messages.Offer())
+_OFFERS = (
+    {"steps": 2, "cmaps": ["bone", "hot"], "opacities": ["linear"]},
+    {"steps": 1, "cmaps": [], "opacities": []},
+)
 
 
 def served_messages(data: bytes) -> None:
@@ -796,18 +799,19 @@ def served_messages(data: bytes) -> None:
         _check_wish(wish, offer)
 
 
-def _check_wish(wish: messages.Wish, offer: messages.Offer) -> None:
+def _check_wish(wish: messages.Wish, offer: Mapping[str, Any]) -> None:
     assert type(wish.step) is int
-    assert 0 <= wish.step < offer.steps
-    look = wish.look
-    assert look.cmap is None or look.cmap in offer.cmaps
-    if isinstance(look.opacity, tuple):
-        assert offer.cmaps
-        assert 2 <= len(look.opacity) <= messages.MAX_OPACITIES
-        assert all(0 <= value <= 1 for value in look.opacity)
+    assert 0 <= wish.step < offer["steps"]
+    look = dict(wish.look)
+    assert look.get("cmap") in (None, *offer["cmaps"])
+    if isinstance(opacity := look.get("opacity"), tuple):
+        assert offer["cmaps"]
+        assert 2 <= len(opacity) <= messages.MAX_OPACITIES
+        assert all(0 <= value <= 1 for value in opacity)
     else:
-        assert look.opacity is None or look.opacity in offer.opacities
-    assert look.clim is None or -np.inf < look.clim[0] < look.clim[1] < np.inf
+        assert opacity in (None, *offer["opacities"])
+    if clim := look.get("clim"):
+        assert -np.inf < clim[0] < clim[1] < np.inf
     hash(wish)  # what is made is looked up by it
     if wish.view is not None:
         assert all(1 <= edge <= messages.MAX_PICTURE_EDGE for edge in wish.view.size)

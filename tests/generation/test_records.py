@@ -1,4 +1,4 @@
-"""Records of runs (opencl/generation/runs.cl, shorten_lists.cl and homogeneity.cl): what merging
+"""Records of runs (opencl/generation/merging.cl, shorten_lists.cl and homogeneity.cl): what merging
 two runs gives and costs, and the four ways of shortening a record.
 
 The reference is float64 and written from docs/conventions.md and the head of the kernel file: a run
@@ -33,7 +33,7 @@ from pyvista_vdi.model.compositing import Segment
 FILE = "record_functions.cl"
 #: Ways of shortening a record.
 WITHIN, ROOM, LIMIT, ALIKE = range(4)
-ERRORS_AT_A_TIME = 8  # see generation/runs.cl
+ERROR_LANES = 16  # see generation/shorten_lists.cl
 
 
 def merging_cost(near, far, transmittance, per_reference, hidden_weight):
@@ -72,13 +72,13 @@ def shortened(call, way, records, limit, *, per_reference=1.0, hidden_weight=0.5
     runs = np.full((n, capacity, 8), np.nan, np.float32)
     for target, record in zip(runs, records, strict=True):
         target[: len(record)] = record
-    padded = -(-capacity // ERRORS_AT_A_TIME) * ERRORS_AT_A_TIME
+    rows = -(-n // ERROR_LANES) * ERROR_LANES
     lengths = np.array([len(r) for r in records], np.int32)
     runs, lengths, thresholds, *_ = call(
         FILE, "shortened", n, np.int32(way), np.int32(limit), np.int32(capacity),
         np.float32(per_reference), np.float32(hidden_weight), call.out(runs), call.out(lengths),
         call.out(np.full(n, threshold, np.float32)), call.empty(n * capacity * 8),
-        call.empty(n * padded),
+        call.empty(rows * capacity),
     )  # fmt: skip
     return [r[:k] for r, k in zip(runs, lengths, strict=True)], thresholds
 

@@ -8,7 +8,7 @@ from recorded_runs import EXTREMES, as_runs, random_records
 
 from pyvista_vdi import Volume
 from pyvista_vdi.device.constants import GROUP, block_items
-from pyvista_vdi.generation.kernels import RECORDING, SHORTEN_LISTS, SHORTEN_LISTS_16
+from pyvista_vdi.generation.kernels import RECORDING, SHORTEN_LISTS
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.volume.rays import GridRays
 
@@ -27,7 +27,7 @@ def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, re
     """Counts, thresholds and records after one launch, by work-item; counts by list."""
     width, _ = WINDOW
     items = block_items(width, ROWS)
-    capacity = -(-max(map(len, records)) // 8) * 8
+    capacity = max(map(len, records))
     rng = np.random.default_rng(4)
     # What lies behind a record is anything
     bits = rng.integers(0, 2**32, (items, capacity, 8), dtype=np.uint32)
@@ -44,7 +44,6 @@ def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, re
         counts[y[at], x[at]] = len(record)
     thresholds = np.full(items, 1e-6, np.float32)
     thresholds[::3] = 1e-2
-    declaration = SHORTEN_LISTS if lanes == 1 else SHORTEN_LISTS_16
     grid = GridRays(Volume(np.zeros((2, 2, 2))), 1.0, 1.0)
     window = Rectangle(0, width, FIRST_ROW, FIRST_ROW + ROWS)
     numbers = {"capacity": capacity, "limit": limit, "grain": 1, "window_row": 0, "finest": 1e-6}
@@ -59,8 +58,8 @@ def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, re
         runtime.write(all_records, runs)
         runtime.write(lengths, counts)
         launch = runtime.bind(
-            declaration,
-            {"DOUBLE_FLOAT_RAYS": 0},
+            SHORTEN_LISTS,
+            {"DOUBLE_FLOAT_RAYS": 0, "LANES": lanes},
             view=grid.view(WINDOW, 0, window),
             forms=rays,
             recording=RECORDING(**numbers, reference_length=reference, hidden_weight=hidden_weight),

@@ -38,7 +38,6 @@ CASES = [
 RUNS = {
     "accuracy": "--volumes brain",
     "films": "--volumes brain --repeats 1",
-    "deferred": "--volumes phantom",
     "baselines": "--size 64x36 --repeats 1",
     "files": "--volumes brain --repeats 1",
     "frames": "--volumes brain --repeats 1",
@@ -64,7 +63,7 @@ def test_a_draw_is_the_same_in_every_run_and_has_all_strata():
 def test_every_script_is_run_and_listed_with_the_question_that_it_answers():
     scripts = {path.stem for path in BENCHMARKS.glob("*.py")}
     assert scripts == set(RUNS)
-    assert len(scripts) <= 11
+    assert len(scripts) <= 10
     about = (BENCHMARKS / "README.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^\| `(\w+)\.py` \| .*\?", about, re.MULTILINE))
     assert listed == scripts

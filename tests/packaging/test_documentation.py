@@ -1,4 +1,4 @@
-"""The pages of ``docs/``: their diagrams, the tables that they include, and the names on them.
+"""The pages of ``docs/``: the tables that they include, and the names on them.
 
 Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one these tests lie in.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import ast
 import contextlib
 import importlib
-import importlib.util
 import inspect
 import io
 import os
@@ -37,27 +36,6 @@ def _pages():
     pages = [page for page in DOCS.rglob("*.md") if "_build" not in page.parts]
     assert pages
     return sorted(pages)
-
-
-def _script(name):
-    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_diagrams_are_those_that_the_script_draws():
-    for name, text in _script("diagrams").draw().items():
-        drawn = DOCS / "images" / name
-        assert drawn.read_bytes() == text.encode(), f"{name}: run python docs/diagrams.py"
-
-
-def test_terms_are_typeset_and_names_are_not():
-    pytest.importorskip("sphinx")
-    text = "V_O's lists have N_S; a.V_O, V_Old, t_near_far and t_near() are names"
-    parts = _script("terms").typeset(text)
-    assert [part.astext() for part in parts if part.tagname == "inline"] == ["VO", "NS"]
-    assert "".join(part.astext() for part in parts).endswith("are names")
 
 
 def test_included_tables_bring_no_headings():

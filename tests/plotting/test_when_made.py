@@ -46,7 +46,7 @@ def test_it_opens_from_its_own_view(kind):
     vdi = pvdi.generate(soft_ball(), OWN, WINDOW, **given)
     thing = vdi
     if kind == "series":
-        thing = pvdi.VDISeries.of([vdi])
+        thing = pvdi.VDISeries([vdi])
     if kind == "set":
         thing = pvdi.VDISet([vdi, vdi], [OWN.azimuth(90), OWN], camera=OWN)
     _, actor = picture(lambda plotter: plotter.add_vdi(thing))
@@ -244,7 +244,7 @@ def test_another_blend_of_a_set_is_drawn(plotter):
     looks = {"cmap": "bone", "opacity_unit_distance": 0.2}
     eyes = [(0, -6, 1), (6, 0, 1)]
     views = [pvdi.Camera(eye, (0, 0, 0), (0, 0, 1)) for eye in eyes]
-    vdis = pvdi.VDISet.of([pvdi.generate(soft_ball(), view, WINDOW, **looks) for view in views])
+    vdis = pvdi.VDISet([pvdi.generate(soft_ball(), view, WINDOW, **looks) for view in views])
     plotter.add_vdi(vdis, show_scalar_bar=False, regenerate="never")
     plotter.camera_position = [(4.3, -4.2, 1), (0, 0, 0), (0, 0, 1)]
     before = shown(plotter)

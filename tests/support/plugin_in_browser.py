@@ -30,6 +30,7 @@ from trame_server.protocol import CoreServer
 from trame_vtk.modules.vtk import get_helper
 from wslink.chunking import UnChunker, generate_chunks
 
+import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.quality.rate import FrameRate
 
@@ -179,7 +180,7 @@ async def shows(plotter, volume, browser):
 
 async def follows_the_view():
     """A remote view: previews, a VDI of the view at rest, and changes, as on screen."""
-    plotter, actor, volume = scene(regenerate_below=0.9999)
+    plotter, actor, volume = scene(settings=pvdi.Settings(regenerate_below=0.9999))
     async with served(plotter, "server") as (server, _), browsing(plotter, server) as browser:
         await turned_by_hand(plotter, actor, volume, browser)
         await changed(plotter, actor, volume, browser)

@@ -149,7 +149,8 @@ def multisampling_goes_while_late_and_is_back_at_rest():
 
 def new_vdi_appears_by_itself():
     """At rest a VDI is made behind the frames, and shown without a frame being asked for."""
-    plotter, actor = scene(regenerate="auto", regenerate_below=0.9999, status=True)
+    plotter, actor = scene(regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9999))
+    actor.show_status(plotter)
     plotter.show(interactive_update=True, auto_close=False)
     old = actor.vdi
     hand = Hand(plotter)
@@ -214,7 +215,9 @@ def show_blocks_and_the_new_vdi_comes():
 
 def closing_in_the_middle():
     """Closing while a VDI is made leaves neither thread nor crash."""
-    plotter, actor = scene(sample_distance=0.002, regenerate=lambda status: status.angle > 5)
+    plotter, actor = scene(
+        settings=pvdi.Settings(sample_distance=0.002), regenerate=lambda status: status.angle > 5
+    )
     plotter.show(interactive_update=True, auto_close=False)
     plotter.camera.Azimuth(30)
     plotter.render()
@@ -229,7 +232,7 @@ def every_change_is_shown():
     plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
     volume = soft_ball()
     values = volume["v"].copy()
-    actor = plotter.add_vdi(volume, sample_distance=0.002, **LOOKS)
+    actor = plotter.add_vdi(volume, settings=pvdi.Settings(sample_distance=0.002), **LOOKS)
     plotter.show(interactive_update=True, auto_close=False)
     shown = []
     for step in range(20):
@@ -260,7 +263,7 @@ def a_movie_has_every_step():
     with tempfile.TemporaryDirectory() as folder:
         name = f"{folder}/steps.gif"
         plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
-        plotter.add_vdi(volume, sample_distance=0.002, **LOOKS)
+        plotter.add_vdi(volume, settings=pvdi.Settings(sample_distance=0.002), **LOOKS)
         plotter.show(interactive_update=True, auto_close=False)
         plotter.open_gif(name)
         for step in range(10):
@@ -276,7 +279,7 @@ def a_series_plays_by_itself_and_goes_on_after_a_turn():
     """Steps follow each other without a frame being asked for, before and after a hand turns."""
     vdis = [vdi_from(soft_ball(12 + k)) for k in range(3)]
     plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
-    actor = plotter.add_vdi(pvdi.VDISeries.of(vdis), show_scalar_bar=False, regenerate="never")
+    actor = plotter.add_vdi(pvdi.VDISeries(vdis), show_scalar_bar=False, regenerate="never")
     actor.play(rate=30)
     plotter.show(interactive_update=True, auto_close=False)
     seen = {}

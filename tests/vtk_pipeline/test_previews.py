@@ -63,7 +63,9 @@ def test_preview_while_the_rate_is_high_and_full_in_the_next_frame(plotter, coar
 
 
 def test_preview_is_not_shifted_and_the_mesh_stays_crisp(plotter, coarsest):
-    watched(plotter, adjust_multi_samples=False)  # else a late frame has other edges
+    watched(
+        plotter, settings=pvdi.Settings(adjust_multi_samples=False)
+    )  # else a late frame has other edges
     ball = frame(plotter)
     preview = turned(plotter, 1e-6, MOVING)
     y, x = np.mgrid[: WINDOW[1], : WINDOW[0]]

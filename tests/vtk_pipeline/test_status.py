@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plugin_scenes import LOOKS, soft_ball
+from settings import with_settings
 from skimage.io import imread
 from watched_windows import MOVING, STILL, frame, small_vdi, turned, watched
 
@@ -35,7 +36,9 @@ pytestmark = pytest.mark.gl
 )
 def test_nonsense_is_refused_by_name(plotter, name, value, message):
     mapper = pvdi.VDIMapper()
-    give = getattr(mapper, name, lambda value: plotter.add_vdi(soft_ball(8), **{name: value}))
+    give = getattr(
+        mapper, name, lambda value: plotter.add_vdi(soft_ball(8), **with_settings(**{name: value}))
+    )
     with pytest.raises(InvalidArgumentError, match=message):
         give(value)
     assert not plotter.actors

@@ -299,7 +299,7 @@ def test_two_renderers(gate):
 @row("a series plays")
 @pytest.mark.extension("series")
 def test_plays(plotter):
-    actor = plotter.add_vdi(pvdi.VDISeries.of([small_vdi() for _ in range(3)]))
+    actor = plotter.add_vdi(pvdi.VDISeries([small_vdi() for _ in range(3)]))
     actor.mapper.SetInteractiveOffScreen(True)
     plotter.show(auto_close=False)
     actor.play(rate=200)
@@ -317,7 +317,7 @@ def test_plays(plotter):
 def test_set(plotter):
     cameras = [pvdi.Camera((5, y, 0), (0, 0, 0), (0, 0, 1)) for y in (-4, 4)]
     vdis = [pvdi.generate(soft_ball(12), each, (60, 50), **CLASSIFICATION) for each in cameras]
-    actor = plotter.add_vdi(pvdi.VDISet.of(vdis), regenerate="never", show_scalar_bar=False)
+    actor = plotter.add_vdi(pvdi.VDISet(vdis), regenerate="never", show_scalar_bar=False)
     actor.mapper.SetInteractiveOffScreen(True)
     for camera, vdi in zip(cameras, vdis, strict=True):
         plotter.camera_position = (camera.position, (0, 0, 0), (0, 0, 1))

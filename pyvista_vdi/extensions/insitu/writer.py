@@ -31,23 +31,18 @@ from pyvista_vdi.extensions.series.writer import (
 )
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.io import read as read_vdi
+from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_range, as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.deferred import importance_points
-from pyvista_vdi.model.options import (
-    GENERATION_NAMES,
-    Deferral,
-    GenerationOptions,
-    GenerationRequest,
-    declared,
-)
+from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Grid, Volume
 
-_DEFERRAL = tuple(declared(Deferral))
+_RECORDS = (Deferral, GenerationOptions)
 
 
 class InSitu:
@@ -163,9 +158,11 @@ class InSitu:
         """Take what is asked for, or raise."""
         self._camera = Camera.from_any(camera)
         self._size = check_window_size(window_size)
-        others = (*GENERATION_NAMES, *_DEFERRAL)
+        others = names_of(*_RECORDS)
         looks = {name: value for name, value in options.items() if name not in others}
-        self._deferral = Deferral(**{n: options[n] for n in _DEFERRAL if n in options})
+        self._deferral, self._options = records_of(
+            options, "InSitu", *_RECORDS, defaults={"precision": "8-byte"}
+        )
         missing = looks.get("clim") is None and "transfer_function" not in looks
         if self._deferral.deferred:
             missing = self._deferral.value_range is None
@@ -180,8 +177,6 @@ class InSitu:
             ends = as_range(self._deferral.value_range)  # what cannot be is refused before the run
             importance_points(self._deferral.importance, ends)
             self._function = unclassified(self._looks.interpolation)
-        chosen = {name: value for name, value in options.items() if name in GENERATION_NAMES}
-        self._options = GenerationOptions(**{"precision": "8-byte", **chosen})
         points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
         of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
         self._grid = Grid(points, of.spacing, of.origin, of.direction)

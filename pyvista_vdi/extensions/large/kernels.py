@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pyvista_vdi.device import KernelDeclaration, Struct
+from pyvista_vdi.device import KernelDeclaration
 from pyvista_vdi.generation.kernels import RECORDING
 from pyvista_vdi.volume.kernels import MEDIUM, VIEW
 
-_OPTICAL_DEPTHS: dict[str, str | Struct] = {**MEDIUM, **VIEW, "stride": "int", "depths": "float*"}
-OPTICAL_DEPTHS = KernelDeclaration("large/optical_depths.cl", "optical_depths", **_OPTICAL_DEPTHS)
-OPTICAL_DEPTHS_16 = KernelDeclaration(
-    "cpu16/generation_optical_depths.cl", "optical_depths", **_OPTICAL_DEPTHS
+OPTICAL_DEPTHS = KernelDeclaration(
+    "large/optical_depths.cl", "optical_depths", **MEDIUM, **VIEW, stride="int", depths="float*"
 )
 COPY_RUNS = KernelDeclaration(
     "large/runs.cl",

@@ -24,7 +24,6 @@ from pyvista_vdi.extensions.large.kernels import (
     APPEND_RUNS,
     COPY_RUNS,
     OPTICAL_DEPTHS,
-    OPTICAL_DEPTHS_16,
 )
 from pyvista_vdi.generation.list_arrays import growing_lists
 from pyvista_vdi.generation.march import March, Records
@@ -69,7 +68,7 @@ class Piece(NamedTuple):
 
     window: Rectangle  # which lists of V_O's window they are
     counts: NDArray[np.uint16]  # runs of each list, uint16 (rows, columns)
-    runs: NDArray[np.float32]  # the runs of ``generation/runs.cl``, list by list, float32 (n, 8)
+    runs: NDArray[np.float32]  # the runs of ``generation/records.cl``, list by list, float32 (n, 8)
 
     def rows(self, y0: int, y1: int) -> Piece:
         """Return the lists in rows y0 to y1 - 1 of V_O's window."""
@@ -333,7 +332,6 @@ class _Marched:
             launch = RayLaunch(
                 runtime,
                 OPTICAL_DEPTHS,
-                OPTICAL_DEPTHS_16,
                 variant.defines,
                 one_by_one=variant.one_by_one,
                 **medium.medium_arguments(task.camera),

@@ -13,16 +13,17 @@ from pathlib import Path
 from typing import IO, Any, NoReturn
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import VDIFileError
-from pyvista_vdi.io.files import opened
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.io.files import format_named, opened
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader, writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
 from pyvista_vdi.io.vdi_file.description import from_json, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.classification import IN_PLACE, Look
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 
 #: Version of the JSON.
@@ -31,6 +32,11 @@ VERSION = 1
 _KEPT = 6
 #: What the files of an earlier format begin with: steps by differences, and sets of them.
 _EARLIER = (b"\x89VDIS\r\n\x1a", b"\x89VDIV\r\n\x1a")
+#: What is said of them.
+_REMEDY = (
+    "is of an earlier format, which is not read any more: make it anew, or have the version that "
+    "wrote it write .vdi files (pyvista-vdi convert), and join these by 'pyvista-vdi series'"
+)
 
 
 @dataclass(frozen=True)
@@ -51,23 +57,6 @@ SERIES = Kind("series", ".vdis", "times")
 SET = Kind("set", ".vdiset", "views")
 
 
-def encoded(
-    vdi: VDI | DeferredVDI,
-    *,
-    precision: str = "8-byte",
-    compression: str = "zstd",
-    level: int | None = None,
-) -> bytes:
-    """Return a VDI's file; its options are those of :meth:`VDI.save`."""
-    one_of(compression, "compression", (*CODECS, "none"))
-    check_level(level)
-    vdi = vdi.with_precision(precision)
-    lists, about = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
-    stream = io.BytesIO()
-    writer.write_to(stream, lists, compression, level, coarse=False, deferred=about)
-    return stream.getvalue()
-
-
 class Archive(Sequence[Any]):
     """The VDIs of a folder, a ZIP or a page: each is read when it is asked for, from any thread.
 
@@ -77,7 +66,7 @@ class Archive(Sequence[Any]):
     def __init__(self, path: str | os.PathLike[str], kind: Kind) -> None:
         self.path, self._kind = as_path(path).absolute(), kind
         self._root: Any = self.path if self.path.is_dir() else zipfile.Path(self._opened())
-        self._read = lru_cache(_KEPT)(self._read_now)
+        self._read = lru_cache(_KEPT)(lambda i: self._file(i, reader.read))
         content = self._content(kind.head)
         try:
             self.about: dict[str, Any] = from_json(content)
@@ -103,10 +92,9 @@ class Archive(Sequence[Any]):
 
     def info(self) -> FileInfo:
         """Return what is known of the first VDI without its arrays, and the bytes of all."""
-        first = reader.read_info(self.path / name_of(0), stream=self._stream(0))
         files = self.path.iterdir() if self.path.is_dir() else [self.path]
         n_bytes = sum(file.stat().st_size for file in files)
-        return replace(first, path=self.path, file_bytes=n_bytes)
+        return replace(self._file(0, reader.read_info), path=self.path, file_bytes=n_bytes)
 
     def refuse(self, why: str) -> NoReturn:
         """Raise the error of what is damaged."""
@@ -124,7 +112,7 @@ class Archive(Sequence[Any]):
             reason = getattr(error, "strerror", None) or error
             raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
         if begin in _EARLIER:
-            raise VDIFileError(_earlier(self.path))
+            raise VDIFileError(f"{self.path} {_REMEDY}")
         if not begin.startswith(b"PK"):
             name = self._kind.name
             raise VDIFileError(f"{self.path} is not a {name} of VDIs: it begins with {begin!r}")
@@ -148,20 +136,9 @@ class Archive(Sequence[Any]):
         except reader.ARCHIVE_ERRORS as error:
             self.refuse(f"its {name} cannot be read ({error})")
 
-    def _stream(self, i: int) -> Any:
-        return io.BytesIO(self._content(name_of(i)))
-
-    def _read_now(self, i: int) -> Any:
-        return reader.read(self.path / name_of(i), stream=self._stream(i))
-
-
-def _earlier(path: Path) -> str:
-    """Return what is said of a file of the earlier format."""
-    return (
-        f"{path} is of an earlier format (VDIs by their differences), which is not read any more: "
-        "make it anew, or have the version that wrote it write .vdi files (pyvista-vdi convert), "
-        "and join these by 'pyvista-vdi series'"
-    )
+    def _file(self, i: int, read: Any) -> Any:
+        """Return what a function of the reader of ``.vdi`` files makes of one of the VDIs."""
+        return read(self.path / name_of(i), stream=io.BytesIO(self._content(name_of(i))))
 
 
 def name_of(i: int) -> str:
@@ -175,23 +152,32 @@ def head_bytes(kind: Kind, about: Mapping[str, Any]) -> bytes:
     return to_json({**head, "written_by": f"pyvista-vdi {__version__}", **about}).encode()
 
 
-def write(
-    path: str | os.PathLike[str],
-    kind: Kind,
-    about: Mapping[str, Any],
-    vdis: Sequence[Any],
-    *,
-    progress: Progress | None = None,
-    **options: Any,
+def save(
+    vdis: Sequence[Any], path: str | os.PathLike[str], kind: Kind, about: Any, **options: Any
 ) -> Path:
-    """Write one file, which appears whole or not at all; it replaces what was there."""
+    """Write one file, or a page that shows it, whole or not at all; it replaces what was there.
+
+    ``options``: those of :meth:`VDICollection.save`.
+    """
+    if look := ", ".join(name for name in options if name in (*Look.declared, *IN_PLACE)):
+        raise InvalidArgumentError(
+            f"save() takes no look, got {look}: give it to classified(), where values are kept, "
+            "and save what that returns"
+        )
+    found = format_named(path)
+    if found is not None and found.page:
+        as_vdi(vdis[0])  # refuses what has no colours
+        write_page = getattr(found.load(), f"write_{kind.name}")
+        return write_page(vdis, path, **options)  # type: ignore[no-any-return]
     target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.name}"))
     if target.exists():
         with target.open("rb") as stream:
             if stream.read(8) in _EARLIER:
-                raise VDIFileError(f"{_earlier(target)}; choose another name for this one")
+                raise VDIFileError(f"{target} {_REMEDY}; choose another name for this one")
+    if options.get("precision") is None:
+        options["precision"] = vdis[0].precision if kind is SERIES else "8-byte"
     with whole_file(target) as out:
-        write_to(out, kind, about, vdis, progress=progress, **options)
+        write_to(out, kind, about, vdis, **options)
     return target
 
 
@@ -202,17 +188,21 @@ def write_to(
     vdis: Sequence[Any],
     *,
     progress: Progress | None = None,
-    **options: Any,
+    precision: str = "8-byte",
+    compression: str = "zstd",
+    level: int | None = None,
 ) -> int:
-    """Write one file to a stream; return how many bytes hold the JSON and the first VDI.
-
-    ``options``: those of :func:`encoded`.
-    """
+    """Write one file to a stream; return how many bytes hold the JSON and the first VDI."""
+    one_of(compression, "compression", (*CODECS, "none"))
+    check_level(level)
     done, first = Pieces(progress, len(vdis)), 0
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(writer.stored(kind.head), head_bytes(kind, about))
         for i in range(len(vdis)):
-            archive.writestr(writer.stored(name_of(i)), encoded(vdis[i], **options))
+            vdi, file = vdis[i].with_precision(precision), io.BytesIO()
+            lists, values = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
+            writer.write_to(file, lists, compression, level, coarse=False, deferred=values)
+            archive.writestr(writer.stored(name_of(i)), file.getvalue())
             first = first or stream.tell()
             done()
     return first

@@ -27,6 +27,7 @@ from pyvista_vdi.cli.inputs import (
     part,
     refuse,
     say_written,
+    settings,
     with_look,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
@@ -88,8 +89,8 @@ def _maker(
     with naming(steps[0].name):
         first = steps[0].read()
     view = generating_view(options, first)
-    names = ("max_supersegments", "sample_distance", "memory_limit", "device")
-    chosen = {name: getattr(options, name) for name in names}
+    chosen = {name: getattr(options, name) for name in ("max_supersegments", "device")}
+    chosen["settings"] = settings(options)
     make = StepMaker("series", view, options.size, client=client, **chosen, **looks)
 
     def vdi_of(i: int) -> VDI:

@@ -8,25 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.extensions.series.archive import SERIES, Archive, write
-from pyvista_vdi.extensions.series.series import VDISeries, checked_times, refuse_look
-from pyvista_vdi.io.files import format_named
+from pyvista_vdi.extensions.series import archive
+from pyvista_vdi.extensions.series.archive import SERIES, Archive
+from pyvista_vdi.extensions.series.series import VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 
 
 def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Path:
     """Write one file with a series, or a page that plays it: see :meth:`VDISeries.save`."""
-    refuse_look(options)
-    found = format_named(path)
-    if found is not None and found.page:
-        as_vdi(series[0])  # refuses what has no colours
-        return found.load().write_series(series, path, **options)  # type: ignore[no-any-return]
-    if options.get("precision") is None:
-        options["precision"] = series[0].precision
-    return write(path, SERIES, {"times": series.times}, series, **options)
+    return archive.save(series, path, SERIES, {"times": series.times}, **options)
 
 
 def write_steps(vdis: Sequence[VDI], times: Sequence[float], path: str, **options: Any) -> Path:

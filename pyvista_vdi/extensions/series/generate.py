@@ -19,24 +19,20 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import (
-    GENERATION_NAMES,
-    Deferral,
-    GenerationOptions,
-    QualityTarget,
-    declared,
-)
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.dial import bytes_of
 
 _GRID = ("spacing", "origin")
-_OTHERS = (*GENERATION_NAMES, *declared(QualityTarget), *declared(Deferral))
+_RECORDS = (QualityTarget, Deferral, GenerationOptions)
+_OTHERS = names_of(*_RECORDS)
 
 
 def generate_series(
@@ -142,11 +138,7 @@ class StepMaker:
         looks = {n: v for n, v in options.items() if n not in _OTHERS}
         self._looks = Classification.composited(looks, function, (*_OTHERS, *_GRID))
         self._described = self._looks.describe()
-        asked: Any = (
-            of(**{n: options[n] for n in declared(of) if n in options})
-            for of in (QualityTarget, Deferral, GenerationOptions)
-        )
-        target, deferral, _ = asked
+        target, deferral, _ = records_of(dict(options), function, *_RECORDS)
         if deferral.deferred:
             self._looks.require_no_look()
             deferral.refuse_target(target)
@@ -167,15 +159,21 @@ class StepMaker:
             # A colour stands for the same value in all steps
             table = self._looks.transfer_function_of(volume)
             self._looks = Classification(transfer_function=table)
-            self._options = {n: v for n, v in self._options.items() if n in _OTHERS}
-            self._options["transfer_function"] = table
+            kept = {n: v for n, v in self._options.items() if n in _OTHERS}
+            self._options = {**kept, "transfer_function": table}
         vdi: Any = generate(volume, self._camera, self._size, **self._where, **self._options)
         vdi.metadata["classification"] = self._described  # as the first step's was asked for
         if isinstance(vdi, DeferredVDI):
             self._options["value_range"] = vdi.value_range
         elif self._dial is not None:
             vdi.metadata["dial"] = self._dial
-            self._check_bytes(vdi)
+            if self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
+                warn_external(
+                    f"max_bytes={self._max_bytes} is not kept by all steps: one has "
+                    f"{bytes_of(vdi)} bytes on the device, with what was chosen for the first "
+                    "step; allow less, or begin with a step that has as much to show"
+                )
+                self._max_bytes = None  # it is said once
         elif dial := vdi.metadata.get("dial"):
             # What was chosen for the first step are the settings of all others
             self._dial, self._size = {**dial, "missed": []}, vdi.window_size
@@ -183,16 +181,6 @@ class StepMaker:
             self._options = {n: v for n, v in self._options.items() if n not in dropped}
             self._options |= {n: dial["chosen"][n] for n in ("max_supersegments", "precision")}
         return vdi  # type: ignore[no-any-return]
-
-    def _check_bytes(self, vdi: VDI) -> None:
-        """Warn once of a step that takes more bytes than are allowed."""
-        if self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
-            warn_external(
-                f"max_bytes={self._max_bytes} is not kept by all steps: one has {bytes_of(vdi)} "
-                "bytes on the device, with what was chosen for the first step; allow less, or "
-                "begin with a step that has as much to show"
-            )
-            self._max_bytes = None
 
 
 def _steps(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 import threading
 import time
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from typing import Any
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.model.checks import as_float, memory_limit_bytes
+from pyvista_vdi.model.checks import as_float, as_whole, memory_limit_bytes
 from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
@@ -83,16 +82,12 @@ class Player:
     @step.setter
     def step(self, step: int) -> None:
         n = len(self.series)
-        try:
-            index = operator.index(step)
-        except TypeError:
-            index = n
-        if not -n <= index < n:
+        if not -n <= as_whole(step) < n:
             raise InvalidArgumentError(
                 f"step must be a whole number from 0 to {n - 1}, or from -{n} to -1 from the end; "
                 f"got {step!r}"
             )
-        self._begin(index % n)
+        self._begin(int(step) % n)
 
     @property
     def decoded(self) -> list[VDI]:
@@ -115,19 +110,17 @@ class Player:
         step = self.step
         known = self._ready.get(step)
         if known is None:
-            known = self.series[step]
-            self._keep(step, known)
+            known = self._keep(step, self.series[step])
         return known
 
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: float | str | None = None
     ) -> None:
         """Go on from the step that is shown, or from the first where the last one is."""
-        rate_ = as_float(rate)
-        if isinstance(rate, bool) or not 0 < rate_ < math.inf:
+        if isinstance(rate, bool) or not 0 < as_float(rate) < math.inf:
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
         self.memory = memory_limit_bytes(memory_limit) or self.memory
-        self.rate, self._loop, self.dropped = rate_, bool(loop), 0
+        self.rate, self._loop, self.dropped = as_float(rate), bool(loop), 0
         last = len(self.series) - 1
         self._begin(0 if not loop and self.step == last else self.step)
         self.playing = last > 0
@@ -146,12 +139,11 @@ class Player:
         with self._lock:
             # Further back than a round the same steps come again
             places = range(due, max(self._place, due - n), -1)
-            place = next((p for p in places if p % n in self._ready), self._place)
-            another = place != self._place
-            self.dropped += max(0, place - self._place - 1)
-            self._place = place
+            before, ready = self._place, self._ready
+            self._place = next((place for place in places if place % n in ready), before)
+            self.dropped += max(0, self._place - before - 1)
             self._trim()
-            left = any(step not in self._broken for step in range(place + 1, n))
+            left = any(step not in self._broken for step in range(self._place + 1, n))
             error = self._unsaid.pop() if self._unsaid else None
         if not self._loop and due >= n - 1 and not left:
             self.pause()
@@ -159,7 +151,7 @@ class Player:
             self._worker.put(Decoding(lambda on, _report: self._decode(on), self.device))
         if error is not None:
             raise error
-        return another
+        return self._place != before
 
     def close(self) -> None:
         """Pause, and leave no thread; playing may begin anew."""
@@ -181,10 +173,11 @@ class Player:
         place = self._from + int((now - since) * self.rate)
         return place if self._loop else min(place, len(self.series) - 1)
 
-    def _keep(self, step: int, vdi: VDI) -> None:
+    def _keep(self, step: int, vdi: VDI) -> VDI:
         with self._lock:
             self._ready[step] = vdi
             self._trim()
+        return vdi
 
     def _trim(self) -> None:
         """Drop what memory is not enough for, first what is shown in the longest time.
@@ -212,10 +205,9 @@ class Player:
     def _decode(self, runtime: Runtime) -> bool:
         """Read what is wanted, step after step, until enough are ready."""
         for _ in range(_AHEAD):  # then a frame must have come: nobody may be looking
-            step = self._wanted()
+            step, began = self._wanted(), self._clock()
             if step is None or not self.playing:
                 break
-            began = self._clock()
             try:
                 vdi = self.series[step]
                 bring(runtime, vdi)

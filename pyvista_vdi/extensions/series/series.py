@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, overload
 
@@ -14,7 +13,6 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.extensions.series.archive import Archive
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classification import IN_PLACE, Look
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, each_of
@@ -25,20 +23,23 @@ class VDISeries(VDICollection):
     """The VDIs of one scene at several times: a sequence of :class:`VDI` or :class:`DeferredVDI`.
 
     Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` of a ``.vdis`` folder
-    or file, whose steps are read when they are asked for, or by :meth:`of` from VDIs at hand. It
-    can be read from several threads at once, and pickled: one that was read, as its path.
+    or file, whose steps are read when they are asked for, or from VDIs at hand. It can be read from
+    several threads at once, and pickled: one that was read, as its path.
 
     Parameters
     ----------
-    steps : sequence of VDI or DeferredVDI
-        One per time; at least one.
-    times : sequence of float
-        Ascending, of any unit.
+    steps : iterable of VDI or DeferredVDI
+        One per time, at least one, or their VTK form; those that keep values all of one range. A
+        sequence that is neither list nor tuple is asked for a step when that is needed.
+    times : iterable of float, optional
+        Ascending, of any unit; 0, 1, 2 … by default.
 
     Raises
     ------
     InvalidArgumentError
         If there is no step, or times are not as many, or do not ascend.
+    InvalidVDIError
+        If one is no VDI, or keeps values where another does not, or of another range.
 
     Attributes
     ----------
@@ -48,39 +49,14 @@ class VDISeries(VDICollection):
 
     times: tuple[float, ...]
 
-    def __init__(self, steps: Sequence[VDI], times: Sequence[float]) -> None:
-        self.times = checked_times(times)
-        if not isinstance(steps, Sequence):
-            raise InvalidArgumentTypeError(
-                f"steps must be a sequence of VDIs, got {type(steps).__name__}: pass a list"
-            )
-        if not len(steps) == len(self.times) > 0:
+    def __init__(self, steps: Iterable[VDI], times: Iterable[float] | None = None) -> None:
+        self._steps = as_steps(steps, "a series")
+        self.times = checked_times(range(len(self._steps)) if times is None else times)
+        if not len(self._steps) == len(self.times) > 0:
             raise InvalidArgumentError(
-                f"a series has a time for each step, and at least one; got {len(steps)} steps "
-                f"and {len(self.times)} times"
+                f"a series has a time for each step, and at least one; got {len(self._steps)} "
+                f"steps and {len(self.times)} times"
             )
-        self._steps = steps
-
-    @classmethod
-    def of(cls, vdis: Iterable[VDI], times: Iterable[float] | None = None) -> VDISeries:
-        """Return a series of VDIs in memory.
-
-        Parameters
-        ----------
-        vdis : iterable of VDI or DeferredVDI
-            One per time, or their VTK form; those that keep values all of one range.
-        times : iterable of float, optional
-            Ascending; 0, 1, 2 … by default.
-
-        Raises
-        ------
-        InvalidArgumentError
-            See :class:`VDISeries`.
-        InvalidVDIError
-            If one is no VDI, or keeps values where another does not, or of another range.
-        """
-        steps: Any = as_steps(vdis, "a series")
-        return cls(steps, range(len(steps)) if times is None else checked_times(times))
 
     @cached_property
     def _first(self) -> Any:
@@ -111,12 +87,12 @@ class VDISeries(VDICollection):
     def __getitem__(self, index: slice) -> VDISeries: ...
     def __getitem__(self, index: int | slice) -> VDI | VDISeries:
         if isinstance(index, slice):
-            chosen = range(len(self))[index]
-            return VDISeries(Called(self._steps.__getitem__, chosen), self.times[index])
-        return self._steps[self._place(index, "steps")]
+            chosen = Called(self._steps.__getitem__, range(len(self))[index])
+            return VDISeries(chosen, self.times[index])
+        return self._steps[self._place(index, "steps")]  # type: ignore[no-any-return]
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISeries:
-        return VDISeries(mapped(function, self), self.times)
+        return VDISeries(Called(function, self, kept=8), self.times)
 
     def nearest(self, time: float) -> int:
         """Return the index of the step whose time is nearest; of two, the earlier.
@@ -131,10 +107,7 @@ class VDISeries(VDICollection):
         InvalidArgumentError
             If it is no number.
         """
-        time = checked_time(time)
-        after = bisect_left(self.times, time)
-        candidates = [i for i in (after - 1, after) if 0 <= i < len(self)]
-        return min(candidates, key=lambda i: abs(self.times[i] - time))
+        return int(np.abs(np.subtract(self.times, checked_time(time))).argmin())
 
     def __repr__(self) -> str:
         width, height = self.window_size
@@ -147,40 +120,35 @@ class VDISeries(VDICollection):
 
 
 class Called(Sequence[Any]):
-    """What a function returns for each of some indices, when it is asked for.
+    """What a function makes of each item of a sequence, when it is asked for.
 
-    ``kept``: how many of those that were asked for last are kept; ``None``: none.
+    ``kept``: how many are kept of those that were asked for last. It is pickled as what it is
+    made from.
     """
 
-    def __init__(
-        self, function: Callable[[int], Any], chosen: range, kept: int | None = None
-    ) -> None:
-        self._given, self._chosen = (function, chosen, kept), chosen
-        self._function = function if kept is None else lru_cache(kept)(function)
+    def __init__(self, function: Callable[[Any], Any], items: Sequence[Any], kept: int = 0) -> None:
+        self._given = function, items, kept
+        self._made = lru_cache(kept)(lambda i: function(items[i]))
 
     def __reduce__(self) -> Any:
         return type(self), self._given
 
     def __len__(self) -> int:
-        return len(self._chosen)
+        return len(self._given[1])
 
     def __getitem__(self, index: Any) -> Any:
-        return self._function(self._chosen[index])
+        return self._made(range(len(self))[index])
 
 
-def mapped(function: Callable[[VDI], VDI], vdis: Sequence[VDI]) -> Called:
-    """Return what a function makes of each of several VDIs, when that is asked for."""
-    return Called(partial(_made, function, vdis), range(len(vdis)), kept=8)
+def as_steps(vdis: Any, what: str) -> Any:
+    """Return several VDIs that have colours, or keep values of one range, as such.
 
-
-def _made(function: Callable[[VDI], VDI], vdis: Sequence[VDI], i: int) -> VDI:
-    return function(vdis[i])
-
-
-def as_steps(vdis: Any, what: str) -> tuple[Any, ...]:
-    """Return several VDIs that have colours, or keep values of one range, as such."""
+    A sequence that makes or reads them when they are asked for is returned as it is.
+    """
     if isinstance(vdis, VDI | DeferredVDI):
         raise InvalidVDIError(f"{what} is made of several VDIs: pass them in a list")
+    if isinstance(vdis, Sequence) and not isinstance(vdis, list | tuple | str | bytes):
+        return vdis
     steps = tuple(v if isinstance(v, DeferredVDI) else as_vdi(v) for v in each_of(vdis))
     for i, step in enumerate(steps):
         check_range(step, range_of(steps[0]), f"number {i}")
@@ -205,20 +173,11 @@ def check_range(vdi: Any, first: tuple[float, float] | None, which: str) -> None
         )
 
 
-def refuse_look(options: Iterable[str]) -> None:
-    """Raise InvalidArgumentError if a look is among the options that a file is written with."""
-    if look := ", ".join(name for name in options if name in (*Look.declared, *IN_PLACE)):
-        raise InvalidArgumentError(
-            f"save() takes no look, got {look}: give it to classified(), where values are kept, "
-            "and save what that returns"
-        )
-
-
 def checked_times(times: Iterable[float]) -> tuple[float, ...]:
     """Return times as floats, or raise InvalidArgumentError where they do not ascend."""
     if not np.iterable(times) or isinstance(times, str | bytes):
         raise InvalidArgumentTypeError(f"times must be numbers, one for each step; got {times!r}")
-    checked = tuple(checked_time(time) for time in times)
+    checked = tuple(map(checked_time, times))
     for before, after in pairwise(checked):
         if not before < after:
             raise InvalidArgumentError(f"times must ascend; got {before} and then {after}")

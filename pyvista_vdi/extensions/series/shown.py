@@ -26,13 +26,12 @@ class SeriesInput(Input):
 
     def vdi(self) -> VDI | None:
         """Return the step's VDI, decoded now if it is not ready."""
-        values = self.deferred
-        if values is None or self.prop is None:
-            self._vdi = as_vdi(self.player.vdi)  # refuses what has no colours
-            return self._vdi
-        if self._kept is None or (self._kept.deferred, self._kept.prop) != (values, self.prop):
-            self._kept = DeferredInput(values, self.prop)
-        self._vdi = self._kept.vdi()
+        step: Any = self.player.vdi
+        if isinstance(step, DeferredVDI) and self.prop is not None:
+            if self._kept is None or (self._kept.deferred, self._kept.prop) != (step, self.prop):
+                self._kept = DeferredInput(step, self.prop)
+            step = self._kept.vdi()
+        self._vdi = as_vdi(step)  # refuses what has no colours
         return self._vdi
 
     @property

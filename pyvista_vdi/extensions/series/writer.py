@@ -23,7 +23,8 @@ from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, whole_file, with_suffix
 
-_NUMBERED = re.compile(r"\d{6,}\.vdi")
+#: Metadata that are the same in all steps.
+_CLASSIFICATION = ("transfer_function", "lights", "ambient_occlusion")
 
 
 class SeriesWriter:
@@ -90,12 +91,12 @@ class SeriesWriter:
         overwrite: bool = False,
         **options: Any,
     ) -> None:
-        self._make: StepMaker | None = None
         if (camera is None) != (window_size is None) or (options and camera is None):
             raise InvalidArgumentError(
                 "volumes need camera and window_size; VDIs, which have their own, take neither, "
                 "nor options of generation"
             )
+        self._make: StepMaker | None = None
         if camera is not None and window_size is not None:
             given = {"precision": precision, "device": device, **options}
             self._make = StepMaker("SeriesWriter", camera, window_size, **given)
@@ -113,27 +114,23 @@ class SeriesWriter:
         self._before: Any = None  # the last step of an earlier run, to compare the next one with
         self._lock: IO[bytes] | None = _locked(self.path)
         try:
-            self._begin(append, overwrite)
+            # Find what an earlier run has written, and refuse, remove or continue it
+            head = self.path / SERIES.head
+            numbered = [f for f in self.path.iterdir() if re.fullmatch(r"\d{6,}\.vdi", f.name)]
+            if overwrite:
+                for file in (head, *numbered):
+                    file.unlink(missing_ok=True)
+            elif append and (numbered or head.exists()):
+                steps = Archive(self.path, SERIES)
+                self._times = list(times_of(steps))
+                self._before = steps[-1] if self._times else None
+                self._range = range_of(self._before)
+            elif numbered:
+                raise refused(self.path, f" with {len(numbered)} .vdi files")
+            self._write_times(self._times)
         except BaseException:
             self.close()
             raise
-
-    def _begin(self, append: bool, overwrite: bool) -> None:
-        """Find what an earlier run has written, and refuse, remove or continue it."""
-        head = self.path / SERIES.head
-        numbered = [file for file in self.path.iterdir() if _NUMBERED.fullmatch(file.name)]
-        if overwrite:
-            for file in (head, *numbered):
-                file.unlink(missing_ok=True)
-        elif append and (numbered or head.exists()):
-            steps = Archive(self.path, SERIES)
-            self._times = list(times_of(steps))
-            if self._times:
-                self._before = steps[-1]
-                self._range = range_of(self._before)
-        elif numbered:
-            raise refused(self.path, f" with {len(numbered)} .vdi files")
-        self._write_times(self._times)
 
     def append(self, step: Any, time: float | None = None) -> VDI:
         """Write the next step.
@@ -233,17 +230,16 @@ def _locked(folder: Path) -> IO[bytes]:
 
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        if error.errno not in (errno.EAGAIN, errno.EACCES, errno.EDEADLK):
-            warn_external(
-                f"{folder} is on a file system without locks ({error.strerror}): nothing keeps a "
-                "second writer from it, whose steps would replace these"
-            )
-            return stream
-        stream.close()
-        raise VDIFileError(
-            f"{folder} is being written by another SeriesWriter: close that, or end its process, "
-            "and try again; or choose another name"
-        ) from None
+        if error.errno in (errno.EAGAIN, errno.EACCES, errno.EDEADLK):
+            stream.close()
+            raise VDIFileError(
+                f"{folder} is being written by another SeriesWriter: close that, or end its "
+                "process, and try again; or choose another name"
+            ) from None
+        warn_external(
+            f"{folder} is on a file system without locks ({error.strerror}): nothing keeps a "
+            "second writer from it, whose steps would replace these"
+        )
     return stream
 
 
@@ -267,17 +263,15 @@ def refused(path: Path, with_what: str) -> VDIFileError:
 
 def check_goes_on(path: Any, before: Any, step: Any) -> None:
     """Raise InvalidArgumentError if a VDI has another view or classification than one before."""
-    pairs: dict[str, tuple[Any, Any]] = {
-        name: (getattr(before, name, None), getattr(step, name, None))
-        for name in ("camera", "window_size", "value_range", "importance")
-    }
-    for name in ("transfer_function", "lights", "ambient_occlusion"):
-        said = (json.loads(to_json(vdi.metadata.get(name))) for vdi in (before, step))
-        pairs[name] = tuple(said)
-    for name, (had, has) in pairs.items():
-        if had != has:
+    told = [
+        {n: getattr(vdi, n, None) for n in ("camera", "window_size", "value_range", "importance")}
+        | json.loads(to_json({n: vdi.metadata.get(n) for n in _CLASSIFICATION}))
+        for vdi in (before, step)
+    ]
+    for name, had in told[0].items():
+        if had != told[1][name]:
             raise InvalidArgumentError(
                 f"{path} cannot be continued: its {name} is {had!s:.99}, and that of this step "
-                f"{has!s:.99}; give the same view and classification (clim, too), or "
+                f"{told[1][name]!s:.99}; give the same view and classification (clim, too), or "
                 "begin another series"
             )

@@ -8,7 +8,14 @@ from pathlib import Path
 
 from pyvista_vdi.cli import declare
 from pyvista_vdi.cli.generate import generating_view
-from pyvista_vdi.cli.inputs import ambient_occlusion, classification, measuring, part, read_volume
+from pyvista_vdi.cli.inputs import (
+    ambient_occlusion,
+    classification,
+    measuring,
+    part,
+    read_volume,
+    settings,
+)
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.extensions.series.archive import SET
 from pyvista_vdi.extensions.series.cli import convert_several, print_info
@@ -34,9 +41,8 @@ def generate(options: argparse.Namespace) -> int:
             volume,
             window_size=options.size,
             camera=generating_view(options, volume),
-            sample_distance=options.sample_distance,
             ambient_occlusion=occlusion,
-            memory_limit=options.memory_limit,
+            settings=settings(options),
             device=options.device,
             progress=part(bar, 0.0, 0.9, "generating"),
             **{n: getattr(options, n) for n in _VIEWS if getattr(options, n) is not None},

@@ -7,24 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.extensions.series.archive import SET, Archive, write
-from pyvista_vdi.extensions.series.series import refuse_look
+from pyvista_vdi.extensions.series import archive
+from pyvista_vdi.extensions.series.archive import SET, Archive
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
-from pyvista_vdi.io.files import format_named
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.inputs import as_vdi
 
 
 def save(vdi_set: VDISet, path: str | os.PathLike[str], **options: Any) -> Path:
     """Write one file with a set, or a page that shows it: see :meth:`VDISet.save`."""
-    refuse_look(options)
-    found = format_named(path)
-    if found is not None and found.page:
-        as_vdi(vdi_set[0])  # refuses what has no colours
-        return found.load().write_set(vdi_set, path, **options)  # type: ignore[no-any-return]
-    return write(path, SET, about(vdi_set), vdi_set, **options)
+    return archive.save(vdi_set, path, SET, about(vdi_set), **options)
 
 
 def about(vdi_set: VDISet) -> dict[str, Any]:

@@ -12,12 +12,13 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io.progress import Pieces
+from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import GENERATION_NAMES, GenerationOptions, GenerationRequest
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import CameraLike, DeviceLike, Progress, VolumeLike, WindowSize
 from pyvista_vdi.quality.view_error import world_centre
@@ -66,7 +67,7 @@ def generate_set(
         Called with the finished fraction, 0 to 1; work stops if it returns ``False``.
     **options
         All else that :func:`pyvista_vdi.generate` takes, classification included, but for quality
-        targets. ``precision`` is ``"8-byte"`` and ``view_cone`` 30 by default.
+        targets. ``precision`` is ``"8-byte"`` and the settings' ``view_cone`` 30 by default.
 
     Returns
     -------
@@ -98,10 +99,9 @@ def generate_set(
         raise InvalidArgumentError(f"half_angle must be degrees, 0 to 180; got {half_angle!r}")
     if not 0.05 <= as_float(lists) <= 8:
         raise InvalidArgumentError(f"lists must be 0.05 to 8 per pixel; got {lists!r}")
-    given: dict[str, Any] = dict(options)
-    chosen = {name: given.pop(name) for name in GENERATION_NAMES if name in given}
-    made = GenerationOptions(**{"view_cone": VIEW_CONE, "precision": "8-byte", **chosen})
-    looks = Classification.composited(given, "generate_set", GENERATION_NAMES)
+    standard = {"precision": "8-byte", "view_cone": VIEW_CONE}
+    (made,) = records_of(options, "generate_set", GenerationOptions, defaults=standard)
+    looks = Classification.composited(options, "generate_set", names_of(GenerationOptions))
     read = as_volume(volume, looks.scalars, looks.preference)
     if not isinstance(views, int | str) and np.iterable(views):
         if camera is not None or half_angle != 180:

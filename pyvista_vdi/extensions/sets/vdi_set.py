@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
-from pyvista_vdi.extensions.series.series import as_steps, mapped
+from pyvista_vdi.extensions.series.series import Called, as_steps
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.collection import VDICollection
@@ -29,15 +29,16 @@ class VDISet(VDICollection):
     """The VDIs of one scene from many views V_O: a sequence of :class:`VDI`.
 
     Made by :func:`pyvista_vdi.generate_set`, by :func:`pyvista_vdi.read` from a ``.vdiset`` file,
-    whose VDIs are read when they are asked for, or by :meth:`of` from VDIs at hand; one that was
-    read is pickled as its path.
+    whose VDIs are read when they are asked for, or from VDIs at hand; one that was read is pickled
+    as its path.
     :func:`pyvista_vdi.render`, :func:`pyvista_vdi.pick` and ``Plotter.add_vdi`` take it as they
     take a VDI, and look at that which was made nearest to the view.
 
     Parameters
     ----------
-    views : sequence of VDI
-        One per V_O; at least one, all of the same bounds.
+    views : iterable of VDI
+        One per V_O, or their VTK form; at least one, all of the same bounds. A sequence that is
+        neither list nor tuple is asked for a VDI when that is needed.
     cameras : sequence of Camera, optional
         Their views, where they are known without the VDIs.
     window_size : (int, int), optional
@@ -51,6 +52,8 @@ class VDISet(VDICollection):
     ------
     InvalidArgumentError
         If there is no VDI, or cameras are not as many.
+    InvalidVDIError
+        If one is no VDI, or they are of other bounds than the first.
     InvalidCameraError
         If an eye is farther from the centre of the bounds than float64 can say.
 
@@ -64,65 +67,40 @@ class VDISet(VDICollection):
 
     def __init__(
         self,
-        views: Sequence[VDI],
+        views: Iterable[VDI],
         cameras: Sequence[Camera] | None = None,
         *,
         window_size: Sequence[int] | None = None,
         bounds: Sequence[float] | None = None,
         camera: Any = None,
     ) -> None:
-        if not isinstance(views, Sequence):
-            raise InvalidArgumentTypeError(
-                f"views must be a sequence of VDIs, got {type(views).__name__}: pass a list"
-            )
+        self._views = as_steps(views, "a set")
         if cameras is None:
-            cameras = [vdi.camera for vdi in as_steps(views, "a set")]
+            cameras = [vdi.camera for vdi in as_steps(list(self._views), "a set")]
         elif not np.iterable(cameras):
             raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
-        cameras = [Camera.from_any(camera) for camera in cameras]
-        if not len(views) == len(cameras) > 0:
+        self._cameras = tuple(Camera.from_any(camera) for camera in cameras)
+        if not len(self._views) == len(self._cameras) > 0:
             raise InvalidArgumentError(
-                f"a set has a camera for each VDI, and at least one; got {len(views)} VDIs and "
-                f"{len(cameras)} cameras"
+                f"a set has a camera for each VDI, and at least one; got {len(self._views)} VDIs "
+                f"and {len(self._cameras)} cameras"
             )
         self.window_size = check_window_size(
-            views[0].picture_size if window_size is None else window_size
+            self[0].picture_size if window_size is None else window_size
         )
-        given = as_floats(views[0].bounds if bounds is None else bounds)
+        given = as_floats(self[0].bounds if bounds is None else bounds)
         if given.shape != (6,) or not np.isfinite(given).all():
             raise InvalidArgumentError(f"bounds must be six finite numbers; got {bounds!r}")
         self.bounds: tuple[float, ...] = tuple(given.tolist())
-        self._views, self._cameras = views, tuple(cameras)
+        for i, vdi in enumerate(self if bounds is None else ()):
+            if vdi.bounds != self.bounds:
+                raise InvalidVDIError(
+                    f"the VDIs of a set are of one scene: number {i} has the bounds "
+                    f"{vdi.bounds}, the first {self.bounds}"
+                )
         self._begin = self._cameras[0] if camera is None else Camera.from_any(camera)
         self._places = self._places_of(self._cameras)
         self._blend = BLEND
-
-    @classmethod
-    def of(cls, vdis: Iterable[VDI], *, window_size: Sequence[int] | None = None) -> VDISet:
-        """Return a set of VDIs in memory.
-
-        Parameters
-        ----------
-        vdis : iterable of VDI
-            Of one scene, from any views, or their VTK form.
-        window_size : (int, int), optional
-            As for :class:`VDISet`.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If there is none.
-        InvalidVDIError
-            If one is no VDI, or they are of other bounds than the first.
-        """
-        views = as_steps(vdis, "a set")
-        for i, vdi in enumerate(views):
-            if vdi.bounds != views[0].bounds:
-                raise InvalidVDIError(
-                    f"the VDIs of a set are of one scene: number {i} has the bounds "
-                    f"{vdi.bounds}, the first {views[0].bounds}"
-                )
-        return cls(views, window_size=window_size)
 
     @property
     def camera(self) -> Camera:
@@ -149,7 +127,7 @@ class VDISet(VDICollection):
     def __getitem__(self, index: int | slice) -> VDI | list[VDI]:
         if isinstance(index, slice):
             return [self[i] for i in range(len(self))[index]]
-        return self._views[self._place(index, "VDIs")]
+        return self._views[self._place(index, "VDIs")]  # type: ignore[no-any-return]
 
     @property
     def blend(self) -> float:
@@ -169,7 +147,7 @@ class VDISet(VDICollection):
 
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISet:
         found = VDISet(
-            mapped(function, self),
+            Called(function, self, kept=8),
             self.cameras,
             window_size=self.window_size,
             bounds=self.bounds,

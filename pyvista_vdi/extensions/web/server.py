@@ -11,24 +11,22 @@ import errno
 import hmac
 import inspect
 import ipaddress
-import json
 import logging
 import secrets
 import threading
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from typing import Any
-from urllib.parse import SplitResult, quote, urlsplit
+from urllib.parse import quote, urlsplit
 
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
-from pyvista_vdi.extensions.web.camera import viewer_camera
 from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, Wish, wish_after
 from pyvista_vdi.extensions.web.placing import encoded
 from pyvista_vdi.extensions.web.served_page import served_page
 from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
 
 try:
@@ -49,12 +47,10 @@ LISTS = 1280 * 720
 LONGEST = 8
 #: Most clients at once; the next is told so.
 MAX_CLIENTS = 256
-#: Bytes of one message of a VDI: what a slow line takes in less than STALLED.
+#: Bytes of one message of a VDI: a slow line takes it long before a client counts as gone.
 CHUNK = 64 * 1024
-#: Seconds for which a client may take nothing of what it is sent before it is dropped.
-STALLED = 30.0
-#: Seconds between two signs of life that are asked of a client.
-_HEARTBEAT = 20.0
+#: Seconds between two signs of life that are asked of a client, and half as many to give one.
+HEARTBEAT = 20.0
 #: Seconds that a client has to answer a goodbye.
 _GOODBYE = 3.0
 #: Threads in which VDIs are made: while one packs and compresses, the device works for the other.
@@ -65,21 +61,24 @@ _log = logging.getLogger(__name__)
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
+@dataclass(eq=False)
 class _Client:
-    """What a server knows of one connection."""
+    """One connection: what it wants, and what is being made for it."""
 
-    def __init__(self) -> None:
-        self.wish = Wish()  # the last
-        self.wished = asyncio.Event()  # that another wish has come
-        self.left = asyncio.Event()
-        self.cancelled = threading.Event()  # what is being made for it
+    socket: web.WebSocketResponse
+    wish: Wish = field(default_factory=Wish)  # the last
+    wished: asyncio.Event = field(default_factory=asyncio.Event)  # that another wish has come
+    cancelled: threading.Event = field(default_factory=threading.Event)
 
-    def hear(self, wish: Wish) -> None:
-        """Take note of what the client wants now; what is made of another wish is given up."""
-        if wish != self.wish:
-            self.wish = wish
-            self.cancelled.set()
-            self.wished.set()
+    async def say(self, kind: str, **entries: Any) -> None:
+        """Send a message."""
+        await self.socket.send_json({"type": kind, **entries})
+
+    async def end(self, code: int, reason: str) -> None:
+        """Say goodbye, and go."""
+        # The protocol has 123 bytes for a reason, none of them a part of a letter
+        message = reason.encode("ascii", "replace")[:120]
+        await self.socket.close(code=code, message=message, drain=False)
 
 
 class Server:
@@ -102,7 +101,7 @@ class Server:
         token: str | None = None,
         hosts: Sequence[str] = (),
         max_clients: int = MAX_CLIENTS,
-        stalled: float = STALLED,
+        heartbeat: float = HEARTBEAT,
     ) -> None:
         if token == "":
             raise InvalidArgumentError(
@@ -112,15 +111,11 @@ class Server:
         self.token = secrets.token_urlsafe(16) if token is None else token
         self.host, self.port = host, port
         self.clients: set[_Client] = set()
-        self._source = source
+        self._source, self._max_clients, self._heartbeat = source, max_clients, heartbeat
         # As browsers write names, in small letters
         self._hosts = {name.lower() for name in ("localhost", host, *hosts) if name}
-        self._max_clients = max_clients
-        self._stalled = stalled
         self._threads = ThreadPoolExecutor(_THREADS, "pyvista-vdi serve")
-        self._thread: threading.Thread | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._ended: asyncio.Event | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None  # while it listens
 
     @property
     def url(self) -> str:
@@ -136,27 +131,28 @@ class Server:
         InvalidArgumentError
             If it cannot listen there.
         """
-        listening: threading.Event = threading.Event()
-        failed: list[Exception] = []
-
-        def run() -> None:
-            try:
-                asyncio.run(self._serve(listening.set))
-            except Exception as error:
-                failed.append(error)
-                listening.set()
-
-        self._thread = threading.Thread(target=run, name="pyvista-vdi server", daemon=True)
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
-        listening.wait()
-        if failed:
-            self._threads.shutdown()
-            raise _cannot_listen(failed[0], self.host, self.port) from failed[0]
+        # The log of requests would hold the token
+        self._runner = web.AppRunner(self.application(), access_log=None)
+        try:
+            asyncio.run_coroutine_threadsafe(self._listen(), self._loop).result()
+        except (OSError, OverflowError) as error:
+            self.close()
+            why = f"cannot listen at {self.host}, port {self.port}: {error}; choose another"
+            if getattr(error, "errno", None) == errno.EADDRINUSE:
+                why = f"port {self.port} of {self.host} is in use: choose another, or 0 for a free one"
+            raise InvalidArgumentError(why) from error
         return self
+
+    async def _listen(self) -> None:
+        await self._runner.setup()
+        await web.TCPSite(self._runner, self.host, self.port).start()
+        self.port = self._runner.addresses[0][1]
 
     def wait(self) -> None:
         """Return when it has ended; Ctrl-C ends it."""
-        assert self._thread is not None
         try:
             while self._thread.is_alive():
                 self._thread.join(0.5)  # a wait without end would not let Ctrl-C through on Windows
@@ -165,11 +161,12 @@ class Server:
 
     def close(self) -> None:
         """End all connections and what is being made, and wait until that has happened."""
-        if self._loop is not None and self._ended is not None:
-            with contextlib.suppress(RuntimeError):  # it has ended by itself
-                self._loop.call_soon_threadsafe(self._ended.set)
-        if self._thread is not None:
+        loop, self._loop = self._loop, None
+        if loop is not None:
+            asyncio.run_coroutine_threadsafe(self._runner.cleanup(), loop).result()
+            loop.call_soon_threadsafe(loop.stop)
             self._thread.join()
+            loop.close()
         self._threads.shutdown(cancel_futures=True)
 
     def __enter__(self) -> Server:
@@ -178,184 +175,127 @@ class Server:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    async def _serve(self, listening: Callable[[], None]) -> None:
-        self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()
-        # The log of requests would hold the token
-        runner = web.AppRunner(self.application(), access_log=None, shutdown_timeout=2 * _GOODBYE)
-        await runner.setup()
-        try:
-            site = web.TCPSite(runner, self.host, self.port)
-            await site.start()
-            self.port = runner.addresses[0][1]
-            listening()
-            await self._ended.wait()
-        finally:
-            await runner.cleanup()
-
     def application(self) -> web.Application:
         """Return what answers requests, for an event loop of the caller's."""
-        app = web.Application(middlewares=[self._guard], client_max_size=MAX_MESSAGE)
-        app.router.add_get("/", self._page)
-        app.router.add_get("/socket", self._socket)
-        app.on_shutdown.append(self._end_clients)
-        return app
 
-    async def _end_clients(self, _: web.Application) -> None:
-        for client in list(self.clients):
-            client.left.set()
+        async def end_clients(_: web.Application) -> None:
+            goodbye = (WSCloseCode.GOING_AWAY, "the server ends")
+            await asyncio.gather(*(client.end(*goodbye) for client in [*self.clients]))
+
+        app = web.Application(middlewares=[self._guard], client_max_size=MAX_MESSAGE)
+        app.add_routes([web.get("/", self._page), web.get("/socket", self._socket)])
+        app.on_shutdown.append(end_clients)
+        return app
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         """Admit requests that know the token, from a page of ours, by a name of ours."""
-        if not self._is_ours(_place(f"//{request.host}")):
-            # A page of another site whose name was made to point here (DNS rebinding)
-            return _refused("this server does not go by that name")
         origin = request.headers.get("Origin")
-        if origin is not None and _place(origin).netloc != request.host:
-            return _refused("pages of other sites are not let in")
         given = request.query.get("token", "").encode()
-        if not hmac.compare_digest(given, self.token.encode()):
-            return _refused(
+        if not self._is_ours(request.host):
+            # A page of another site whose name was made to point here (DNS rebinding)
+            why = "this server does not go by that name"
+        elif origin is not None and origin.partition("://")[2] != request.host:
+            why = "pages of other sites are not let in"
+        elif not hmac.compare_digest(given, self.token.encode()):
+            why = (
                 "this address is no longer valid, or never was: "
                 "open the one that the server printed when it was started"
             )
-        return await handler(request)
+        else:
+            return await handler(request)
+        return web.Response(status=403, text=f"{why}\n")
 
-    def _is_ours(self, place: SplitResult) -> bool:
-        name = place.hostname or ""
+    def _is_ours(self, host: str) -> bool:
+        """Whether a host is called by a name of ours, or by a number, which cannot point here."""
         try:
-            ipaddress.ip_address(name)  # names can be made to point here, numbers cannot
-        except ValueError:
+            name = urlsplit(f"//{host}").hostname or ""
+            with contextlib.suppress(ValueError):
+                return bool(ipaddress.ip_address(name))
             return name in self._hosts
-        return True
+        except ValueError:
+            return False
 
     async def _page(self, request: web.Request) -> web.Response:
         text, headers = served_page(request.host)
         return web.Response(text=text, content_type="text/html", headers=headers)
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
+        """Hear a client, and have what it asks for made and sent, until one of these ends."""
         if len(self.clients) >= self._max_clients:
             return web.Response(status=503, text="there are as many clients as this server takes")
-        connection = web.WebSocketResponse(
-            max_msg_size=MAX_MESSAGE, heartbeat=_HEARTBEAT, compress=False
+        socket = web.WebSocketResponse(
+            timeout=_GOODBYE,
+            max_msg_size=MAX_MESSAGE,
+            heartbeat=self._heartbeat,
+            compress=False,
         )
-        if not connection.can_prepare(request):
+        if not socket.can_prepare(request):
             return web.Response(
                 status=426,
                 text="this address is a WebSocket's: open the server's page\n",
                 headers={"Upgrade": "websocket", "Sec-WebSocket-Version": "13"},
             )
-        client = _Client()
+        client = _Client(socket)
         self.clients.add(client)
+        answering = None
         try:
-            await connection.prepare(request)
-            await self._talk(client, connection, request.transport)
+            await socket.prepare(request)
+            answering = asyncio.ensure_future(self._answer(client))
+            async for message in socket:
+                if message.type is not WSMsgType.TEXT:
+                    raise BadMessageError("messages are text")
+                wish = wish_after(message.data, client.wish, self._source.offer)
+                if wish != client.wish:
+                    client.wish = wish
+                    client.cancelled.set()  # what is made of another wish
+                    client.wished.set()
+        except BadMessageError as error:
+            await client.end(WSCloseCode.POLICY_VIOLATION, str(error))
         finally:
             self.clients.discard(client)
             client.cancelled.set()
-            if request.transport is not None and not connection.closed:
-                request.transport.abort()  # also where it takes nothing that it is sent
-        return connection
+            if answering is not None:
+                answering.cancel()
+            gone = not socket.closed or socket.close_code == WSCloseCode.ABNORMAL_CLOSURE
+            if gone and request.transport is not None:
+                request.transport.abort()  # what it has not taken is not kept
+        return socket
 
-    async def _talk(
-        self, client: _Client, connection: web.WebSocketResponse, transport: Any
-    ) -> None:
-        """Hear a client, make and send what it asks for, until one of these ends."""
-        doing: tuple[Awaitable[Any], ...] = (
-            self._hear(client, connection),
-            self._answer(client, connection, transport),
-            client.left.wait(),
-        )
-        tasks = [asyncio.ensure_future(one) for one in doing]
-        try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in tasks:
-                task.cancel()
-            ends = await asyncio.gather(*tasks, return_exceptions=True)
-        code, reason = WSCloseCode.GOING_AWAY, "the server ends"
-        for error in ends:
-            if isinstance(error, BadMessageError):
-                code, reason = WSCloseCode.POLICY_VIOLATION, str(error)
-            elif isinstance(error, ConnectionError):
-                return
-            elif isinstance(error, Exception):
-                _log.error("a client was sent away", exc_info=error)
-                code, reason = WSCloseCode.INTERNAL_ERROR, "the server has failed"
-        with contextlib.suppress(asyncio.TimeoutError, ConnectionError):
-            # The protocol has 123 bytes for a reason, none of them a part of a letter
-            closing = connection.close(code=code, message=reason.encode("ascii", "replace")[:120])
-            await asyncio.wait_for(closing, _GOODBYE)
-
-    async def _hear(self, client: _Client, connection: web.WebSocketResponse) -> None:
-        async for message in connection:
-            if message.type is not WSMsgType.TEXT:
-                raise BadMessageError("messages are text")
-            client.hear(wish_after(message.data, client.wish, self._source.offer))
-
-    async def _answer(
-        self, client: _Client, connection: web.WebSocketResponse, transport: Any
-    ) -> None:
+    async def _answer(self, client: _Client) -> None:
         """Make and send a VDI of the last wish, and of what is wished meanwhile the last again."""
-
-        async def tell(**entries: Any) -> None:
-            await self._put(connection, transport, json.dumps(entries))
-
-        await tell(**self._hello())
-        while True:
-            await client.wished.wait()
-            client.wished.clear()
-            wish, client.cancelled = client.wish, threading.Event()
-            if wish.view is None:
-                continue
-            await tell(type="status", doing="vdi")
-            try:
-                lists, file = await asyncio.get_running_loop().run_in_executor(
-                    self._threads, self._made, wish, client.cancelled.is_set
-                )
-            except Cancelled:
-                continue
-            except VDIError as error:
-                await tell(type="status", doing=None)
-                await tell(type="error", message=str(error))
-                continue
-            if file:
-                await tell(type="vdi", bytes=len(file), lists=lists, step=wish.step)
+        try:
+            await client.say("hello", protocol=PROTOCOL, **self._source.offer)
+            while await client.wished.wait():
+                client.wished.clear()
+                wish, client.cancelled = client.wish, threading.Event()
+                if wish.view is None:
+                    continue
+                await client.say("status", doing="vdi")
+                try:
+                    lists, file = await asyncio.get_running_loop().run_in_executor(
+                        self._threads, self._made, wish, client.cancelled.is_set
+                    )
+                except Cancelled:
+                    continue
+                except VDIError as error:
+                    await client.say("status", doing=None)
+                    await client.say("error", message=str(error))
+                    continue
+                if file:
+                    await client.say("vdi", bytes=len(file), lists=lists, step=wish.step)
                 for first in range(0, len(file), CHUNK):
-                    await self._put(connection, transport, file[first : first + CHUNK])
-            await tell(type="status", doing=None)
+                    await client.socket.send_bytes(file[first : first + CHUNK])
+                await client.say("status", doing=None)
+        except ConnectionError:
+            pass  # who is gone needs nothing more
+        except Exception:
+            _log.exception("a client was sent away")
+            await client.end(WSCloseCode.INTERNAL_ERROR, "the server has failed")
 
     def _made(self, wish: Wish, cancelled: Callable[[], bool]) -> tuple[tuple[int, int], bytes]:
         vdi = self._source.make(wish, cancelled)
         return ((0, 0), b"") if vdi is None else (vdi.window_size, encoded(vdi, coarse=True))
-
-    async def _put(
-        self, connection: web.WebSocketResponse, transport: Any, data: str | bytes
-    ) -> None:
-        """Send one message, or drop a client that takes none for too long."""
-        # Not asyncio.wait_for, which before Python 3.12 may lose that the task was cancelled
-        drop = asyncio.get_running_loop().call_later(self._stalled, transport.abort)
-        try:
-            if isinstance(data, str):
-                await connection.send_str(data)
-            else:
-                await connection.send_bytes(data)
-        finally:
-            drop.cancel()
-
-    def _hello(self) -> dict[str, Any]:
-        source = self._source
-        return {
-            "type": "hello",
-            "protocol": PROTOCOL,
-            "bounds": list(source.bounds),
-            "camera": viewer_camera(filling_camera(source.bounds, (4, 3))),
-            "steps": source.offer.steps,
-            "cmaps": list(source.offer.cmaps),
-            "opacities": list(source.offer.opacities),
-            "look": source.started_with,
-            "range": list(source.range),
-        }
 
 
 def serve(
@@ -456,26 +396,3 @@ def _is_sequence(volume: Any) -> bool:
     if isinstance(volume, str) or hasattr(volume, "dtype") or hasattr(volume, "GetClassName"):
         return False
     return hasattr(volume, "__len__") and hasattr(volume, "__getitem__")
-
-
-def _place(url: str) -> SplitResult:
-    """Return the parts of a URL; none of what is no URL."""
-    try:
-        return urlsplit(url)
-    except ValueError:
-        return urlsplit("")
-
-
-def _refused(why: str) -> web.Response:
-    return web.Response(status=403, text=f"{why}\n")
-
-
-def _cannot_listen(error: Exception, host: str, port: int) -> Exception:
-    if not isinstance(error, OSError | OverflowError):
-        return error
-    if getattr(error, "errno", None) == errno.EADDRINUSE:
-        return InvalidArgumentError(
-            f"port {port} of {host} is in use: choose another, or 0 for one that is free"
-        )
-    why = getattr(error, "strerror", None) or error
-    return InvalidArgumentError(f"cannot listen at {host}, port {port}: {why}; choose another")

@@ -26,40 +26,35 @@ except ImportError as error:
         'this is a component for trame, which is not installed: pip install "pyvista-vdi[web]"'
     ) from error
 
-#: The component: a viewer that follows two properties, and says where it is turned to.
+#: The component: a viewer that follows three properties, and says where it is turned to.
 _COMPONENT = """
-window.pyvistaVDI = {
-  install(app) {
-    app.component("vdi-view", {
-      props: ["file", "eye", "background"],
-      emits: ["turned"],
-      render() { return Vue.h("vdi-viewer"); },
-      mounted() {
-        this.told = "";
-        this.$el.addEventListener("camerachange", () => {
-          const { clientWidth, clientHeight, camera } = this.$el;
-          const density = window.devicePixelRatio || 1;
-          const size = [clientWidth, clientHeight].map((e) => Math.max(1, Math.round(e * density)));
-          clearTimeout(this.timer);
-          this.timer = setTimeout(() => {
-            const text = JSON.stringify([camera, size]);
-            if (text !== this.told) this.$emit("turned", { camera, size });
-            this.told = text;
-          }, 100);
-        });
-        this.$watch("background", (color) => { if (color) this.$el.background = color; },
-          { immediate: true });
-        this.$watch("eye", (camera) => { if (camera) this.$el.camera = { ...camera }; },
-          { immediate: true });
-        this.$watch("file", async (file) => {
-          if (!file) return;
-          const bytes = new Uint8Array(await new Response(file).arrayBuffer());
-          if (file === this.file) this.$el.showBytes(bytes).catch(() => {});
-        }, { immediate: true });
-      },
+window.pyvistaVDI = { install(app) { app.component("vdi-view", {
+  props: ["file", "eye", "background"],
+  emits: ["turned"],
+  render() { return Vue.h("vdi-viewer"); },
+  mounted() {
+    const viewer = this.$el;
+    const follow = (name, take) =>
+      this.$watch(name, (value) => { if (value) take(value); }, { immediate: true });
+    let timer, told = "";
+    viewer.addEventListener("camerachange", () => {
+      clearTimeout(timer);
+      timer = setTimeout(() => {
+        const density = window.devicePixelRatio || 1, { camera, clientWidth, clientHeight } = viewer;
+        const size = [clientWidth, clientHeight].map((e) => Math.max(1, Math.round(e * density)));
+        const text = JSON.stringify({ camera, size });
+        if (text !== told) this.$emit("turned", { camera, size });
+        told = text;
+      }, 100);
+    });
+    follow("background", (color) => { viewer.background = color; });
+    follow("eye", (camera) => { viewer.camera = { ...camera }; });
+    follow("file", async (file) => {
+      const bytes = new Uint8Array(await new Response(file).arrayBuffer());
+      if (file === this.file) viewer.showBytes(bytes).catch(() => {});
     });
   },
-};
+}); } };
 """
 
 _numbers = itertools.count(1)
@@ -71,9 +66,10 @@ def _module() -> dict[str, Any]:
     folder = tempfile.mkdtemp(prefix="pyvista-vdi-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     (Path(folder) / "viewer.js").write_text(viewer_script() + _COMPONENT, encoding="utf-8")
+    served = "__pyvista_vdi"
     return {
-        "serve": {"__pyvista_vdi": folder},
-        "scripts": ["__pyvista_vdi/viewer.js"],
+        "serve": {served: folder},
+        "scripts": [f"{served}/viewer.js"],
         "vue_use": ["pyvistaVDI"],
     }
 

@@ -19,6 +19,8 @@ from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, w
 from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, head_of, stack
 
+_APART = "put those that belong together into a folder of their own"
+
 
 class _Slice(NamedTuple):
     """A frame of a file: lengths are millimetres, arrays are empty where the file says nothing."""
@@ -36,38 +38,33 @@ def dicom(path: Path) -> list[VolumeInFile]:
     """Return the series of a folder, or that of a file of several frames."""
     import pydicom
 
-    with pydicom.config.disable_value_validation():  # else it warns of each long number
-        return _series(path)
-
-
-def _series(path: Path) -> list[VolumeInFile]:
-    series, damaged, found = defaultdict(list), [], []
-    refused: list[tuple[int, VDIError]] = []
+    series, found = defaultdict(list), []
+    damaged: list[str] = []
+    refused: list[tuple[int, VDIError]] = []  # and how many slices each has
     files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
-    for file in files:
-        try:
-            for one in _slices(file):
-                series[one.header.get("SeriesInstanceUID", "")].append(one)
-        except UnsupportedError as error:
-            refused.append((len(files), error))
-        except Exception as error:  # damage shows at whatever pydicom comes to first
-            damaged.append(f"{file} cannot be read as a DICOM slice: {error}")
-    if damaged and series:
-        warn_external(
-            f"{len(damaged)} of {len(files)} files in the folder {path} are left out, as they "
-            f"are damaged; the first: {damaged[0]}"
-        )
-    for uid, those in series.items():
-        try:
-            name = str(those[0].header.get("SeriesDescription") or uid)
-            found.append(_volume(path, those, name))
-        except VDIError as error:
-            refused.append((len(those), error))
+    with pydicom.config.disable_value_validation():  # else it warns of each long number
+        for file in files:
+            try:
+                for one in _slices(file):
+                    series[one.header.get("SeriesInstanceUID", "")].append(one)
+            except UnsupportedError as error:
+                refused.append((len(files), error))
+            except Exception as error:  # damage shows at whatever pydicom comes to first
+                damaged.append(f"{file} cannot be read as a DICOM slice: {error}")
+        if damaged and series:
+            left_out = f"{len(damaged)} of {len(files)} files in the folder {path} are left out"
+            warn_external(f"{left_out}, as they are damaged; the first: {damaged[0]}")
+        for uid, those in series.items():
+            try:
+                name = str(those[0].header.get("SeriesDescription") or uid)
+                found.append(_volume(path, those, name))
+            except VDIError as error:
+                refused.append((len(those), error))
     if not found and refused:
         raise max(refused, key=lambda each: each[0])[1]
     if not found:
-        none = f"{path} holds no slices ({len(files)} files, none is DICOM, TIFF or PNG): give the"
-        raise InvalidVolumeError(damaged[0] if damaged else f"{none} folder that holds them")
+        none = f"{path} holds no slices of DICOM, TIFF or PNG: give the folder that holds them"
+        raise InvalidVolumeError(damaged[0] if damaged else none)
     for count, why in refused:
         if count > 1:
             warn_external(f"a series of {count} slices is left out: {why}")
@@ -108,9 +105,7 @@ def _slices(file: Path) -> list[_Slice]:
         if count > 1 and not own and len(position) and len(turn):
             position = position + (offsets[i] - offsets[0]) * np.cross(turn[:3], turn[3:])
         if count > 1 and not (len(turn) and len(position) and np.isfinite(position).all()):
-            raise UnsupportedError(
-                f"{file} holds {count} frames that do not say where they lie, as those of a film"
-            )
+            raise UnsupportedError(f"{file} holds {count} frames that do not say where they lie")
         values = "PixelValueTransformationSequence"
         slope = data.get("DoseGridScaling") or of(i, values, "RescaleSlope", 1)
         line = float(slope) or 1.0, float(of(i, values, "RescaleIntercept", 0))
@@ -122,47 +117,39 @@ def _slices(file: Path) -> list[_Slice]:
 def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
     """Return a series in the order of its places."""
     if len(slices) < 2:
-        raise InvalidVolumeError(
-            f"{path} holds one slice: give the folder that holds all slices of its series"
-        )
+        raise InvalidVolumeError(f"{path} holds one slice: give the folder of all of its series")
     slices.sort(key=lambda one: (one.header.get("InstanceNumber") or 0, one.file.name, one.frame))
     first, what = slices[0], f"slices in {path}"
     read = partial(_pixels, lru_cache(maxsize=1)(_decoded))  # once for all frames of a file
     rows, columns = first.spacing if len(first.spacing) and first.spacing.min() > 0 else (1.0, 1.0)
     if not len(first.spacing):
-        warn_external(
-            f"{what} do not say how large pixels are, and 1 mm is taken: give spacing=(x, y, z)"
-        )
+        warn_external(f"{what} do not say how large pixels are, and 1 mm is taken: give spacing=")
     if any(len(one.position) != 3 or len(one.turn) != 6 for one in slices):
-        apart = float(first.header.get("SliceThickness") or columns)
+        step = float(first.header.get("SliceThickness") or columns)
         warn_external(
             f"{what} do not say where they lie or how they are turned: rows are taken to run along "
-            f"y, slices along z, {apart:g} apart, in an order that may be the wrong one"
+            f"y, slices along z, {step:g} apart, in an order that may be the wrong one"
         )
         array = stack(slices, lambda one: read(one)[::-1], mixed=True)
-        return VolumeInFile(array, "zyx", to_world((columns, rows, apart)), name, "mm")
+        return VolumeInFile(array, "zyx", to_world((columns, rows, step)), name, "mm")
     if any(
         not np.array_equal(one.spacing, first.spacing)
         or not np.allclose(one.turn, first.turn, atol=1e-3)
         for one in slices
     ):
         raise InvalidVolumeError(
-            f"{what} are turned against each other, as of a localiser, or have pixels of several "
-            "sizes: put those that belong together into a folder of their own"
+            f"{what} are turned against each other, or have pixels of several sizes: {_APART}"
         )
     along, down = first.turn.reshape(2, 3)
     slices.sort(key=lambda one: one.position @ np.cross(along, down))
     gaps = np.diff([one.position @ np.cross(along, down) for one in slices])
     if not gaps.min() > 0.01 * gaps.mean():
         raise InvalidVolumeError(
-            f"several {what} lie in the same place, as those of several times or echoes do: put "
-            "those of one into a folder of their own"
+            f"several {what} lie in the same place, as those of several times do: {_APART}"
         )
     if np.ptp(gaps) > 0.01 * gaps.mean():  # more are missing slices
-        warn_external(
-            f"{what} are {gaps.min():g} to {gaps.max():g} apart, and are taken as "
-            f"{gaps.mean():g} apart: some are missing, or resample them"
-        )
+        apart = f"{gaps.min():g} to {gaps.max():g} apart, and are taken as {gaps.mean():g} apart"
+        warn_external(f"{what} are {apart}: some are missing, or resample them")
     # The step is along the normal, unless a gantry was tilted
     step = (slices[-1].position - slices[0].position) / len(gaps)
     place = to_world(np.column_stack([along * columns, down * rows, step]), slices[0].position)
@@ -174,8 +161,10 @@ def _decoded(file: Path) -> tuple[Any, NDArray[Any]]:
     import pydicom
 
     data = pydicom.dcmread(file)
+    if data.SamplesPerPixel != 1:
+        raise UnsupportedError(f"{file} holds colours: convert them to grey values")
     try:
-        pixels = data.pixel_array
+        return data, data.pixel_array.reshape(-1, data.Rows, data.Columns)
     except Exception as error:
         syntax = pydicom.uid.UID(data.file_meta.TransferSyntaxUID)
         if not syntax.is_encapsulated:
@@ -184,20 +173,16 @@ def _decoded(file: Path) -> tuple[Any, NDArray[Any]]:
             f"{file} is compressed as {syntax.name} ({syntax}), which cannot be decoded here "
             f"({' '.join(str(error).split())}): decode the slices by gdcmconv --raw"
         ) from error
-    if data.SamplesPerPixel != 1:
-        raise UnsupportedError(f"{file} holds colours: convert them to grey values")
-    return data, pixels.reshape(-1, data.Rows, data.Columns)
 
 
 def _pixels(decoded: Callable[[Path], tuple[Any, NDArray[Any]]], one: _Slice) -> NDArray[Any]:
     """Return the values that a slice means: whole numbers where slope and intercept are."""
-    import pydicom
+    from pydicom.pixels import apply_modality_lut
 
     data, stored = decoded(one.file)
     values = stored[one.frame]
     if data.get("ModalityLUTSequence"):  # in place of a line
-        found: NDArray[Any] = pydicom.pixels.apply_modality_lut(values, data)
-        return found
+        return np.asarray(apply_modality_lut(values, data))
     slope, intercept = one.line
     if slope == 1 and intercept == 0:
         return values

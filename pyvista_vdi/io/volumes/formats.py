@@ -25,7 +25,6 @@ from pyvista_vdi.model.host_memory import aligned_empty
 _UNITS = {1: "m", 2: "mm", 3: "um"}
 _MODES = {0: "i1", 1: "i2", 2: "f4", 6: "u2", 12: "f2"}
 _MICRONS = ("um", "µm", "\\u00b5m", "micron", "microns")
-_TIFF = (".tif", ".tiff")
 
 
 def nrrd(file: Path) -> list[VolumeInFile]:
@@ -36,9 +35,8 @@ def nrrd(file: Path) -> list[VolumeInFile]:
     import nrrd
 
     head = head_of(file).partition(b"\n\n")[0].decode("latin-1")
-    header: Any = {}
-    if not re.search(r"(?im)^(data ?file: *(LIST|\S*%)|axis ?m)", head):
-        header = nrrd.read_header(str(file))
+    apart = re.search(r"(?im)^(data ?file: *(LIST|\S*%)|axis ?m)", head)
+    header: Any = {} if apart else nrrd.read_header(str(file))
     if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space", "???"}:
         array, axes, place = _by_itk(file)
         # ITK turns frames that grow to the right and the front: turn them back
@@ -95,8 +93,16 @@ def nifti(file: Path) -> list[VolumeInFile]:
     order = "<" if head[:4] == b"\x5c\x01\0\0" else ">"
     real, short = (partial(np.frombuffer, head, f"{order}{kind}") for kind in ("f4", "i2"))
     n, *counts = short(8, 40).tolist()
-    points, bits = np.prod(counts[:n], dtype=object), int(short(1, 72)[0])
-    _require_bytes(file, int(real(1, 108)[0]) + points * bits // 8)
+    # Refuse values that ITK would fill up with zeros, or that gzip's checksum refuses
+    needed = int(real(1, 108)[0]) + np.prod(counts[:n], dtype=object) * int(short(1, 72)[0]) // 8
+    values, size = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name)), 0
+    with values.open("rb") as plain:
+        unpacked: Any = gzip.open if plain.read(2) == b"\x1f\x8b" else Path.open
+    with unpacked(values, "rb") as stream:
+        while part := stream.read(1 << 24):
+            size += len(part)
+    if size < needed:
+        raise InvalidVolumeError(f"it has {size} of {needed} bytes: it is cut off")
     slope, shift = real(2, 112)
     if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
         array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled
@@ -114,18 +120,6 @@ def nifti(file: Path) -> list[VolumeInFile]:
     return [VolumeInFile(array, axes, place, unit=_UNITS.get(head[123] & 7, ""))]
 
 
-def _require_bytes(file: Path, count: int) -> None:
-    """Refuse a file of values that ITK would fill with zeros, or that gzip's checksum refuses."""
-    values, size = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name)), 0
-    with values.open("rb") as stream:
-        packed = stream.read(2) == b"\x1f\x8b"
-    with gzip.open(values) if packed else values.open("rb") as stream:
-        while part := stream.read(1 << 24):
-            size += len(part)
-    if size < count:
-        raise InvalidVolumeError(f"it has {size} of {count} bytes: it is cut off")
-
-
 def mrc(file: Path) -> list[VolumeInFile]:
     """Return an MRC or CCP4 map, axes as MAPC, MAPR and MAPS have them; lengths in angstrom.
 
@@ -136,9 +130,7 @@ def mrc(file: Path) -> list[VolumeInFile]:
     words, reals = (np.frombuffer(head, f"{order}{kind}4", 56) for kind in "if")
     shape, mode, mapped = words[2::-1].tolist(), int(words[3]), words[16:19].tolist()
     if head[208:212] != b"MAP " or mode not in _MODES or sorted(mapped) != [1, 2, 3]:
-        raise InvalidVolumeError(
-            f"it is no map, or of mode {mode}, where modes {', '.join(map(str, _MODES))} are read"
-        )
+        raise InvalidVolumeError(f"it is no map, or of mode {mode}, and {[*_MODES]} are read")
     axes = "".join("?xyz"[n] for n in mapped)
     counts = np.maximum(words[7:10], 1)
     step = np.where(reals[10:13] > 0, reals[10:13].astype(np.float64) / counts, 1.0)
@@ -151,17 +143,17 @@ def mrc(file: Path) -> list[VolumeInFile]:
 
 
 def numpy(file: Path) -> list[VolumeInFile]:
-    """Return the array of an .npy file, or those of three axes in an .npz file."""
+    """Return the array of an .npy file, or those of three axes or more in an .npz file."""
     if file.suffix.lower() == ".npz":
         with file.open("rb") as stream, np.lib.npyio.NpzFile(stream) as packed:  # no objects
-            return [_array(packed[name], name) for name in packed if packed[name].ndim > 2]
-    return [_array(np.lib.format.open_memmap(file, mode="r"))]
-
-
-def _array(array: NDArray[Any], name: str = "") -> VolumeInFile:
-    n, colors = array.ndim, array.shape[3:] == (4,) and array.dtype == np.uint8
-    axes = "zyxs" if colors else "?" * (n - 3) + "zyx"[-n:]
-    return VolumeInFile(array, axes, name=name)
+            arrays = {name: packed[name] for name in packed if packed[name].ndim > 2}
+    else:
+        arrays = {"": np.lib.format.open_memmap(file, mode="r")}
+    colors = [n for n, a in arrays.items() if a.shape[3:] == (4,) and a.dtype == np.uint8]
+    return [
+        VolumeInFile(a, "zyxs" if n in colors else "?" * (a.ndim - 3) + "zyx"[-a.ndim :], name=n)
+        for n, a in arrays.items()
+    ]
 
 
 def tiff(file: Path) -> list[VolumeInFile]:
@@ -171,50 +163,39 @@ def tiff(file: Path) -> list[VolumeInFile]:
     def read(number: int, down: int) -> NDArray[Any]:
         with tifffile.TiffFile(file) as again:
             values = np.flip(again.asarray(series=number), down)
-        return values if calibrated is None else (values * slope + shift).astype(calibrated)
+        return values if kept is None else (values * slope + shift).astype(kept)
 
     found = []
     with tifffile.TiffFile(file) as opened:
-        calibrated, slope, shift = _calibration(opened)
-        many = len(opened.series) > 1
+        # ImageJ keeps signed values as unsigned ones, and others by a line
+        said = (opened.imagej_metadata or {}) if opened.is_imagej else {}
+        shift, slope = float(said.get("c0", 0.0)), float(said.get("c1", 1.0))
+        signed = (slope, shift) == (1, -32768) and opened.series[0].dtype == np.uint16
+        function = said.get("cf", 0 if (slope, shift) != (1, 0) else -1)
+        kept = np.dtype(np.int16 if signed else np.float32) if function == 0 else None
+        if function not in (-1, 0, 20, 21):  # none, or of an uncalibrated density
+            said = f"{file} calibrates its values by ImageJ's function {function}"
+            warn_external(f"{said}, which is not applied: apply it in ImageJ")
         for number, series in enumerate(opened.series):
-            axes = _axes(series)
+            axes = str(series.axes).lower()
+            # Of axes that nothing names the last is z
+            if unnamed := next((a for a in "qi" if a in axes and "z" not in axes), None):
+                axes = "z".join(axes.rsplit(unnamed, 1))
             if not {*"zyx"} <= {*axes} or series.keyframe.is_reduced:
                 continue
-            lazy = partial(read, number, axes.index("y"))
-            array = Lazy(series.shape, calibrated or series.dtype, lazy)
-            size, unit, channels = _described(opened, number, series)
-            name = series.name if many else ""
-            found.append(VolumeInFile(array, axes, to_world(size), name, unit, channels))
+            lazy = Lazy(series.shape, kept or series.dtype, partial(read, number, axes.index("y")))
+            size, unit, names = _described(opened, number, series.keyframe)
+            channels = series.shape[axes.index("c")] if "c" in axes else 0
+            each = len({*names}) == len(names) == channels and all(names)
+            name = series.name if len(opened.series) > 1 else ""
+            place = to_world(size)
+            found.append(VolumeInFile(lazy, axes, place, name, unit, tuple(names) if each else ()))
     return found
 
 
-def _axes(series: Any) -> str:
-    """Return the axes' letters: of those that nothing names the last is z."""
-    axes = str(series.axes).lower()
-    unnamed = next((letter for letter in "qi" if letter in axes and "z" not in axes), None)
-    return "z".join(axes.rsplit(unnamed, 1)) if unnamed else axes
-
-
-def _calibration(opened: Any) -> tuple[Any, float, float]:
-    """Return what ImageJ's values are of and by which line; it keeps signed ones as unsigned."""
-    said = (opened.imagej_metadata or {}) if opened.is_imagej else {}
-    shift, slope = float(said.get("c0", 0.0)), float(said.get("c1", 1.0))
-    function = said.get("cf", 0 if (slope, shift) != (1, 0) else -1)
-    if function not in (-1, 0, 20, 21):  # none, or of an uncalibrated density
-        warn_external(
-            f"{opened.filename} calibrates its values by ImageJ's function {function}, which is "
-            "not applied: values are those that are stored; apply it in ImageJ"
-        )
-    if function != 0:
-        return None, 1.0, 0.0
-    signed = (slope, shift) == (1, -32768) and opened.series[0].dtype == np.uint16
-    return np.dtype(np.int16 if signed else np.float32), slope, shift
-
-
-def _described(opened: Any, number: int, series: Any) -> tuple[list[float], str, tuple[str, ...]]:
+def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, list[str]]:
     """Return the spacing along x, y and z, its unit and the channels' names, as the file says."""
-    page, names, size, unit, alone = series.keyframe, [], [1.0, 1.0, 1.0], "", ""
+    size, unit, alone, names = [1.0, 1.0, 1.0], "", "", []
     per = page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
     described = opened.ome_metadata if opened.is_ome else ""
     of_ome = ET.fromstring(described).findall(".//{*}Pixels")[number:] if described else []
@@ -236,19 +217,15 @@ def _described(opened: Any, number: int, series: Any) -> tuple[list[float], str,
     elif int(page.tags.valueof("ResolutionUnit", 1)) == 3 and all(per):
         alone = f"{10 / per[0]:g} x {10 / per[1]:g} mm"  # an inch's are most often nobody's
     if alone:
-        warn_external(
-            f"{opened.filename} says that pixels are {alone}, and not how far apart slices are: "
-            "spacing is taken as 1; give spacing=(x, y, z)"
-        )
-    channels = series.shape[axes.index("c")] if "c" in (axes := _axes(series)) else 0
-    each = len({*names}) == len(names) == channels and all(names)
-    return size, unit, tuple(names) if each else ()
+        said = f"{opened.filename} says that pixels are {alone}, and not how far apart slices are"
+        warn_external(f"{said}: spacing is taken as 1; give spacing=(x, y, z)")
+    return size, unit, names
 
 
 def slices_in(folder: Path) -> list[Path]:
     """Return the pictures of slices in a folder, in natural order; none beside DICOM slices."""
     files = [path for path in folder.iterdir() if path.is_file() and path.name[0] != "."]
-    found = [file for file in files if file.suffix.lower() in (*_TIFF, ".png")]
+    found = [file for file in files if file.suffix.lower() in (".tif", ".tiff", ".png")]
     if found and any(head_of(file)[128:132] == b"DICM" for file in {*files} - {*found}):
         return []  # previews of a scan
     return sorted(found, key=lambda file: natural_key(file.name.lower()))
@@ -263,36 +240,29 @@ def pictures(path: Path) -> list[VolumeInFile]:
     if len({file.suffix.lower() == ".png" for file in files}) > 1:
         raise InvalidVolumeError(f"{path} holds TIFF and PNG files: put those of one volume apart")
     if len(files) < 2:
-        raise InvalidVolumeError(
-            f"{path} holds one slice, and a volume needs two: give the folder that holds all"
-        )
+        raise InvalidVolumeError(f"{path} holds one slice, and a volume needs two: give the folder")
     numbers = [int(n[-1]) for file in files if (n := re.findall(r"\d+", file.stem))]
     if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
-        warn_external(
-            f"the numbers of the slices in the folder {path} are not evenly spaced "
-            f"({files[0].name} to {files[-1].name}, {len(files)} files), and are taken as if: "
-            "are some missing?"
-        )
+        names = f"{files[0].name} to {files[-1].name}, {len(files)} files"
+        warn_external(f"slices in {path} are not evenly spaced ({names}): are some missing?")
     slices = stack(files, _picture)
     return [VolumeInFile(slices, "zyxs"[: len(slices.shape)])]
 
 
 def _picture(file: Path) -> NDArray[Any]:
     try:
-        if file.suffix.lower() in _TIFF:
+        if file.suffix.lower() != ".png":
             import tifffile
 
-            found = np.asarray(tifffile.imread(file))
-        else:
-            from PIL import Image
+            return np.asarray(tifffile.imread(file))[::-1]
+        from PIL import Image
 
-            with Image.open(file) as picture:
-                found = np.asarray(picture.convert("RGBA") if picture.mode == "P" else picture)
-                if picture.mode == "I":  # of 16 bits, as older versions have them
-                    found = found.astype(np.uint16)
+        with Image.open(file) as picture:
+            found = np.asarray(picture.convert("RGBA") if picture.mode == "P" else picture)
+            # Of 16 bits, as older versions have them
+            return found.astype(np.uint16 if picture.mode == "I" else found.dtype)[::-1]
     except Exception as error:  # each format has readers, and exceptions, of its own
         raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
-    return found[::-1]
 
 
 def vtk(file: Path) -> list[VolumeInFile]:
@@ -308,34 +278,27 @@ class VolumeFormat(NamedTuple):
 
     name: str
     suffixes: tuple[str, ...]
-    volumes_in: Callable[[Path], list[VolumeInFile]] | None
+    volumes_in: Callable[[Path], list[VolumeInFile]] | None  # None: a store, which is opened
     library: str
     extra: str = "files"
     magic: tuple[bytes, ...] = ()
 
 
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_VTK = (b"# vtk DataFile", b"<VTKFile")
+_TABLE: Any = (
+    ("NRRD", ".nrrd .nhdr", nrrd, "nrrd", "", (b"NRRD0",)),
+    ("NIfTI", ".nii .nii.gz .hdr .img .img.gz", nifti, "SimpleITK"),
+    ("MetaImage", ".mha .mhd", itk, "SimpleITK"),
+    ("GIPL, MINC 2", ".gipl .gipl.gz .mnc", itk, "SimpleITK"),
+    ("MRC", ".mrc .map .ccp4 .mrcs .st .ali", mrc, "numpy", ""),
+    ("DICOM", ".dcm .ima", dicom, "pydicom", "files", (b"DICM",)),
+    ("TIFF", ".tif .tiff .btf .tf8 .lsm", tiff, "tifffile", "files", _TIFF),
+    ("HDF5", ".h5 .hdf5 .he5 .hdf .nxs", None, "h5py", "files", (b"\x89HDF",)),
+    ("NumPy", ".npy .npz", numpy, "numpy", "", (b"\x93NUMPY",)),
+    ("PNG slices", ".png", pictures, "PIL", ""),
+    ("VTK", ".vti .vtr .vtm .vtk .pvti .vtkhdf", vtk, "pyvista", "plot", _VTK),
+)
 FORMATS = {
-    each.name: each
-    for each in (
-        VolumeFormat("NRRD", (".nrrd", ".nhdr"), nrrd, "nrrd", "", (b"NRRD0",)),
-        VolumeFormat("NIfTI", (".nii", ".nii.gz", ".hdr", ".img", ".img.gz"), nifti, "SimpleITK"),
-        VolumeFormat("MetaImage", (".mha", ".mhd"), itk, "SimpleITK"),
-        VolumeFormat("GIPL, MINC 2", (".gipl", ".gipl.gz", ".mnc"), itk, "SimpleITK"),
-        VolumeFormat("MRC", (".mrc", ".map", ".ccp4", ".mrcs", ".st", ".ali"), mrc, "numpy", ""),
-        VolumeFormat("DICOM", (".dcm", ".ima"), dicom, "pydicom", magic=(b"DICM",)),
-        VolumeFormat(
-            *("TIFF", (*_TIFF, ".btf", ".tf8", ".lsm"), tiff, "tifffile"),
-            magic=(b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
-        ),
-        VolumeFormat(
-            *("HDF5", (".h5", ".hdf5", ".he5", ".hdf", ".nxs"), None, "h5py"),
-            magic=(b"\x89HDF",),  # a store, which is opened
-        ),
-        VolumeFormat("NumPy", (".npy", ".npz"), numpy, "numpy", "", (b"\x93NUMPY",)),
-        VolumeFormat("PNG slices", (".png",), pictures, "PIL", ""),
-        VolumeFormat(
-            *("VTK", (".vti", ".vtr", ".vtm", ".vtk", ".pvti", ".vtkhdf"), vtk, "pyvista", "plot"),
-            magic=(b"# vtk DataFile", b"<VTKFile"),
-        ),
-    )
+    name: VolumeFormat(name, tuple(suffixes.split()), *more) for name, suffixes, *more in _TABLE
 }

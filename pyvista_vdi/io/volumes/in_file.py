@@ -126,16 +126,14 @@ def chosen(
     if not names:
         raise InvalidVolumeError(f"{file} holds no {what} of three axes")
     count = len(names)
-    numbered = f"0 to {count - 1}" if isinstance(names, range) else ", ".join(names)
-    said = f"{file} holds {count} {what}s, {listed or numbered}"
-    if asked is None and count == 1:
-        return 0
-    if asked is None:
-        raise UnsupportedError(f"{said}, and a volume is one: choose one by {how}")
-    if asked in names:
-        return names.index(asked)
+    listed = listed or (f"0 to {count - 1}" if isinstance(names, range) else ", ".join(names))
+    if asked is None and count > 1:
+        which = "and a volume is one: choose one by"
+        raise UnsupportedError(f"{file} holds {count} {what}s, {listed}, {which} {how}")
+    if asked is None or asked in names:
+        return 0 if asked is None else names.index(asked)
     if isinstance(asked, bool | str) or not 0 <= asked < count:
-        raise InvalidArgumentError(f"{file} has no {what} {asked!r}: it holds {listed or numbered}")
+        raise InvalidArgumentError(f"{file} has no {what} {asked!r}: it holds {listed}")
     return int(asked)
 
 
@@ -153,9 +151,8 @@ def volume_of(
         "c": chosen(file, "channel", channels, channel, "channel=0 (--channel 0)"),
     }
     kept = "".join(axis for axis in axes if axis in "zyxs")
-    if sorted(kept.replace("s", "")) != ["x", "y", "z"] or any(
-        n > 1 for axis, n in count.items() if axis not in "zyxstc"
-    ):
+    others = (n for axis, n in count.items() if axis not in "zyxstc")
+    if sorted(kept.replace("s", "")) != [*"xyz"] or any(n > 1 for n in others):
         raise InvalidVolumeError(
             f"{file} has the axes {', '.join(axes)}, of shape {shape}: a volume has three, and "
             f"beside them times and channels; {REMEDY}"
@@ -178,20 +175,14 @@ def volume_of(
     return volume
 
 
-def placed(
-    volume: Volume, spacing: Sequence[float] | None, origin: Sequence[float] | None
-) -> Volume:
+def placed(volume: Volume, spacing: Any, origin: Any) -> Volume:
     """Return a volume with another spacing or origin, where one is given."""
     if spacing is None and origin is None:
         return volume
-    other = Volume(
-        volume.array,
-        volume.spacing if spacing is None else spacing,
-        volume.origin if origin is None else origin,
-        volume.direction,
-        name=volume.name,
-        blanked=volume.blanked,
-    )
+    along = volume.spacing if spacing is None else spacing
+    begin = volume.origin if origin is None else origin
+    known = {"name": volume.name, "blanked": volume.blanked}
+    other = Volume(volume.array, along, begin, volume.direction, **known)
     other.unit = volume.unit if spacing is None else ""  # another spacing may be in another
     return other
 
@@ -206,7 +197,6 @@ def _grey(array: NDArray[Any], file: Path) -> NDArray[Any]:
     if components == 4 and array.dtype == np.uint8:
         return array
     raise UnsupportedError(
-        f"the voxels of {file} are coloured, {components} components of type {array.dtype}: "
-        "choose one by channel=0, or write them as grey values, or as 8-bit RGBA whose fourth "
-        "component is the opacity"
+        f"the voxels of {file} are coloured, {components} components of type {array.dtype}: choose "
+        "one by channel=0, or write grey values, or 8-bit RGBA whose fourth component is opacity"
     )

@@ -93,8 +93,7 @@ def read_volume(
     with _explained(file, kind):
         found = volumes_in(file)
         meant = [each for each in found if each.meant]
-        if asked is None and len(meant) == 1:
-            found = meant
+        found = meant if asked is None and len(meant) == 1 else found
         names, listed = [each.name or "values" for each in found], "; ".join(map(str, found[:20]))
         number = chosen(file, "volume", names, asked, "array= or series=", listed)
         return placed(volume_of(found[number], file, channel, time), spacing, origin)
@@ -140,21 +139,20 @@ def _format(path: str | os.PathLike[str]) -> VolumeFormat:
             return FORMATS["HDF5"]
         if os.path.isdir(file):  # noqa: PTH112 - pathlib's raises for a name that is too long
             return FORMATS["PNG slices" if slices_in(file) else "DICOM"]
+        why, name = "", file.name.lower()
         if not os.path.exists(file):  # noqa: PTH110
             why = "does not exist: check the volume's path, or name a shipped volume by --example"
-            raise InvalidVolumeError(f"{file} {why} (pyvista_vdi.examples)")
-        if not file.is_file() or not file.stat().st_size:
-            raise InvalidVolumeError(f"{file} cannot be read as a volume: it is empty, or no file")
-        if lists_steps(file):
-            raise InvalidVolumeError(
-                f"{file} lists time steps, and one volume is asked for: name the file of one, or "
-                "make a series of all (pyvista-vdi series)"
-            )
-        name, head = file.name.lower(), head_of(file)
-        if name.endswith((".vdi", ".exr", ".html")):
-            raise InvalidVolumeError(
-                f"{file} is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
-            )
+            why += " (pyvista_vdi.examples)"
+        elif not file.is_file() or not file.stat().st_size:
+            why = "cannot be read as a volume: it is empty, or no file"
+        elif lists_steps(file):
+            why = "lists time steps, and one volume is asked for: name the file of one, or "
+            why += "make a series of all (pyvista-vdi series)"
+        elif name.endswith((".vdi", ".exr", ".html")):
+            why = "is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
+        if why:
+            raise InvalidVolumeError(f"{file} {why}")
+        head = head_of(file)
         for each in FORMATS.values():
             if name.endswith(each.suffixes) and not head.startswith(b"CDF"):  # as MINC 1 is
                 return each
@@ -176,10 +174,9 @@ def _explained(file: Path, kind: VolumeFormat) -> Iterator[None]:
     mine = threading.get_ident()
 
     def passes(record: logging.LogRecord) -> bool:
-        if record.thread != mine or record.levelno < logging.WARNING:
-            return True
-        said.append(record)
-        return False
+        own = record.thread == mine and record.levelno >= logging.WARNING
+        said.extend([record] * own)
+        return not own
 
     # A filter of this thread's records: handlers are the process's, and its other threads' as well
     loggers = [logging.getLogger(name) for name in ("tifffile", "pydicom")]

@@ -43,7 +43,7 @@ from pyvista_vdi.vtk_pipeline.drawing.screen import (
     shown_box,
 )
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
-from pyvista_vdi.vtk_pipeline.drawing.settings import Settings
+from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.filters.inputs import ROUNDING, Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
@@ -84,7 +84,7 @@ class Driver:
     """
 
     def __init__(self) -> None:
-        self.settings = Settings()
+        self.settings = MapperSettings()
         self.device: Any = None
         self.input: Input | None = None
         self.box, self.texts = Box(), CornerTexts()

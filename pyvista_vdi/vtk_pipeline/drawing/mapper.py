@@ -113,8 +113,8 @@ class VDIMapperMethods(ArrayChoiceMethods):
         """
         if not isinstance(series, VDICollection) or series.times is None:
             raise InvalidArgumentError(
-                f"SetSeries takes a VDISeries; got {type(series).__name__}: VDISeries.of makes one "
-                "of several VDIs"
+                f"SetSeries takes a VDISeries; got {type(series).__name__}: VDISeries(vdis) "
+                "makes one of several VDIs"
             )
         self._set_input(input_of(series))
 
@@ -133,8 +133,8 @@ class VDIMapperMethods(ArrayChoiceMethods):
         """
         if not isinstance(vdi_set, VDICollection) or vdi_set.times is not None:
             raise InvalidArgumentError(
-                f"SetVDISet takes a VDISet; got {type(vdi_set).__name__}: VDISet.of makes one of "
-                "several VDIs"
+                f"SetVDISet takes a VDISet; got {type(vdi_set).__name__}: VDISet(vdis) makes "
+                "one of several VDIs"
             )
         self._set_input(input_of(vdi_set))
 

@@ -9,6 +9,7 @@ import shutil
 import numpy as np
 import pytest
 from command_line import run
+from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import (
@@ -22,7 +23,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:the transfer function shows valu
 
 SIZE, RANGE = (24, 16), (20, 180)
 TIMES = (0.0, 0.5, 2.0, 4.0)
-KEPT = {"classification": "deferred", "value_range": RANGE, "importance": [1, 2]}
+KEPT = {"classification": "deferred", "value_range": RANGE}
+KEPT["settings"] = pvdi.Settings(importance=[1, 2])
 LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.8], "clim": (40, 170)}
 
 
@@ -68,7 +70,7 @@ def test_what_is_read_is_what_generate_makes_of_each_step(precision, alone, save
         else:
             assert all_equal(series, made)
     assert "20 to 180" in repr(series)
-    assert all_equal(pvdi.VDISeries.of(alone)[1:3], alone[1:3])
+    assert all_equal(pvdi.VDISeries(alone)[1:3], alone[1:3])
 
 
 def test_a_look_is_that_of_each_step_alone_and_of_one_range(alone, saved):
@@ -134,7 +136,7 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
         with pytest.raises(InvalidVDIError, match="keeps values from 20"):
             out.append(alone[0])
     with pytest.raises(InvalidVDIError, match="number 1 keeps values from 0"):
-        pvdi.VDISeries.of([alone[0], other])
+        pvdi.VDISeries([alone[0], other])
 
 
 @pytest.mark.parametrize(
@@ -149,7 +151,9 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
 def test_what_cannot_be_kept_is_refused_before_a_step_is_written(kept, says, tmp_path):
     path = tmp_path / "a.vdis"
     with (
-        pvdi.SeriesWriter(path, CAMERA, SIZE, classification="deferred", **kept) as out,
+        pvdi.SeriesWriter(
+            path, CAMERA, SIZE, classification="deferred", **with_settings(**kept)
+        ) as out,
         pytest.raises((InvalidArgumentError, UnsupportedError), match=says),
     ):
         out.append(next(volumes()))
@@ -161,7 +165,7 @@ def test_what_cannot_be_kept_is_refused_before_a_step_is_written(kept, says, tmp
 def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
     path = shutil.copytree(saved, tmp_path / "run.vdis")
     with (
-        pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT | {"importance": None}) as out,
+        pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT | {"settings": None}) as out,
         pytest.raises(InvalidArgumentError, match=r"importance is \(\(20\.0, 1\.0\), .*None"),
     ):
         out.append(next(volumes()), 9.0)
@@ -172,7 +176,7 @@ def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
 
 
 def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
-    series = pvdi.VDISeries.of(alone)
+    series = pvdi.VDISeries(alone)
     with pytest.raises(InvalidVDIError, match="no colours yet"):
         series.save(tmp_path / "run.html")
     for vdis in (series, series.classified(**LOOK)):
@@ -189,7 +193,7 @@ def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
 
 @pytest.mark.parametrize("wrong", [{"version": 2}, {"version": 1, "value_range": [1, 0]}])
 def test_what_is_said_of_values_is_checked(wrong, alone, tmp_path, monkeypatch):
-    series = pvdi.VDISeries.of(alone)
+    series = pvdi.VDISeries(alone)
     with monkeypatch.context() as patched:
         patched.setattr(pvdi.DeferredVDI, "about", wrong)
         path = series.save(tmp_path / "run.vdis")

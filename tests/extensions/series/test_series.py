@@ -232,12 +232,12 @@ def test_refusals_name_the_function_and_the_remedy(volumes, camera):
 
 
 def test_series_of_vdis_at_hand(series):
-    again = pvdi.VDISeries.of(list(series))
+    again = pvdi.VDISeries(list(series))
     assert again.times == (0.0, 1.0, 2.0, 3.0)
     assert again[2] is series[2]
     with pytest.raises(InvalidArgumentError, match="at least one"):
-        pvdi.VDISeries.of([])
+        pvdi.VDISeries([])
     with pytest.raises(InvalidVDIError, match="in a list"):
-        pvdi.VDISeries.of(series[0])
+        pvdi.VDISeries(series[0])
     with pytest.raises(InvalidArgumentError, match="4 steps and 1 times"):
-        pvdi.VDISeries.of(series, [3])
+        pvdi.VDISeries(series, [3])

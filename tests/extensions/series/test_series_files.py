@@ -36,7 +36,7 @@ def saved(request, steps, tmp_path_factory):
     path = tmp_path_factory.mktemp("series") / "a.vdis"
     times = np.arange(5) * 0.5
     if request.param == "file":
-        return pvdi.VDISeries.of(steps, times).save(path)
+        return pvdi.VDISeries(steps, times).save(path)
     with pvdi.SeriesWriter(path) as out:
         for step, at in zip(steps, times, strict=True):
             out.append(step, at)
@@ -81,7 +81,7 @@ def test_a_step_is_a_vdi_file_and_a_file_is_the_folder_zipped(steps, saved, tmp_
 def test_precisions_and_compressions(precision, compression, tmp_path):
     steps = [stepped_vdi(step=k) for k in range(2)]
     options = {"precision": precision, "compression": compression}
-    read = pvdi.read(pvdi.VDISeries.of(steps).save(tmp_path / "a.vdis", **options))
+    read = pvdi.read(pvdi.VDISeries(steps).save(tmp_path / "a.vdis", **options))
     with pvdi.SeriesWriter(tmp_path / "b.vdis", **options) as out:
         for step in steps:
             out.append(step)
@@ -95,7 +95,7 @@ def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
     empty = pvdi.VDI(camera, (3, 2), np.zeros(7, int), [], [], np.empty((0, 3)), [], first.bounds)
     told = stepped_vdi(metadata={"told": [1.5, None]})
     steps = [step.with_precision("8-byte") for step in (first, empty, told, first)]
-    assert all_same(pvdi.read(pvdi.VDISeries.of(steps).save(tmp_path / "a.vdis")), steps)
+    assert all_same(pvdi.read(pvdi.VDISeries(steps).save(tmp_path / "a.vdis")), steps)
 
 
 def test_what_was_appended_is_readable_at_once(steps, tmp_path):
@@ -137,7 +137,7 @@ def test_a_series_is_continued_replaced_or_kept(steps, tmp_path):
     with pytest.raises(InvalidArgumentError, match="pass one of them"):
         pvdi.SeriesWriter(path, append=True, overwrite=True)
     with pytest.raises(VDIFileError, match="it is a folder"):
-        pvdi.VDISeries.of(steps).save(path)
+        pvdi.VDISeries(steps).save(path)
     with pvdi.SeriesWriter(path, append=True) as out:
         assert len(out) == 3
         with pytest.raises(InvalidArgumentError, match=r"ascend; got 2\.0 after 2\.0"):
@@ -169,7 +169,7 @@ def test_files_of_others_are_named_and_stay(content, read, steps, tmp_path):
             pvdi.SeriesWriter(path, **way)
     if content == EARLIER:
         with pytest.raises(VDIFileError, match=r"earlier format.*another name"):
-            pvdi.VDISeries.of(steps).save(path)
+            pvdi.VDISeries(steps).save(path)
     assert path.read_bytes() == content
 
 
@@ -209,7 +209,7 @@ def test_times_that_cannot_be_are_refused(change, why, steps, tmp_path):
 
 def test_a_file_that_is_cut_off_or_changed_is_noticed(tmp_path):
     steps, path = packed_steps(3, size=(6, 4)), tmp_path / "a.vdis"
-    data = pvdi.VDISeries.of(steps).save(path).read_bytes()
+    data = pvdi.VDISeries(steps).save(path).read_bytes()
     for n in [*range(0, len(data), 397), len(data) - 1]:
         path.write_bytes(data[:n])
         with pytest.raises(VDIFileError):
@@ -232,7 +232,7 @@ def test_a_file_that_is_cut_off_or_changed_is_noticed(tmp_path):
 
 
 def test_a_file_that_is_compressed_once_more_is_refused(steps, tmp_path):
-    saved = pvdi.VDISeries.of(steps[:1]).save(tmp_path / "a.vdis")
+    saved = pvdi.VDISeries(steps[:1]).save(tmp_path / "a.vdis")
     with zipfile.ZipFile(saved) as one, zipfile.ZipFile(tmp_path / "b.vdis", "w", 8) as other:
         for name in one.namelist():
             other.writestr(name, one.read(name))
@@ -284,7 +284,7 @@ def test_a_writer_takes_volumes(tmp_path, default_runtime):
 def test_options_and_names_that_there_are_not(options, what, steps, tmp_path):
     path = tmp_path / options.get("name", "a.vdis")
     options = {key: value for key, value in options.items() if key != "name"}
-    for save in (pvdi.VDISeries.of(steps[:1]).save, pvdi.SeriesWriter):
+    for save in (pvdi.VDISeries(steps[:1]).save, pvdi.SeriesWriter):
         with pytest.raises((InvalidArgumentError, VDIFileError), match=what):
             save(path, **options)
     assert not list(tmp_path.iterdir())

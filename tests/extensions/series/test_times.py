@@ -37,7 +37,7 @@ ASKED = ((0.5, 0), (3.0, 2), (2.5, 1), (-7.0, 0), (1e9, 2), (1.0, 1))
 def path(tmp_path):
     vdis = [random_vdi(np.random.default_rng(seed)) for seed in range(3)]
     assert len({vdi.window_size for vdi in vdis}) == 3
-    return pvdi.VDISeries.of(vdis, TIMES).save(tmp_path / "a.vdis")
+    return pvdi.VDISeries(vdis, TIMES).save(tmp_path / "a.vdis")
 
 
 def reader_of(path):

@@ -37,7 +37,7 @@ def views(default_runtime):
 
 @pytest.fixture(scope="module")
 def saved(views, tmp_path_factory):
-    return pvdi.VDISet.of(views).save(tmp_path_factory.mktemp("set") / "ball.vdiset")
+    return pvdi.VDISet(views).save(tmp_path_factory.mktemp("set") / "ball.vdiset")
 
 
 @pytest.mark.filterwarnings("ignore:the transfer function shows values outside")
@@ -46,7 +46,7 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path, 
     assert all(one.equals(other) for one, other in zip(found, views, strict=True))
     assert found.value_range == (1, 250)
     assert "1 to 250" in repr(found)
-    baked = pvdi.VDISet.of([view.classified(**LOOK) for view in views])
+    baked = pvdi.VDISet([view.classified(**LOOK) for view in views])
     view = CAMERA.azimuth(12)
     expected = pvdi.render(baked, view)
     assert np.array_equal(pvdi.render(found.classified(**LOOK), view), expected)
@@ -59,7 +59,7 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path, 
         with pytest.raises(InvalidVDIError, match="no colours yet"):
             refused()
     with pytest.raises(InvalidVDIError, match="number 1 has colours"):
-        pvdi.VDISet.of([views[0], baked[1]])
+        pvdi.VDISet([views[0], baked[1]])
     with pytest.raises(TypeError, match="generate_set.*generate_series"):
         pvdi.generate_set(soft_ball(12), window_size=SIZE, classification="deferred")
     assert "values from 1 to 250" in run(capsys, "info", saved)
@@ -83,6 +83,6 @@ def test_its_property_is_followed_in_a_plotter(plotter, saved):
     for _ in range(2):
         values = [view.classified(volume_property=actor.prop) for view in pvdi.read(saved)]
         pictures.append(frame(plotter))
-        assert np.abs(pictures[-1] - picture_of(pvdi.VDISet.of(values), plotter)).max() <= 1
+        assert np.abs(pictures[-1] - picture_of(pvdi.VDISet(values), plotter)).max() <= 1
         actor.prop.GetScalarOpacity().AddPoint(60, 1.0)
     assert np.abs(pictures[1] - pictures[0]).max() > 8

@@ -27,7 +27,7 @@ def vdis():
 
 @pytest.fixture(scope="module")
 def saved(vdis, tmp_path_factory):
-    made = pvdi.VDISet.of(vdis, window_size=(40, 30))
+    made = pvdi.VDISet(vdis, window_size=(40, 30))
     return made.save(tmp_path_factory.mktemp("sets") / "a.vdiset")
 
 
@@ -85,7 +85,7 @@ def test_what_the_json_says_wrongly_is_refused(changes, saved, tmp_path):
 
 
 def test_foreign_files_and_names(saved, vdis, tmp_path):
-    other = pvdi.VDISeries.of([vdis[0]]).save(tmp_path / "a.vdis")
+    other = pvdi.VDISeries([vdis[0]]).save(tmp_path / "a.vdis")
     for name, content, message in (
         ("b.vdiset", other.read_bytes(), r"no set\.json"),
         ("c.vdis", saved.read_bytes(), r"no series\.json"),
@@ -97,8 +97,8 @@ def test_foreign_files_and_names(saved, vdis, tmp_path):
     with pytest.raises(VDIFileError, match="absent|cannot be read"):
         pvdi.read(tmp_path / "none.vdiset")
     with pytest.raises(VDIFileError, match="vdiset"):
-        pvdi.VDISet.of(vdis).save(tmp_path / "a.vdi")
+        pvdi.VDISet(vdis).save(tmp_path / "a.vdi")
     with pytest.raises(InvalidArgumentError, match="compression"):
-        pvdi.VDISet.of(vdis).save(tmp_path / "a.vdiset", compression="zip")
+        pvdi.VDISet(vdis).save(tmp_path / "a.vdiset", compression="zip")
     with pytest.raises(InvalidArgumentError, match="option"):
         pvdi.read(saved, thickness=3)

@@ -23,7 +23,7 @@ def once(default_runtime):
 @pytest.fixture
 def made(once):
     """The same set, which may be blended otherwise without the others' seeing it."""
-    return pvdi.VDISet.of(list(once), window_size=once.window_size)
+    return pvdi.VDISet(list(once), window_size=once.window_size)
 
 
 @pytest.fixture

@@ -104,7 +104,7 @@ def test_of_two_eyes_in_a_line_the_one_at_that_distance_is_nearest(volume, aroun
         pvdi.generate(volume, view, (16, 9), transfer_function=_table(), max_supersegments=2)
         for view in (near, far)
     ]
-    both = pvdi.VDISet.of(vdis)
+    both = pvdi.VDISet(vdis)
     assert both.nearest(near) == 0
     assert both.nearest(far) == 1
     # Twice as far is ln 2, as if turned by that angle
@@ -181,7 +181,7 @@ def test_a_vdi_of_a_set_is_what_generate_makes(made, volume):
         vdi.window_size,
         transfer_function=_table(),
         max_supersegments=8,
-        view_cone=30,
+        settings=pvdi.Settings(view_cone=30),
         precision="8-byte",
     )
     assert vdi.precision == "8-byte"
@@ -225,13 +225,13 @@ def test_arguments_out_of_range_are_named(changes, error, said, volume):
 
 def test_what_is_no_set_is_refused(made):
     with pytest.raises(InvalidArgumentError, match="at least one"):
-        pvdi.VDISet.of([])
+        pvdi.VDISet([])
     with pytest.raises(InvalidVDIError, match="in a list"):
-        pvdi.VDISet.of(made[0])
+        pvdi.VDISet(made[0])
     z = pvdi.Volume(np.zeros((3, 3, 3), np.uint8))
     other = pvdi.generate(z, VIEW, (4, 4), transfer_function=_table())
     with pytest.raises(InvalidVDIError, match="bounds"):
-        pvdi.VDISet.of([made[0], other])
+        pvdi.VDISet([made[0], other])
     with pytest.raises(IndexError, match=r"is out of range: there are \d+ VDIs"):
         made[len(made)]
     assert [vdi is made[i] for i, vdi in enumerate(made)] == [True] * len(made)

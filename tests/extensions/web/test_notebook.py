@@ -327,11 +327,11 @@ def test_a_viewer_keeps_its_subplot(linked):
 @pytest.fixture(scope="module")
 def series(vdi):
     dense = thinned(vdi, 4.0)
-    return pvdi.VDISeries.of([vdi.with_precision("8-byte"), dense], [0.0, 1.5])
+    return pvdi.VDISeries([vdi.with_precision("8-byte"), dense], [0.0, 1.5])
 
 
 def test_series_and_sets_are_sent_whole(series, vdi, tmp_path):
-    made = pvdi.VDISet.of([vdi, pvdi.generate(BALL, vdi.camera.azimuth(90), SIZE, cmap="bone")])
+    made = pvdi.VDISet([vdi, pvdi.generate(BALL, vdi.camera.azimuth(90), SIZE, cmap="bone")])
     for shown, suffix in ((series, ".vdis"), (made, ".vdiset")):
         data, _ = shown._repr_mimebundle_()
         assert WIDGET_VIEW in data
@@ -363,7 +363,7 @@ def test_a_plotter_s_series_plays_and_has_the_plotter_s_time(plotter, series):
     plotter.render()
     assert widget._file != file
     assert (widget.time, actor.time) == (0, 0)
-    plotter.add_vdi(pvdi.VDISeries.of(list(series), [0, 1]), name="another", show_scalar_bar=False)
+    plotter.add_vdi(pvdi.VDISeries(list(series), [0, 1]), name="another", show_scalar_bar=False)
     with pytest.warns(UserWarning, match=r"all but one of the 2 steps .*\(another\)"):
         show_plotter(plotter)
 
@@ -396,7 +396,7 @@ def test_a_view_that_rests_gets_a_vdi_of_its_own(plotter):
     """As in a window on the screen, and seen by the viewer, in the loop that cells run in."""
 
     async def in_a_kernel():
-        actor = add_ball(plotter, regenerate_below=1.0)
+        actor = add_ball(plotter, settings=pvdi.Settings(regenerate_below=1.0))
         widget = show(plotter)
         first, file = widget.vdi, file_of(widget)
         turned = viewer_camera(pvdi.Camera.from_any(plotter.camera).azimuth(70))
@@ -519,7 +519,7 @@ def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget, tmp_
     apart = np.abs(picture(page, SIZE, "viewers[0]") / 255 - packed).max(axis=2)
     assert np.mean(apart <= 2 / 255) >= 0.999  # as of what has colours
     assert page.page.get_by_label("Transfer function and clipping").count()
-    several = {"series": pvdi.VDISeries.of([kept]), "set": pvdi.VDISet.of([kept])}
+    several = {"series": pvdi.VDISeries([kept]), "set": pvdi.VDISet([kept])}
     for name, vdis in several.items():
         with pytest.raises(pvdi.InvalidVDIError, match=rf"this {name} keeps.*{name}\.classified"):
             VDIWidget(vdis, **look)

@@ -63,7 +63,7 @@ def series(default_runtime):
 def vdi_set(default_runtime):
     volume = soft_ball(16)
     views = orbit(filling_camera(volume.bounds, SIZE), volume.bounds, spread(6, (0, 0, 1), 180))
-    return pvdi.VDISet.of([pvdi.generate(volume, view, SIZE, **LOOKS) for view in views])
+    return pvdi.VDISet([pvdi.generate(volume, view, SIZE, **LOOKS) for view in views])
 
 
 def look_from(plotter, view):

@@ -315,7 +315,7 @@ _entries = st.fixed_dictionaries(
 @settings(max_examples=50)
 @given(_entries | _json)
 def test_any_message_is_taken_or_refused(message):
-    offer = messages.Offer(2, ("bone",), ("linear",))
+    offer = {"steps": 2, "cmaps": ["bone"], "opacities": ["linear"]}
     with contextlib.suppress(messages.BadMessageError):
         wish = messages.wish_after(json.dumps(message), messages.Wish(), offer)
         assert isinstance(wish, messages.Wish)
@@ -341,7 +341,7 @@ async def test_extreme_views_harm_nobody(client, other):
 
 @pytest.mark.slow
 def test_a_client_that_stops_reading_is_dropped(own_server, tmp_path):
-    server = own_server(stalled=0.5)
+    server = own_server(heartbeat=0.5)
 
     async def story():
         # All but: a chunk of a VDI would take it half a minute

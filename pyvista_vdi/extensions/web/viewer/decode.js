@@ -2,9 +2,7 @@
 // checked: checksums of all members, sizes that are declared against those that are there, codes
 // and depths against a VDI's rules; and nothing is allocated for a mere declaration.
 
-import {
-  GrowingBytes, REMEDY, VDIFileError, crc32, damaged, unpackChunk,
-} from "./unpack.js";
+import { GrowingBytes, REMEDY, VDIFileError, crc32, damaged, inflate } from "./bytes.js";
 
 /** The version of files that are compressed with deflate, which browsers inflate by themselves. */
 const VERSION = 4;
@@ -303,11 +301,18 @@ async function unpacked(array) {
   let at = 0;
   for (const { bytes, raw } of array.chunks) {
     const rows = out.subarray(at, at + raw);
-    await unpackChunk(bytes, rows, array.rowBytes);
+    unshuffle(await inflate(bytes, raw), rows, array.rowBytes);
     at += raw;
   }
   array.chunks = null;
   return out;
+}
+
+// Byte planes to elements: first the first bytes of all, then the second ones.
+function unshuffle(planes, out, size) {
+  for (let plane = 0, k = 0; plane < size; ++plane) {
+    for (let to = plane; to < out.length; to += size) out[to] = planes[k++];
+  }
 }
 
 // -- arrays --------------------------------------------------------------------------------------

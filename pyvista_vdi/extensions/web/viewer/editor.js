@@ -1,7 +1,6 @@
 // The editor of a transfer function: a curve of opacities over a histogram, colours, window and level.
 import { COLORMAPS } from "./colormaps.js";
-import { htmlElement, svgElement } from "./html.js";
-import { inShort } from "./marks.js";
+import { htmlElement, inShort, setSlider, slider, svgElement } from "./html.js";
 
 /** Shares that an arrow key moves a point by, and with Shift. */
 const NUDGE = 0.01, STRIDE = 0.1;
@@ -16,30 +15,11 @@ const PRESETS = {
   Step: [0, 0, 0.49, 0, 0.51, 0.9, 1, 0.9],
 };
 
-/** In a viewer's sheet of styles. */
-export const EDITOR_STYLE = `
-.curve { position: relative; height: 120px; margin: 6px 0; touch-action: none; cursor: crosshair;
-  box-shadow: 0 0 0 1px var(--edge); }
-.curve svg { position: absolute; inset: 0; width: 100%; height: 100%; overflow: clip;
-  overflow-clip-margin: 2px; }
-.curve path { vector-effect: non-scaling-stroke; }
-.curve .lengths { fill: #8886; }
-.curve .line { fill: none; stroke: currentColor; stroke-width: 2; }
-.point { position: absolute; width: 24px; height: 24px; margin: -12px; border-radius: 12px; cursor: move; }
-.point::after { content: ""; position: absolute; inset: 6px; border: 2px solid currentColor;
-  border-radius: 50%; background: var(--paper); }
-.point.last::after { background: var(--mark); }
-.colors { height: 10px; margin: 6px 0; }
-.ends { display: flex; justify-content: space-between; min-height: 20px; font-size: 12px;
-  font-variant-numeric: tabular-nums; }
-.editor .row { display: flex; gap: 4px; margin: 4px 0; }
-.editor .row button { flex: 1; min-width: 0; padding: 0 2px; border: 1px solid var(--edge); }
-.editor button:disabled { opacity: 0.6; cursor: default; }
-.editor select { flex: 1; min-width: 0; height: 32px; font: inherit; color: inherit;
-  background: var(--paper); border: 1px solid var(--edge); border-radius: 6px; }
-@container (max-width: 479px) { .panel:has(.editor:not([hidden])) { inset: auto 6px 6px; width: auto; max-height: 40%; } }`;
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+  Home: [-Infinity, 0], End: [Infinity, 0] };
 
-const thousandths = (x) => Math.round(1000 * Math.min(Math.max(x, 0), 1)) / 1000;
+const clamped = (x, low = 0, high = 1) => Math.min(Math.max(x, low), high);
+const thousandths = (x) => Math.round(1000 * clamped(x)) / 1000;
 
 /**
  * The editor of what a viewer shows of a VDI that keeps values.
@@ -47,56 +27,41 @@ const thousandths = (x) => Math.round(1000 * Math.min(Math.max(x, 0), 1)) / 1000
  * @param {HTMLElement} viewer The element.
  * @param {function(string, function(), string): HTMLElement} button Makes one: its name, what it
  *   does and what stands on it.
- * @returns {{element: HTMLElement, show: function(), key: function(KeyboardEvent, EventTarget): boolean,
- *   undo: function(KeyboardEvent, EventTarget): boolean, reset: function()}} `show` what the viewer has;
- *   whether a `key` is taken, and one with Ctrl by `undo`; `reset`: to what the file begins with.
+ * @returns {{element: HTMLElement, show: function(), key: function(KeyboardEvent, EventTarget): boolean}}
+ *   `show` what the viewer has; whether a `key` is taken.
  */
 export function transferEditor(viewer, button) {
-  const before = []; // that undo goes back to
   let last = 0; // the point that was used last
   let dragged = null; // a pointer's number
-  let gesture = null; // what changes as one: a pointer, a slider, or repeats of a key
 
   const current = () => viewer.look.transfer ?? viewer.values.start;
-  const pointsOf = () => {
-    const { points } = current();
-    return Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1]]);
-  };
-  const give = (transfer) => (viewer.look = { ...viewer.look, transfer });
-  const change = (changes, by = null) => {
-    if (by === null || by !== gesture) before.push(viewer.look.transfer ?? null);
-    gesture = by;
-    give(changes && { ...current(), ...changes });
-  };
-  const back = () => {
-    if (!before.length) return;
-    gesture = null;
-    give(before.pop());
-  };
-
-  // -- points ------------------------------------------------------------------------------------
-
-  const valueOf = (x) => {
-    const [low, high] = current().clim;
-    return low + x * (high - low);
-  };
+  const change = (changes) =>
+    (viewer.look = { ...viewer.look, transfer: { ...current(), ...changes } });
   const shareOf = (value) => { // of the values that are kept
     const [low, high] = viewer.values.range;
     return (value - low) / (high - low);
   };
-  const move = (k, x, y, by) => { // between its neighbours
-    const points = pointsOf();
-    const [low, high] = [points[k - 1]?.[0] ?? 0, points[k + 1]?.[0] ?? 1];
-    points[k] = [Math.min(Math.max(thousandths(x), low), high), thousandths(y)];
-    change({ points: points.flat() }, by);
+  const valueOf = (x) => {
+    const [low, high] = current().clim;
+    return low + x * (high - low);
   };
-  const add = (x, y, by) => {
+
+  // -- points ------------------------------------------------------------------------------------
+
+  const pointsOf = () => {
+    const { points } = current();
+    return Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1]]);
+  };
+  const move = (k, x, y) => { // between its neighbours
     const points = pointsOf();
-    let k = points.findIndex(([other]) => other > x);
-    if (k < 0) k = points.length;
-    points.splice(k, 0, [thousandths(x), thousandths(y)]);
-    last = k;
-    change({ points: points.flat() }, by);
+    points[k] = [clamped(thousandths(x), points[k - 1]?.[0], points[k + 1]?.[0]), thousandths(y)];
+    change({ points: points.flat() });
+  };
+  const add = (x, y) => {
+    const points = pointsOf(), k = points.findIndex(([other]) => other > x);
+    last = k < 0 ? points.length : k;
+    points.splice(last, 0, [thousandths(x), thousandths(y)]);
+    change({ points: points.flat() });
   };
   const addBehind = () => { // in the middle of what follows the point, or of what is before the last
     const points = pointsOf(), k = Math.min(last, Math.max(points.length - 2, 0));
@@ -114,10 +79,9 @@ export function transferEditor(viewer, button) {
   };
 
   const lengths = svgElement("path", { class: "lengths" }), line = svgElement("path", { class: "line" });
-  const drawing = svgElement("svg", { viewBox: "0 0 1 1", preserveAspectRatio: "none", "aria-hidden": "true" },
-    lengths, line);
   const curve = htmlElement("div", { className: "curve", role: "group",
-    label: "Opacity over values: press to add a point, drag to move one" }, drawing);
+    label: "Opacity over values: press to add a point, drag to move one" },
+  svgElement("svg", { viewBox: "0 0 1 1", preserveAspectRatio: "none", "aria-hidden": "true" }, lengths, line));
   const marks = []; // of points
   const markOf = (k) => {
     const mark = htmlElement("div", { className: "point", role: "slider", tabIndex: 0 });
@@ -128,98 +92,64 @@ export function transferEditor(viewer, button) {
     curve.append(mark);
     return mark;
   };
-
-  const placeOf = ({ clientX, clientY }) => {
+  const placeOf = ({ clientX, clientY }) => { // share of the window, opacity, and pixels of both
     const { left, top, width, height } = curve.getBoundingClientRect();
-    const [low, high] = viewer.values.range, [first, end] = current().clim;
-    const value = low + (clientX - left) / width * (high - low);
-    return { x: (value - first) / (end - first), y: 1 - (clientY - top) / height, width, height };
+    const [first, end] = current().clim.map(shareOf), wide = width * (end - first);
+    return { x: ((clientX - left) - width * first) / wide, y: 1 - (clientY - top) / height, wide, height };
   };
-  const nearest = ({ x, y, width, height }) => {
-    const [first, end] = current().clim, wide = width * (shareOf(end) - shareOf(first));
-    const far = ([px, py]) => Math.hypot((px - x) * wide, (py - y) * height);
-    const points = pointsOf();
-    const k = points.reduce((best, point, i) => (far(point) < far(points[best]) ? i : best), 0);
-    return far(points[k]) <= NEAR ? k : -1;
+  const pressed = (event) => { // takes the nearest point, or makes one
+    const { x, y, wide, height } = placeOf(event);
+    const far = pointsOf().map(([px, py]) => Math.hypot((px - x) * wide, (py - y) * height));
+    const nearest = Math.min(...far);
+    if (nearest <= NEAR) last = far.indexOf(nearest);
+    else add(x, y);
+    marks[last].focus({ preventScroll: true });
   };
-  let number = 0; // of the gesture
   curve.addEventListener("pointerdown", (event) => {
     if (event.button || dragged !== null) return;
-    event.preventDefault(); // the focus is given below
-    const place = placeOf(event), k = nearest(place);
+    event.preventDefault(); // the focus is given by hand
     dragged = event.pointerId;
     curve.setPointerCapture(dragged);
-    ++number;
-    if (k >= 0) last = k;
-    else add(place.x, place.y, number);
-    marks[last].focus({ preventScroll: true });
+    pressed(event);
   });
   curve.addEventListener("pointermove", (event) => {
     if (event.pointerId !== dragged) return;
     const { x, y } = placeOf(event);
-    move(last, x, y, number);
+    move(last, x, y);
   });
-  for (const name of ["pointerup", "pointercancel"]) {
-    curve.addEventListener(name, (event) => {
-      if (event.pointerId === dragged) dragged = gesture = null;
-    });
-  }
+  curve.addEventListener("lostpointercapture", () => (dragged = null));
 
   // -- colours, window and level -----------------------------------------------------------------
 
+  const span = () => htmlElement("span");
   const colors = htmlElement("div", { className: "colors" });
-  const span = (...text) => htmlElement("span", {}, ...text);
   const said = span(), lowest = span(), highest = span();
-  const ends = htmlElement("div", { className: "ends" }, lowest, said, highest);
   const maps = htmlElement("select", {}, ...["", ...COLORMAPS].map((name) =>
     htmlElement("option", { value: name }, name || "as it was made")));
   maps.addEventListener("change", () => change({ cmap: maps.value || null }));
-  const labelled = (text, control) => htmlElement("label", {}, span(text), control);
-  const range = (label, limits, read, told, write) => {
-    const input = htmlElement("input", { type: "range", label, ...limits });
-    input.addEventListener("input", () => change({ clim: write(Number(input.value)) }, label));
-    input.addEventListener("change", () => (gesture = null));
-    return [labelled(label, input), () => {
-      input.value = read();
-      input.setAttribute("aria-valuetext", told());
-    }];
-  };
+  const labelled = (text, control) => htmlElement("label", {}, htmlElement("span", {}, text), control);
+  const middle = () => valueOf(0.5), width = () => current().clim[1] - current().clim[0];
+  const climOf = (centre, wide) => change({ clim: [centre - wide / 2, centre + wide / 2].map((value) =>
+    Number(value.toPrecision(7))) });
+  const valueAt = (share) => viewer.values.range[0] + share * extent();
   const extent = () => viewer.values.range[1] - viewer.values.range[0];
-  const middle = () => (current().clim[0] + current().clim[1]) / 2;
-  const width = () => current().clim[1] - current().clim[0];
-  const climOf = (centre, wide) => [centre - wide / 2, centre + wide / 2].map((value) =>
-    Number(value.toPrecision(7)));
-  const sliders = [
-    range("Level", { min: 0, max: 1, step: 0.005 }, () => shareOf(middle()), () => inShort(middle()),
-      (share) => climOf(viewer.values.range[0] + share * extent(), width())),
-    range("Window", { min: 0.01, max: 1.5, step: 0.005 }, () => width() / extent(), () => inShort(width()),
-      (share) => climOf(middle(), share * extent())),
-  ];
+  const level = slider("Level", { min: 0, max: 1, step: 0.005 }, (share) => climOf(valueAt(share), width()));
+  const window_ = slider("Window", { min: 0.01, max: 1.5, step: 0.005 },
+    (share) => climOf(middle(), share * extent()));
 
   // -- all of it ---------------------------------------------------------------------------------
 
-  const presets = Object.entries(PRESETS).map(([name, points]) =>
-    button(`Opacity: ${name}`, () => change({ points }), name));
-  const undoing = button("Undo", back, "Undo");
-  const removing = button("Remove the point", remove, "\u2212 Point");
   const row = (...content) => htmlElement("div", { className: "row" }, ...content);
-  const element = htmlElement("div", { className: "editor" }, curve, colors, ends,
-    row(button("Add a point", addBehind, "+ Point"), removing, undoing),
-    labelled("Colours", maps), ...sliders.map(([label]) => label), row(...presets));
+  const removing = button("Remove the point", remove, "\u2212 Point");
+  const element = htmlElement("div", { className: "editor" }, curve, colors,
+    htmlElement("div", { className: "ends" }, lowest, said, highest),
+    row(button("Add a point", addBehind, "+ Point"), removing),
+    labelled("Colours", maps), labelled("Level", level), labelled("Window", window_),
+    row(...Object.entries(PRESETS).map(([name, points]) =>
+      button(`Opacity: ${name}`, () => change({ points }), name))));
 
   const textOf = ([x, y]) => `value ${inShort(valueOf(x))}, opacity ${y}`;
-  let histogram = null; // that is drawn
-  const show = () => {
-    const { values, transferFunction } = viewer;
-    element.hidden = !values;
-    if (!values) return;
-    if (values.histogram !== histogram) {
-      ({ histogram } = values);
-      const most = Math.max(...histogram), n = histogram.length; // by roots: what is rare is seen, too
-      const tops = Array.from(histogram, (length, k) =>
-        `V${1 - Math.sqrt(most ? length / most : 0)}H${(k + 1) / n}`);
-      lengths.setAttribute("d", `M0 1${tops.join("")}V1Z`);
-    }
+  const showPoints = () => {
     const points = pointsOf();
     last = Math.min(last, points.length - 1);
     const places = points.map(([x, y]) => [shareOf(valueOf(x)), 1 - y]);
@@ -229,7 +159,7 @@ export function transferEditor(viewer, button) {
     while (marks.length > points.length) marks.pop().remove();
     if (held >= marks.length) marks.at(-1).focus();
     marks.forEach((mark, k) => {
-      mark.style.left = `${100 * Math.min(Math.max(places[k][0], 0), 1)}%`;
+      mark.style.left = `${100 * clamped(places[k][0])}%`;
       mark.style.top = `${100 * places[k][1]}%`;
       mark.classList.toggle("last", k === last);
       for (const [name, told] of Object.entries({ label: `Point ${k + 1} of ${points.length}`,
@@ -238,42 +168,40 @@ export function transferEditor(viewer, button) {
       }
     });
     said.textContent = textOf(points[last]);
-    [lowest.textContent, highest.textContent] = values.range.map(inShort);
-    const table = transferFunction.colors, [first, end] = transferFunction.scalar_range.map(shareOf);
-    const count = Math.min(table.length, 32);
-    const stops = Array.from({ length: count }, (_, k) => {
-      const at = count > 1 ? k / (count - 1) : 0;
-      const shade = table[Math.round(at * (table.length - 1))].map((c) => `${100 * c}%`).join(" ");
-      return `rgb(${shade}) ${100 * (first + at * (end - first))}%`;
-    });
-    colors.style.background = stops.length > 1 ? `linear-gradient(to right, ${stops})` : "";
-    maps.value = viewer.look.transfer?.cmap ?? "";
-    undoing.disabled = !before.length;
     removing.disabled = points.length < 2;
-    sliders.forEach(([, take]) => take());
+  };
+  const show = () => {
+    const { values, transferFunction } = viewer;
+    element.hidden = !values;
+    if (!values) return;
+    const { histogram } = values, most = Math.max(...histogram) || 1;
+    const tops = Array.from(histogram, (length, k) => // by roots: what is rare is seen, too
+      `V${1 - Math.sqrt(length / most)}H${(k + 1) / histogram.length}`);
+    lengths.setAttribute("d", `M0 1${tops.join("")}V1Z`);
+    showPoints();
+    const table = transferFunction.colors, [first, end] = transferFunction.scalar_range.map(shareOf);
+    const stops = Array.from({ length: 32 }, (_, k) => {
+      const shade = table[Math.round(k / 31 * (table.length - 1))].map((c) => `${100 * c}%`).join(" ");
+      return `rgb(${shade}) ${100 * (first + k / 31 * (end - first))}%`;
+    });
+    colors.style.background = `linear-gradient(to right, ${stops})`;
+    [lowest.textContent, highest.textContent] = values.range.map(inShort);
+    maps.value = viewer.look.transfer?.cmap ?? "";
+    setSlider(level, shareOf(middle()), inShort(middle()));
+    setSlider(window_, width() / extent(), inShort(width()));
   };
 
-  const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
-    Home: [-Infinity, 0], End: [Infinity, 0] };
-  const key = (event, target) => {
-    const k = marks.indexOf(target), arrow = ARROWS[event.key];
+  const key = ({ key: name, shiftKey }, target) => {
+    const k = marks.indexOf(target), arrow = ARROWS[name];
     if (k < 0) return false;
     last = k;
     if (arrow) {
-      const step = event.shiftKey ? STRIDE : NUDGE, [x, y] = pointsOf()[k];
-      move(k, x + arrow[0] * step, y + arrow[1] * step, event.repeat ? `key ${k}` : null);
-      gesture = `key ${k}`;
-    } else if (event.key === "+") addBehind();
-    else if (["Delete", "Backspace", "-"].includes(event.key)) remove();
+      const step = shiftKey ? STRIDE : NUDGE, [x, y] = pointsOf()[k];
+      move(k, x + arrow[0] * step, y + arrow[1] * step);
+    } else if (name === "+") addBehind();
+    else if (["Delete", "Backspace", "-"].includes(name)) remove();
     else return false;
     return true;
   };
-  const undo = (event, target) => {
-    const asked = (event.ctrlKey || event.metaKey) && !event.altKey && event.key.toLowerCase() === "z";
-    if (!asked || !element.contains(target)) return false;
-    event.preventDefault();
-    back();
-    return true;
-  };
-  return { element, show, key, undo, reset: () => viewer.look.transfer && change(null) };
+  return { element, show, key };
 }

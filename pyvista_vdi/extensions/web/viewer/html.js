@@ -14,7 +14,23 @@ export function svgElement(name, attributes, ...children) {
   return made;
 }
 
-/** Return a picture of strokes, as an SVG path in a square of 20 x 20, which takes the text's colour. */
+/** Return a picture of strokes, as an SVG path in a square of 20 x 20, in the text's colour. */
 export function strokes(d) {
   return svgElement("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svgElement("path", { d }));
 }
+
+/** Return a slider with a name, beside what stands before it and behind it. */
+export function slider(label, limits, take) {
+  const made = htmlElement("input", { type: "range", label, ...limits });
+  made.addEventListener("input", () => take(Number(made.value)));
+  return made;
+}
+
+/** Have a slider say where it stands, in words. */
+export function setSlider(made, value, words) {
+  made.value = value;
+  made.setAttribute("aria-valuetext", words);
+}
+
+/** A number as people read it. */
+export const inShort = (x) => String(Number(x.toPrecision(4)));

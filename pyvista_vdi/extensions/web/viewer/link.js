@@ -1,13 +1,15 @@
 // What is seen, in the address of the page: #view=position:80,40,90/... A link shares it.
 import { checkedCamera } from "./camera.js";
-import { AS_MADE, checkedLook } from "./look.js";
+import { AS_MADE, checkedLook, isAsMade } from "./look.js";
 
 /** Milliseconds after the last change from which it stands in the address: browsers limit how often. */
 const WRITTEN_AFTER = 300;
 
-const LISTS = { position: 3, focal_point: 3, view_up: 3, window_center: 2, clip: 6 };
-const OF_TRANSFER = { cmap: (x) => x, clim: numbersIn, points: numbersIn };
-const NUMBERS = ["view_angle", "parallel_scale", "brightness", "opacity", "time"];
+/** Numbers of an entry, or null for text or any number of them. */
+const ENTRIES = {
+  position: 3, focal_point: 3, view_up: 3, window_center: 2, view_angle: 1, parallel_scale: 1,
+  brightness: 1, opacity: 1, clip: 6, time: 1, cmap: null, clim: null, points: null,
+};
 
 const keysTaken = new Set(); // by viewers of this page
 
@@ -17,15 +19,11 @@ const keysTaken = new Set(); // by viewers of this page
  * @param {{camera: object, look: object, time: number|null}} state
  * @returns {string} `position:80,40,90/focal_point:...`; what is as it was made is left out.
  */
-export function textOfView({ camera, look = AS_MADE, time = null }) {
-  const { transfer, ...rest } = look, said = { ...camera };
-  for (const [name, value] of Object.entries(rest)) {
-    if (JSON.stringify(value) !== JSON.stringify(AS_MADE[name])) said[name] = value;
-  }
-  if (time !== null) said.time = time;
-  for (const name of Object.keys(OF_TRANSFER)) if (transfer?.[name]) said[name] = transfer[name];
+export function textOfView({ camera, look: { transfer, ...look } = AS_MADE, time = null }) {
+  const isOther = ([name, value]) => JSON.stringify(value) !== JSON.stringify(AS_MADE[name]);
+  const said = { ...camera, ...Object.fromEntries(Object.entries(look).filter(isOther)), time, ...transfer };
   return Object.entries(said)
-    .filter(([name]) => name in LISTS || name in OF_TRANSFER || NUMBERS.includes(name))
+    .filter(([name, value]) => name in ENTRIES && value !== null)
     .map(([name, value]) => `${name}:${value}`).join("/");
 }
 
@@ -35,56 +33,55 @@ export function textOfView({ camera, look = AS_MADE, time = null }) {
  * @throws {TypeError} That names what is wrong.
  */
 export function viewOfText(text) {
-  const said = {}, transfer = {};
+  const said = {};
   for (const entry of text.split("/")) {
     const [name, value = ""] = entry.split(":");
-    if (Object.hasOwn(OF_TRANSFER, name)) {
-      transfer[name] = OF_TRANSFER[name](value);
-      continue;
+    if (!Object.hasOwn(ENTRIES, name)) throw new TypeError(`A view in an address has no "${name}".`);
+    const numbers = value.split(",").map((part) => (part.trim() ? Number(part) : NaN));
+    const count = ENTRIES[name];
+    if (count && (numbers.length !== count || !numbers.every(Number.isFinite))) {
+      throw new TypeError(`The ${name} of a view in an address is ${count} numbers with commas; ` +
+        `got "${value}".`);
     }
-    if (!Object.hasOwn(LISTS, name) && !NUMBERS.includes(name)) {
-      throw new TypeError(`A view in an address has no "${name}".`);
-    }
-    const numbers = numbersIn(value);
-    if (numbers.length !== (LISTS[name] ?? 1) || !numbers.every(Number.isFinite)) {
-      throw new TypeError(`The ${name} of a view in an address is ${LISTS[name] ?? 1} numbers ` +
-        `with commas; got "${value}".`);
-    }
-    said[name] = name in LISTS ? numbers : numbers[0];
+    said[name] = name === "cmap" ? value : count === 1 ? numbers[0] : numbers;
   }
-  const { brightness = 1, opacity = 1, clip = AS_MADE.clip, time = null, ...camera } = said;
-  const look = { brightness, opacity, clip, ...(Object.keys(transfer).length && { transfer }) };
+  const { brightness = 1, opacity = 1, clip = AS_MADE.clip, time = null,
+    cmap, clim, points, ...camera } = said;
+  const transfer = cmap || clim || points ? { cmap, clim, points } : undefined;
+  const look = { brightness, opacity, clip, transfer };
   return { camera: checkedCamera(camera), look: checkedLook(look), time };
-}
-
-function numbersIn(text) {
-  return text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
 }
 
 const partsOfHash = (hash) => hash.replace(/^#/, "").split("&").filter(Boolean);
 
 // The text that an address has for a key; undefined without one.
 function saidIn(hash, key) {
-  const part = partsOfHash(hash).find((each) => each.startsWith(`${key}=`));
-  if (part === undefined) return undefined;
+  const part = partsOfHash(hash).find((each) => each.startsWith(`${key}=`))?.slice(key.length + 1);
   try {
-    return decodeURIComponent(part.slice(key.length + 1));
+    return part && decodeURIComponent(part);
   } catch {
-    return part.slice(key.length + 1); // it says no view, and that is told of
+    return part; // it says no view, and that is told of
   }
+}
+
+// What a viewer shows, as text; empty where it is what the page begins with.
+function textOfViewer({ camera, home, look, series, playing, time }) {
+  const paused = series && !playing && time !== series.times[0] ? time : null;
+  const begins = paused === null && isAsMade(look) && JSON.stringify(camera) === JSON.stringify(home);
+  return !camera || begins ? "" : textOfView({ camera, look, time: paused });
 }
 
 /**
  * Keep what a viewer shows in the page's address, and follow the address.
  *
  * @param {string} key Before the `=`: of viewers with the same the first one is followed.
- * @param {object} host `state()` says what is shown, `null` where it is what the page begins with;
- *   `take(state)` shows something else, of null what the page begins with.
+ * @param {HTMLElement} viewer
+ * @param {function(object|null)} take Shows something else, of null what the page begins with.
  * @param {AbortSignal} signal Ends it.
- * @returns {{changed: function()}|null} To be told that something else is shown; null where another
- *   viewer has the key.
+ * @returns {{changed: function(), now: function()}|null} To be told that something else is shown, or
+ *   that the address is wanted; null where another viewer has the key.
  */
-export function followAddress(key, host, signal) {
+export function followAddress(key, viewer, take, signal) {
   if (keysTaken.has(key)) return null;
   keysTaken.add(key);
   let timer = 0;
@@ -92,22 +89,18 @@ export function followAddress(key, host, signal) {
     keysTaken.delete(key);
     clearTimeout(timer);
   });
-  const read = (hash) => {
-    const text = saidIn(hash, key);
-    if (text === undefined) {
-      if (!partsOfHash(hash).length) host.take(null);
-      return;
-    }
+  const read = () => {
+    const text = saidIn(location.hash, key);
     try {
-      host.take(viewOfText(text));
+      if (text !== undefined) take(viewOfText(text));
+      else if (!partsOfHash(location.hash).length) take(null);
     } catch (error) {
       console.info(`The view in this page's address is not followed: ${error.message}`);
     }
   };
-  const written = () => {
-    timer = 0;
-    const state = host.state();
-    const text = state ? textOfView(state) : "";
+  const now = () => {
+    clearTimeout(timer);
+    const text = textOfViewer(viewer);
     if (text === (saidIn(location.hash, key) ?? "")) return;
     const others = partsOfHash(location.hash).filter((part) => !part.startsWith(`${key}=`));
     const hash = [...others, ...(text ? [`${key}=${text}`] : [])].join("&");
@@ -117,15 +110,11 @@ export function followAddress(key, host, signal) {
       console.info(`What is seen is not kept in this page's address: ${error.message}`);
     }
   };
-  window.addEventListener("hashchange", () => read(location.hash), { signal });
-  if (saidIn(location.hash, key) !== undefined) read(location.hash);
-  return {
-    changed() {
-      clearTimeout(timer);
-      timer = setTimeout(written, WRITTEN_AFTER);
-    },
-    now() { // who takes the address elsewhere wants what is seen now
-      if (timer) clearTimeout(timer), written();
-    },
+  const changed = () => {
+    clearTimeout(timer);
+    timer = setTimeout(now, WRITTEN_AFTER);
   };
+  window.addEventListener("hashchange", read, { signal });
+  if (saidIn(location.hash, key) !== undefined) read();
+  return { changed, now };
 }

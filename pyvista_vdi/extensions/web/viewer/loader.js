@@ -1,93 +1,58 @@
 // A file from wherever it is to prepared levels: read piece by piece, decoded in a worker.
-import { askPort, borrowPort, returnPort } from "./port.js";
+import { GrowingBytes, VDIFileError } from "./bytes.js";
+import { withWorker } from "./port.js";
 import { BEGIN, Series, beginsAsSeries } from "./series.js";
-import { GrowingBytes, VDIFileError } from "./unpack.js";
 
 /**
  * Load a VDI: first its coarse level, where the file has one, then the whole. Or a series or a set.
  *
  * @param {string|URL|Uint8Array|ArrayBuffer|Blob|ReadableStream|AsyncIterable} source A .vdi, .vdis
  *   or .vdiset file: where it is, its bytes, or its pieces, which may be base64 text as
- *   {@link embedded} gives it. Or where the folder of a series is.
+ *   {@link embedded} gives it. Or where the folder of a series is, with a slash behind it.
  * @param {object} options
  * @param {(prepared: object) => void} options.onLevel Called with each level as prepare.js makes
  *   it; its `level` is "coarse" or "full".
  * @param {(vdi: object) => void} [options.onBegin] Called before a coarse level with its camera,
  *   windowSize, bounds and depthOrigin.
- * @param {(series: Series) => void} [options.onSeries] Called with a series when it has a step. Of
- *   a folder, steps are read when they are asked for.
- * @param {(fraction: number) => void} [options.onProgress] Called with the share that was read,
- *   0 to 1, where the length is known.
- * @param {AbortSignal} [options.signal] Ends it; the promise is then rejected by its reason.
- * @returns {Promise<void>} Resolves when the full level has been given, or the series.
+ * @param {(series: Series) => void} [options.onSeries] Called in their place, where it is one, as
+ *   soon as it has a VDI.
+ * @param {(progress: number) => void} [options.onProgress] Called with what is read of 1.
+ * @param {AbortSignal} [options.signal] Ends it: nothing is called any more.
+ * @returns {Promise<void>} When all is there.
  * @throws {VDIFileError} A sentence that says what is wrong.
  */
-export async function load(
-  source, { onLevel, onBegin = () => {}, onSeries, onProgress = () => {}, signal }
-) {
-  signal?.throwIfAborted();
-  const aborted = new Promise((_, reject) => {
-    signal?.addEventListener("abort", () => reject(signal.reason), { once: true });
-  });
-  aborted.catch(() => {});
-  const unlessAborted = (promise) => Promise.race([aborted, promise]);
-  const began = borrowPort(); // it starts while the first bytes come
-  let working = false; // whether it has been told what it has not finished
+export async function load(source, { onLevel, onBegin = () => {}, onSeries, onProgress = () => {},
+  signal = new AbortController().signal }) {
+  const unlessAborted = (call) => (...given) => signal.aborted || call(...given);
+  const [level, begin, series, progress] = [onLevel, onBegin, onSeries, onProgress].map(unlessAborted);
   let pieces = null;
   try {
-    if (isSeriesAddress(source) && Series && onSeries) {
-      const { folder, response } = await folderAt(source, signal);
+    const { reading } = await withWorker(signal, async (ask) => {
+      const folder = onSeries && Series && seriesFolder(source);
       if (folder) {
-        const name = /\.vdis\/$/i.test(folder.pathname) ? "series.json" : "set.json";
-        const series = await Series.ofFolder(name, async (file) =>
-          new Uint8Array(await (await fetched(new URL(file, folder))).arrayBuffer()));
-        signal?.throwIfAborted();
-        onSeries(series);
-        onProgress(1);
-        return;
+        series(await Series.ofFolder(folder.name, async (file) =>
+          new Uint8Array(await (await fetched(new URL(file, folder.url))).arrayBuffer())));
+        progress(1);
+        return {};
       }
-      source = response;
-    }
-    pieces = piecesOf(source, onProgress, signal);
-    const rest = await unlessAborted(begun(pieces));
-    if (Series && onSeries && rest.first && beginsAsSeries(rest.first)) {
-      await unlessAborted(Series.ofPieces(rest.pieces, (series) => {
-        if (!signal?.aborted) onSeries(series);
-      }));
-      return;
-    }
-    const port = await began;
-    working = true;
-    const hear = ({ begun, prepared }) => {
-      if (!signal?.aborted) begun ? onBegin(begun) : onLevel(prepared);
-    };
-    const ask = (message) => unlessAborted(askPort(port, message, hear));
-    for (let next; !(next = await unlessAborted(rest.pieces.next())).done;) await ask({ piece: next.value });
-    await ask({ end: true });
-    working = false;
+      pieces = piecesOf(source, progress, signal);
+      const head = new GrowingBytes(); // which tells what it is
+      for (let next; head.whole.length < BEGIN || head.broken; head.push(next.value)) {
+        if ((next = await pieces.next()).done) break;
+      }
+      if (onSeries && beginsAsSeries?.(head.whole)) {
+        return { reading: Series.ofPieces(head.whole, pieces, series) }; // without this worker
+      }
+      const hear = ({ begun, prepared }) => begun ? begin(begun) : level(prepared);
+      await ask({ piece: head.whole }, hear);
+      for await (const piece of pieces) await ask({ piece }, hear);
+      await ask({ end: true }, hear);
+      return {};
+    });
+    await reading;
   } finally {
     pieces?.return().catch(() => {});
-    began.then((port) => returnPort(port, working));
   }
-}
-
-// The first bytes, or the first text, of pieces, and all of them.
-async function begun(pieces) {
-  let { value: first, done } = await pieces.next();
-  while (!done && typeof first !== "string" && first.length < BEGIN) {
-    const next = await pieces.next();
-    if ((done = next.done)) break;
-    const [before, piece] = [new GrowingBytes(), next.value];
-    [first, piece].forEach((each) => before.push(each));
-    first = before.whole;
-  }
-  return { first, pieces: following(first, pieces) };
-}
-
-async function* following(first, pieces) {
-  if (first === undefined) return;
-  yield first;
-  yield* pieces;
 }
 
 const EMBEDDED = 'script[type="application/vdi+base64"]';
@@ -124,57 +89,39 @@ async function* embeddedTexts(element) {
 }
 
 async function* piecesOf(source, onProgress, signal) {
+  let total = 0;
+  if (typeof source === "string" || source instanceof URL) {
+    const response = await fetched(source, signal);
+    total = Number(response.headers.get("Content-Length"));
+    source = response.body;
+  }
   if (source instanceof ArrayBuffer) source = new Uint8Array(source);
   if (source instanceof Blob) source = source.stream();
-  if (source instanceof Uint8Array) {
-    yield source;
-    onProgress(1);
-    return;
-  }
-  let total = 0;
-  if (typeof source === "string" || source instanceof URL) source = await fetched(source, signal);
-  if (source instanceof Response) {
-    total = Number(source.headers.get("Content-Length"));
-    source = source.body;
-  }
   if (!(source instanceof ReadableStream)) {
-    yield* source;
+    yield* source instanceof Uint8Array ? [source] : source;
     return;
   }
   const reader = source.getReader();
   try {
-    for (let read = 0; ;) {
-      const { done, value } = await reader.read();
-      if (done) break;
-      read += value.length;
-      yield value;
+    for (let read = 0, next; !(next = await reader.read()).done;) {
+      read += next.value.length;
+      yield next.value;
       if (total) onProgress(Math.min(1, read / total));
     }
   } catch (error) {
-    if (signal?.aborted || error instanceof VDIFileError) throw error;
+    if (signal.aborted) throw error;
     throw new VDIFileError(`the VDI file breaks off while it is read (${error.message})`);
   } finally {
     reader.cancel().catch(() => {});
   }
 }
 
-// Whether an address is one of a series, or a set: by its name.
-function isSeriesAddress(source) {
-  if (typeof source !== "string" && !(source instanceof URL)) return false;
-  return URL.canParse(source, document.baseURI) &&
-    /\.vdis(et)?\/?$/i.test(new URL(source, document.baseURI).pathname);
-}
-
-// Whether an address is that of a folder: it ends in a slash, by itself or as servers say. Otherwise
-// the response with the file.
-async function folderAt(source, signal) {
-  const url = new URL(source, document.baseURI);
-  if (url.pathname.endsWith("/")) return { folder: url };
-  const response = await fetched(url, signal);
-  const found = response.url ? new URL(response.url) : url;
-  if (!found.pathname.endsWith("/")) return { response };
-  response.body?.cancel();
-  return { folder: found };
+// Where a folder with a series, or with a set, is, and the JSON in it; undefined for other sources.
+function seriesFolder(source) {
+  if (!(typeof source === "string" || source instanceof URL)) return undefined;
+  const url = URL.canParse(source, document.baseURI) && new URL(source, document.baseURI);
+  const kind = url && /\.(vdis|vdiset)\/$/i.exec(url.pathname)?.[1].toLowerCase();
+  return kind && { url, name: kind === "vdis" ? "series.json" : "set.json" };
 }
 
 async function fetched(url, signal) {

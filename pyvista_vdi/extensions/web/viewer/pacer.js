@@ -1,4 +1,5 @@
 // Keeps a frame rate: frames with fewer pixels while a view moves, full ones in bands.
+import { emptyTexture } from "./graphics.js";
 
 /** Seconds that a frame of a movement may take. */
 const FRAME_SECONDS = 1 / 30;
@@ -6,10 +7,6 @@ const FRAME_SECONDS = 1 / 30;
 const BAND_SECONDS = 1 / 20;
 /** Least share of the pixels: a quarter along each edge. */
 const LEAST_SHARE = 1 / 16;
-/** Shares of the pixels below which frames take every second list, and above which all again. */
-const FEW_BELOW = 0.25, FEW_ABOVE = 0.45;
-/** Time of a frame of every second list over one of all (docs/decisions/any_view.md). */
-const FEW_COST = 0.8;
 /** Share of a frame by which its size may miss the goal before it is changed. */
 const DEAD_BAND = 0.25;
 /** How many times as high as the band before a band may be. */
@@ -20,7 +17,6 @@ const STALE = 2;
 /** Targets to draw into, and how many pixels they can have. */
 export class Pacer {
   #perPixel = null; // seconds, by the frames before
-  #few = false; // whether those had every second list
   #screen = null;
 
   /** @param {WebGL2RenderingContext} gl */
@@ -29,25 +25,13 @@ export class Pacer {
     this.share = 1; // of the pixels, in the frame before
   }
 
-  /**
-   * Whether the next frame is to have every second list.
-   *
-   * @param {boolean} worth Whether they would cost less: in a movement, in a view from the side.
-   */
-  few(worth, width, height) {
-    const share = FRAME_SECONDS / (this.#perPixel * width * height);
-    const few = worth && this.#perPixel !== null && share < (this.#few ? FEW_ABOVE : FEW_BELOW);
-    if (few !== this.#few) this.#perPixel *= few ? FEW_COST : 1 / FEW_COST;
-    return (this.#few = few);
-  }
-
   /** Pixels of the next frame of a movement in a window of width x height. */
   sizeFor(width, height) {
-    const pixels = width * height;
     if (this.#perPixel === null) { // unknown yet: whatever the machine, soon
       this.share = LEAST_SHARE;
     } else {
-      const share = Math.min(Math.max(FRAME_SECONDS / (this.#perPixel * pixels), LEAST_SHARE), 1);
+      const wanted = FRAME_SECONDS / (this.#perPixel * width * height);
+      const share = Math.min(Math.max(wanted, LEAST_SHARE), 1);
       if (share === 1 || Math.abs(share / this.share - 1) > DEAD_BAND) this.share = share;
     }
     const edge = Math.sqrt(this.share);
@@ -58,7 +42,7 @@ export class Pacer {
    * Draw a picture band by band, and wait for each.
    *
    * @param {object} target Of {@link target}.
-   * @param {function(object, boolean)} paint Draws into the target; true: for the first band.
+   * @param {function(object)} paint Draws into the target.
    * @param {function(): boolean} [goesOn] Asked between bands.
    * @returns {Promise<boolean>} Whether it was finished.
    */
@@ -75,7 +59,7 @@ export class Pacer {
       gl.scissor(0, row, width, high);
       gl.clearColor(0, 0, 0, 0);
       gl.clear(gl.COLOR_BUFFER_BIT);
-      paint(target, row === 0);
+      paint(target);
       gl.disable(gl.SCISSOR_TEST);
       await finished(gl);
       const took = (performance.now() - began) / 1000;
@@ -90,11 +74,8 @@ export class Pacer {
 
   /** A target of some pixels: RGBA, 8 bits. */
   target(width, height) {
-    const { gl } = this;
-    const texture = gl.createTexture(), framebuffer = gl.createFramebuffer();
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
+    const { gl } = this, texture = emptyTexture(gl, "RGBA8", width, height);
+    const framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
     return { texture, framebuffer, width, height };

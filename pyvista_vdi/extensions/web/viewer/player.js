@@ -1,12 +1,11 @@
 // Which step of a series is shown, and when; steps are decoded ahead, in a worker.
 import { htmlElement } from "./html.js";
+import { Ahead } from "./series.js";
 
 /** Steps per second of films. */
 const RATE = 24;
 /** Steps that are decoded before their time comes. */
-const AHEAD = 3;
-/** Share of the last step's decoding in what the next one is expected to take. */
-const LAST = 0.3;
+const STEPS_AHEAD = 3;
 
 /** Keys that a slider takes by itself. */
 const OF_SLIDERS = /^(Arrow|Page|Home|End)/;
@@ -17,9 +16,8 @@ const OF_SLIDERS = /^(Arrow|Page|Home|End)/;
  */
 export class Player {
   #series;
-  #show;
+  #ahead;
   #changed;
-  #failed;
   // Places go on where the series begins anew: place p is step p modulo the steps
   #place = 0;
   #since = null; // seconds, when the place before was due; null before a frame
@@ -27,23 +25,21 @@ export class Player {
   #playing = false;
   #rate = RATE;
   #loop = true;
-  #ready = new Map(); // step -> what prepare.js made of it
-  #broken = new Set();
-  #shown = -1; // the step
-  #seeking = false;
-  #working = false;
-  #seconds = 0; // that a step takes to be ready
   #frame = 0; // that is asked for
 
   /**
    * @param {Series} series
-   * @param {object} host `show(prepared, time, step)` has a step drawn with the next frame;
+   * @param {object} host `show(prepared, step)` has a step drawn with the next frame;
    *   `changed()` is called when it plays or pauses, or another step is wanted; `failed(error)`
    *   when a step that was asked for cannot be shown.
    */
   constructor(series, { show, changed, failed }) {
-    this.#series = series;
-    [this.#show, this.#changed, this.#failed] = [show, changed, failed];
+    [this.#series, this.#changed] = [series, changed];
+    this.#ahead = new Ahead(series, {
+      show,
+      came: (step) => step === this.step && this.#ahead.show(step),
+      broken: (step, error) => step === this.step && !this.#playing && failed(error),
+    });
     this.#seek();
   }
 
@@ -53,9 +49,8 @@ export class Player {
   }
 
   set step(step) {
-    this.#moveTo(Math.min(Math.max(Math.round(step), 0), this.#series.length - 1));
+    this.#place = Math.min(Math.max(Math.round(step), 0), this.#series.length - 1);
     [this.#from, this.#since] = [this.#place, null];
-    this.#broken.clear(); // one that could not be fetched may come now
     this.#seek();
     this.#changed();
   }
@@ -65,13 +60,9 @@ export class Player {
     return this.#series.times[this.step];
   }
 
-  set time(time) {
-    this.step = this.#series.nearest(time);
-  }
-
   /** Whether the step that is asked for is the one that was handed to be drawn. */
   get settled() {
-    return this.#shown === this.step;
+    return this.#ahead.shown === this.step;
   }
 
   get playing() {
@@ -83,13 +74,12 @@ export class Player {
     if (!(rate > 0 && rate < Infinity)) {
       throw new RangeError(`A rate is steps per second, above 0; got ${rate}.`);
     }
-    const n = this.#series.length;
-    this.#place %= n;
+    const { step } = this;
     [this.#rate, this.#loop] = [rate, loop];
-    if (!loop && this.#place === n - 1) this.#moveTo(0);
+    this.#place = !loop && step === this.#series.length - 1 ? 0 : step;
     [this.#from, this.#since] = [this.#place, null];
-    this.#broken.clear();
     this.#playing = true;
+    this.#seek(); // what could not be fetched may come now
     this.#nextFrame();
     this.#changed();
   }
@@ -101,18 +91,21 @@ export class Player {
     this.#changed();
   }
 
-  /** Go on with what was given up when the series was closed. */
+  /** Go on with what was given up when it was closed. */
   resume() {
     this.#seek();
   }
 
   close() {
     this.#playing = false;
-    this.#ready.clear();
-    this.#series.close();
+    this.#ahead.stop();
   }
 
-  // -- frames ------------------------------------------------------------------------------------
+  // Have the step that is asked for decoded, unless it is, and shown.
+  #seek() {
+    if (this.#ahead.isReady(this.step)) this.#ahead.show(this.step);
+    this.#ahead.want([this.step], true);
+  }
 
   #nextFrame() {
     cancelAnimationFrame(this.#frame);
@@ -126,9 +119,9 @@ export class Player {
     const due = this.#dueAt(now);
     // Further back than a round the same steps come again
     for (let place = due; place > Math.max(this.#place, due - n); --place) {
-      if (this.#ready.has(place % n)) {
-        this.#moveTo(place);
-        this.#give(place % n);
+      if (this.#ahead.isReady(place % n)) {
+        this.#place = place;
+        this.#ahead.show(place % n);
         this.#changed();
         break;
       }
@@ -137,7 +130,10 @@ export class Player {
       this.pause();
       return;
     }
-    this.#work();
+    const first = Math.max(this.#place + 1, this.#dueAt(now + this.#ahead.seconds));
+    const next = Array.from({ length: STEPS_AHEAD }, (_, k) => first + k);
+    const coming = next.filter((place) => this.#loops || place < n).map((place) => place % n);
+    this.#ahead.want(this.settled ? coming : [this.step, ...coming]);
     this.#nextFrame();
   }
 
@@ -155,76 +151,8 @@ export class Player {
   #ended() {
     if (this.#loop || !this.#series.complete) return false;
     let last = this.#series.length - 1;
-    while (last > this.#place && this.#broken.has(last)) --last;
+    while (last > this.#place && this.#ahead.isBroken(last)) --last;
     return this.#place >= last;
-  }
-
-  #give(step) {
-    if (this.#shown === step) return;
-    this.#shown = step;
-    this.#show(this.#ready.get(step), this.#series.times[step], step);
-  }
-
-  // Show a place, and forget the steps that are neither that nor soon to come.
-  #moveTo(place) {
-    this.#place = place;
-    const n = this.#series.length, keep = new Set();
-    for (let k = 0; k < AHEAD + 2; ++k) keep.add((place + k) % n);
-    for (const step of [...this.#ready.keys()]) if (!keep.has(step)) this.#ready.delete(step);
-  }
-
-  // -- decoding ----------------------------------------------------------------------------------
-
-  // Decode the step that is asked for, whatever is asked for meanwhile.
-  async #seek() {
-    if (this.#seeking) return;
-    this.#seeking = true;
-    while (!this.settled) {
-      const { step } = this;
-      try {
-        if (!this.#ready.has(step)) this.#ready.set(step, await this.#series.prepared(step));
-        if (this.#ready.has(step) && (step === this.step || !this.#playing)) this.#give(step);
-      } catch (error) {
-        if (error.name === "AbortError") break;
-        if (step !== this.step) continue;
-        this.#broken.add(step);
-        if (!this.#playing) this.#failed(error);
-        break;
-      }
-    }
-    this.#seeking = false;
-  }
-
-  // Decode what is wanted, step after step, until enough are ready.
-  async #work() {
-    if (this.#working) return;
-    this.#working = true;
-    for (let step; this.#playing && (step = this.#wanted()) >= 0;) {
-      const began = performance.now();
-      try {
-        this.#ready.set(step, await this.#series.prepared(step));
-      } catch (error) {
-        if (error.name === "AbortError") break;
-        this.#broken.add(step); // the next ones may be whole
-        continue;
-      }
-      const took = (performance.now() - began) / 1000;
-      this.#seconds += (took - this.#seconds) * (this.#seconds ? LAST : 1);
-      for (const late of [...this.#ready.keys()].slice(0, -AHEAD - 1)) this.#ready.delete(late);
-    }
-    this.#working = false;
-  }
-
-  // The next step to be decoded; -1 where enough are.
-  #wanted() {
-    const n = this.#series.length, now = performance.now() / 1000;
-    const first = Math.max(this.#place + 1, this.#dueAt(now + this.#seconds));
-    const end = this.#loops ? first + AHEAD : Math.min(first + AHEAD, n);
-    for (let place = first; place < end; ++place) {
-      const step = place % n;
-      if (!this.#ready.has(step) && !this.#broken.has(step)) return step;
-    }
-    return -1;
   }
 }
 

@@ -1,11 +1,10 @@
-// The worker that decodes, or what stands for one on the page's own thread.
+// The workers that decode, or what stands for one on the page's own thread.
+import { VDIFileError } from "./bytes.js";
 import { waysToSpawn } from "./spawn.js";
-import { VDIFileError } from "./unpack.js";
 import { serve } from "./worker.js";
 
 /** Files that are decoded at a time, as many as browsers fetch at a time. */
 const MOST_FILES = 6;
-
 /** Milliseconds in which a worker says that it listens, if it is ours. */
 const PATIENCE = 20000;
 
@@ -14,9 +13,54 @@ const waiting = []; // what goes on when another file is done
 let lent = 0;
 let warned = false;
 
-/** A worker that listens, or what stands for one on this thread where none may be started. */
-export async function decodingPort() {
-  if (idle.length) return idle.pop();
+/**
+ * Decode a file: as soon as no more than MOST_FILES are, in a worker that starts meanwhile.
+ *
+ * @param {AbortSignal} signal Ends it, and the worker that is at it.
+ * @param {function(function(object, function(object)=, ArrayBuffer[]=): Promise): Promise} work Is
+ *   given what says a message of worker.js to the worker, has its answers heard, and waits until it
+ *   is done.
+ * @throws {VDIFileError} A sentence that says what is wrong.
+ */
+export async function withWorker(signal, work) {
+  signal.throwIfAborted();
+  const lending = borrowed();
+  let works = false; // whether it has been told what it has not finished
+  let abort;
+  const aborted = new Promise((_, reject) => (abort = () => reject(signal.reason)));
+  aborted.catch(() => {});
+  signal.addEventListener("abort", abort);
+  const ask = async (message, hear, handed) => {
+    const port = await Promise.race([aborted, lending]);
+    works = true;
+    await Promise.race([aborted, answered(port, message, hear, handed)]);
+    works = !(message.end || message.file); // it has a part of a file
+  };
+  try {
+    return await Promise.race([aborted, work(ask)]);
+  } finally {
+    signal.removeEventListener("abort", abort);
+    lending.then((port) => giveBack(port, works));
+  }
+}
+
+async function borrowed() {
+  if (lent >= MOST_FILES) await new Promise((resolve) => waiting.push(resolve));
+  else ++lent;
+  return idle.pop() ?? started();
+}
+
+function giveBack(port, works) {
+  port.onmessage = port.onerror = null;
+  if (works) port.terminate();
+  else if (port instanceof Worker) idle.push(port);
+  const next = waiting.shift();
+  if (next) next();
+  else --lent;
+}
+
+// A worker that listens, or what stands for one on this thread where none may be started.
+async function started() {
   const causes = new Set();
   for (const spawn of waysToSpawn) {
     let worker = null;
@@ -46,37 +90,8 @@ export async function decodingPort() {
   return port;
 }
 
-/** Give back a port that has nothing to do. */
-export function releasePort(port) {
-  port.onmessage = port.onerror = null;
-  if (port instanceof Worker) idle.push(port);
-}
-
-/** A port for one file, as soon as no more than MOST_FILES have one. */
-export async function borrowPort() {
-  if (lent >= MOST_FILES) await new Promise((resolve) => waiting.push(resolve));
-  else ++lent;
-  return decodingPort();
-}
-
-/** Give it back, or end it where it still works. */
-export function returnPort(port, works) {
-  works ? port.terminate() : releasePort(port);
-  const next = waiting.shift();
-  next ? next() : --lent;
-}
-
-/**
- * Say something to a port, and wait until it is done.
- *
- * @param {object} port Of {@link decodingPort}.
- * @param {object} message See worker.js.
- * @param {(data: object) => void} hear Called with what it says meanwhile.
- * @param {ArrayBuffer[]} [handed] What is handed over.
- * @returns {Promise<void>}
- * @throws {VDIFileError} A sentence that says what is wrong.
- */
-export function askPort(port, message, hear, handed = []) {
+// Say something to a port, and wait until it is done.
+function answered(port, message, hear, handed = []) {
   return new Promise((resolve, reject) => {
     port.onmessage = ({ data }) => {
       if (data.error) reject(new VDIFileError(data.error));

@@ -1,13 +1,11 @@
 // A VDI's arrays to what the shader reads: textures as typed arrays, made off the main thread.
-import { frameOf, listSpace, pixelRays } from "./rays.js";
+import { frameOf, listSpace } from "./rays.js";
 
 /** Texels in a row of the textures that hold supersegments. */
 export const TEXTURE_WIDTH = 4096;
 /** Lists along an edge of a stack of the occupancy grid, and its slabs: bits of two words. */
 export const STACK_SHIFT = 4;
 const SLABS = 64;
-/** Squares of stacks along the grid's longer edge, with a box around what is occupied of each. */
-const SQUARES = 16;
 /** Bins of the histogram of values. */
 const BINS = 128;
 const LARGEST = 3.4028234663852886e38;
@@ -29,7 +27,6 @@ export function prepare(vdi) {
     windowSize: vdi.windowSize, camera: vdi.camera, bounds: vdi.bounds, level: vdi.level,
     pictureSize: vdi.pictureSize, metadata: vdi.metadata, n, frame, space, packed, ...arrays,
     step: packed ? vdi.depthStep * frame.scale : 0,
-    corners: occupiedBoxes(vdi, frame, space, arrays),
     ...(vdi.values && { values: preparedValues(vdi, frame, space) }),
   };
 }
@@ -182,43 +179,6 @@ function occupancy({ windowSize, offsets, ...vdi }, frame) {
       if (last >= 32) masks[at + 1] |= bits(Math.max(first - 32, 0), last - 32);
     },
   };
-}
-
-// Corners, model', of boxes in list space that hold the occupied cells: eight points for each.
-function occupiedBoxes({ windowSize, camera }, frame, space, grid) {
-  const { masks, stacks, firstDepth, slabsPerDepth } = grid;
-  const rays = pixelRays(frame, camera, windowSize);
-  const edge = Math.ceil(Math.max(...stacks) / SQUARES);
-  const corners = [];
-  const ends = (first, lists) => [first << STACK_SHIFT, (first + edge) << STACK_SHIFT]
-    .map((list, k) => Math.min(list, lists) - lists / 2 + 2 * k - 1);
-  for (let row = 0; row < stacks[1]; row += edge) {
-    for (let column = 0; column < stacks[0]; column += edge) {
-      const words = [0, 0];
-      for (let j = row; j < Math.min(row + edge, stacks[1]); ++j) {
-        for (let i = column; i < Math.min(column + edge, stacks[0]); ++i) {
-          words[0] |= masks[2 * (j * stacks[0] + i)];
-          words[1] |= masks[2 * (j * stacks[0] + i) + 1];
-        }
-      }
-      if (!(words[0] | words[1])) continue;
-      const lowest = words[0] ? words[0] & -words[0] : words[1] & -words[1];
-      const first = 31 - Math.clz32(lowest) + (words[0] ? 0 : 32);
-      const last = words[1] ? 63 - Math.clz32(words[1]) : 31 - Math.clz32(words[0]);
-      for (const slab of [first - 1, last + 2]) {
-        const depth = space.origin + firstDepth + slab / slabsPerDepth;
-        const t = (space.parallel ? depth : Math.max(depth, 0)) - rays.reference;
-        for (const a of ends(column, windowSize[0])) {
-          for (const b of ends(row, windowSize[1])) {
-            const along = (rows, k) => rows[0][k] + a * rows[1][k] + b * rows[2][k];
-            corners.push(...[0, 1, 2].map(
-              (k) => along(rays.origin, k) + t * along(rays.direction, k)));
-          }
-        }
-      }
-    }
-  }
-  return new Float64Array(corners);
 }
 
 // Bits first to last of a word, both included.

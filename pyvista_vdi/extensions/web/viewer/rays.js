@@ -205,83 +205,25 @@ export function frameForms(frame, space, windowSize, rays, parallel, clippingPla
 }
 
 /**
- * The list space of every second list, which stands for its neighbour, too.
- *
- * @param {object} space Of {@link listSpace}.
- * @param {number[]} windowSize Lists.
- * @param {number[]} thinned Along each edge: 1 for every second list, or 0 for all.
- * @returns {{space: object, windowSize: number[]}}
- */
-export function thinnedSpace(space, windowSize, thinned) {
-  const [wide, high] = windowSize.map((lists, k) => thinned[k] ? (lists + 1) >> 1 : lists);
-  const [u, v, ...rest] = space.rows, denominator = rest[1];
-  // Middles of the lists that are taken stay: list 2 m + 1/2 before is m + 1/2
-  const half = (row, before, after) => row.map(
-    (x, k) => 0.5 * x + (0.25 * before + 0.25 - 0.5 * after) * denominator[k]);
-  const rows = [thinned[0] ? half(u, windowSize[0], wide) : u,
-    thinned[1] ? half(v, windowSize[1], high) : v, ...rest];
-  return { space: { ...space, rows }, windowSize: [wide, high] };
-}
-
-/**
- * How many lists rays of a view cross along the window's width and height: the mean of nine rays
- * through the bounds, over a length of half their diagonal.
+ * The rectangle of pixels that a VDI's bounds are seen in.
  *
  * @param {object} frame Of {@link frameOf}.
- * @param {object} space Of {@link listSpace}.
- * @param {object} camera The view.
- * @returns {number[]}
- */
-export function listsCrossed(frame, space, camera) {
-  const { half } = frame, toView = modelToView(frame, camera);
-  const inverse = inverse3(toView.map((row) => row.slice(0, 3)));
-  const eye = inverse.map((row) => -dot(row, column(toView, 3)));
-  const points = [[0, 0, 0]];
-  for (let corner = 0; corner < 8; ++corner) {
-    points.push(half.map((edge, k) => (corner >> k & 1 ? 0.5 : -0.5) * edge));
-  }
-  const reach = Math.hypot(...half) / 2;
-  const crossed = [0, 0];
-  let seen = 0;
-  for (const point of points) {
-    const along = times(unit(isParallel(camera) ? column(inverse, 2) : subtract(point, eye)), reach);
-    const [first, last] = [subtract(point, along), add(point, along)].map(
-      (end) => space.rows.map((row) => dot(row.slice(0, 3), end) + row[3]));
-    if (!(first[3] > 0 && last[3] > 0)) continue;
-    seen += 1;
-    [0, 1].forEach((k) => { crossed[k] += Math.abs(last[k] / last[3] - first[k] / first[3]); });
-  }
-  return seen ? times(crossed, 1 / seen) : crossed;
-}
-
-/**
- * Rectangles of pixels that boxes are seen in.
- *
- * @param {object} frame Of {@link frameOf}, of the new view.
  * @param {object} camera Of the new view.
  * @param {number[]} size Of its window, pixels.
- * @param {Float64Array} corners Of boxes, model', eight points each.
- * @returns {number[][]} x0, x1, y0, y1 of each, two pixels more to each side, row 0 at the bottom;
- *   all of the window for a box that is not in front of the eye.
+ * @returns {number[][]} Ends along the width and the height, two pixels more to each side, row 0 at
+ *   the bottom; all of the window where the bounds are not in front of the eye.
  */
-export function pixelsOfBoxes(frame, camera, size, corners) {
+export function pixelsOfBounds(frame, camera, size) {
   const toView = modelToView(frame, camera);
   const half = halfExtentIn(frame, camera, size), centre = windowCentre(camera);
   const parallel = isParallel(camera);
-  const rectangles = [];
-  for (let at = 0; at < corners.length; at += 24) {
-    const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
-    for (let k = at; k < at + 24; k += 3) {
-      const point = [corners[k], corners[k + 1], corners[k + 2], 1];
-      const [x, y, z] = toView.map((row) => dot(row, point));
-      [x, y].forEach((value, axis) => {
-        const on = (value / (parallel ? 1 : z) / half[axis] - centre[axis] + 1) * size[axis] / 2;
-        low[axis] = Math.min(low[axis], parallel || z > NEAREST_DEPTH ? on : -Infinity);
-        high[axis] = Math.max(high[axis], parallel || z > NEAREST_DEPTH ? on : Infinity);
-      });
-    }
-    rectangles.push([0, 1].flatMap((axis) => [
-      Math.max(Math.floor(low[axis] - 2), 0), Math.min(Math.ceil(high[axis] + 2), size[axis])]));
-  }
-  return rectangles;
+  const corners = Array.from({ length: 8 }, (_, corner) =>
+    [...frame.half.map((edge, k) => (corner >> k & 1 ? edge : -edge)), 1]);
+  const seen = corners.map((corner) => toView.map((row) => dot(row, corner)));
+  return [0, 1].map((axis) => {
+    const at = seen.map((point) =>
+      (point[axis] / (parallel ? 1 : point[2]) / half[axis] - centre[axis] + 1) * size[axis] / 2);
+    if (!parallel && seen.some(([, , depth]) => depth <= NEAREST_DEPTH)) return [0, size[axis]];
+    return [Math.max(Math.floor(Math.min(...at) - 2), 0), Math.min(Math.ceil(Math.max(...at) + 2), size[axis])];
+  });
 }

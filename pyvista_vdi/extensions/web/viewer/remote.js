@@ -25,147 +25,152 @@ const FORBIDDEN = 403;
  * Events: `hello` (detail: what the server offers), `status` (detail: {doing, text}).
  */
 export class RemoteVDI extends EventTarget {
+  #socket = null;
+  #incoming = null; // a VDI that comes
+  #next = null; // the file of the last that has
+  #showing = false;
+  #said = new Map(); // the last message of each kind, said again to a new connection
+  #timer = 0; // until the view rests
+  #retrying = 0; // another timer
+  #retry = FIRST_RETRY;
+  #closing = new AbortController();
+
+  /** What the server offers; null before it has said so. */
+  hello = null;
+  received = { vdis: 0, bytes: 0 };
+
   /**
    * @param {HTMLElement} viewer - A `<vdi-viewer>`.
    * @param {string} url - Of the socket, with the token.
    */
   constructor(viewer, url) {
     super();
-    this.viewer = viewer;
-    this.url = url;
-    this.hello = null;
-    this.received = { vdis: 0, bytes: 0 };
-    this._said = new Map(); // the last message of each kind, said again to a new connection
-    this._retry = FIRST_RETRY;
-    this._showing = false;
-    this._next = null;
-    this._restTimer = 0;
-    this._onCamera = () => this._viewMoved();
-    viewer.addEventListener("camerachange", this._onCamera);
-    this._sizes = new ResizeObserver(this._onCamera);
-    this._sizes.observe(viewer);
-    this._connect();
+    [this.viewer, this.url] = [viewer, url];
+    const moved = () => {
+      clearTimeout(this.#timer);
+      this.#timer = setTimeout(() => this.#sendView(), VIEW_RESTS);
+    };
+    const sizes = new ResizeObserver(moved), { signal } = this.#closing;
+    sizes.observe(viewer);
+    signal.addEventListener("abort", () => sizes.disconnect());
+    viewer.addEventListener("camerachange", moved, { signal });
+    this.#connect();
   }
 
   /** Change the transfer function: {cmap, opacity, clim}; what is left out is the server's. */
   setLook(look) {
-    this._say({ type: "look", ...look });
+    this.#say({ type: "look", ...look });
   }
 
   /** Show a time step, counted from 0. */
   setStep(step) {
-    this._say({ type: "time", step });
+    this.#say({ type: "time", step });
   }
 
   /** End the connection for good. The viewer goes on drawing what it has. */
   close() {
-    this.viewer.removeEventListener("camerachange", this._onCamera);
-    this._sizes.disconnect();
-    clearTimeout(this._restTimer);
-    clearTimeout(this._retryTimer);
-    this._closed = true;
-    this._socket.close();
+    this.#closing.abort();
+    clearTimeout(this.#timer);
+    clearTimeout(this.#retrying);
+    this.#socket.close();
   }
 
-  _connect() {
-    const socket = new WebSocket(this.url);
+  #connect() {
+    const socket = this.#socket = new WebSocket(this.url);
     socket.binaryType = "arraybuffer";
-    this._socket = socket;
-    this._incoming = null;
+    this.#incoming = null;
     socket.onmessage = ({ data }) => {
-      if (typeof data === "string") this._hear(JSON.parse(data));
-      else this._take(new Uint8Array(data));
+      if (typeof data === "string") this.#hear(JSON.parse(data));
+      else this.#take(new Uint8Array(data));
     };
     socket.onclose = async (event) => {
-      const { why, forGood } = this._closed ? {} : await whyNot(event, this.url);
-      if (this._closed) return;
+      const { why, forGood } = this.#closing.signal.aborted ? {} : await whyNot(event, this.url);
+      if (this.#closing.signal.aborted) return;
       if (forGood) {
-        this._status(null, why);
+        this.#status(null, why);
         return;
       }
-      this._status(null, `${why}; trying again in ${Math.ceil(this._retry / 1000)} s`);
-      this._retryTimer = setTimeout(() => this._connect(), this._retry);
-      this._retry = Math.min(2 * this._retry, LAST_RETRY);
+      this.#status(null, `${why}; trying again in ${Math.ceil(this.#retry / 1000)} s`);
+      this.#retrying = setTimeout(() => this.#connect(), this.#retry);
+      this.#retry = Math.min(2 * this.#retry, LAST_RETRY);
     };
   }
 
-  _hear(message) {
+  #hear(message) {
+    const { viewer } = this;
     if (message.type === "hello") {
       const first = this.hello === null;
       this.hello = message;
-      if (first) this.viewer.home = message.camera;
-      if (first && !this.viewer.camera) this.viewer.camera = message.camera; // no link has said another
-      this._status(null, "");
+      if (first) viewer.home = message.camera;
+      if (first && !viewer.camera) viewer.camera = message.camera; // no link has said another
+      this.#status(null, "");
       this.dispatchEvent(new CustomEvent("hello", { detail: message })); // a panel may take room
-      this._said.forEach((said) => this._send(said));
-      this._sendView();
+      this.#said.forEach((said) => this.#send(said));
+      this.#sendView();
     } else if (message.type === "vdi") {
-      this._retry = FIRST_RETRY; // not at once: a server may fail whenever it is asked for one
+      this.#retry = FIRST_RETRY; // not at once: a server may fail whenever it is asked for one
       // One that has not come whole is given up by the server
-      this._incoming = { ...message, file: new Uint8Array(message.bytes), filled: 0 };
+      this.#incoming = { file: new Uint8Array(message.bytes), filled: 0 };
     } else if (message.type === "status") {
-      this._status(message.doing, "");
+      this.#status(message.doing, "");
     } else if (message.type === "error") {
-      this._status(null, message.message);
+      this.#status(null, message.message);
     }
   }
 
-  _take(part) {
-    const incoming = this._incoming;
+  #take(part) {
+    const incoming = this.#incoming;
     if (incoming === null || incoming.filled + part.length > incoming.file.length) return;
     incoming.file.set(part, incoming.filled);
     incoming.filled += part.length;
     this.received.bytes += part.length;
     if (incoming.filled < incoming.file.length) return;
-    this._incoming = null;
-    this._next = incoming;
-    if (!this._showing) this._show();
+    [this.#incoming, this.#next] = [null, incoming.file];
+    if (!this.#showing) this.#show();
   }
 
-  /** Decode and swap what has come, one after the other: the last one counts. */
-  async _show() {
-    this._showing = true;
-    while (this._next !== null) {
-      const { file } = this._next;
-      this._next = null;
+  // Decode and swap what has come, one after the other: the last one counts.
+  async #show() {
+    this.#showing = true;
+    while (this.#next !== null) {
+      const file = this.#next;
+      this.#next = null;
       try {
         await this.viewer.showBytes(file);
         this.received.vdis += 1;
       } catch (error) {
-        this._status(null, error.message);
+        this.#status(null, error.message);
       }
     }
-    this._showing = false;
+    this.#showing = false;
   }
 
-  _viewMoved() {
-    clearTimeout(this._restTimer);
-    this._restTimer = setTimeout(() => this._sendView(), VIEW_RESTS);
-  }
-
-  _sendView() {
+  #sendView() {
     const { viewer } = this;
-    if (this.hello === null || this._socket.readyState !== WebSocket.OPEN) return;
+    if (!this.#listens) return;
     const density = globalThis.devicePixelRatio || 1;
     const edge = (length) => Math.min(LONGEST_EDGE, Math.max(1, Math.round(length * density)));
     const size = [edge(viewer.clientWidth), edge(viewer.clientHeight)];
     const { position, focal_point, view_up, view_angle, parallel_scale } = viewer.camera;
     const lens = parallel_scale === undefined ? { view_angle } : { parallel_scale };
-    const camera = { position, focal_point, view_up, ...lens };
-    clearTimeout(this._restTimer);
-    this._send({ type: "view", camera, size });
+    clearTimeout(this.#timer);
+    this.#send({ type: "view", camera: { position, focal_point, view_up, ...lens }, size });
   }
 
-  _send(message) {
-    this._socket.send(JSON.stringify(message));
+  get #listens() {
+    return this.hello !== null && this.#socket.readyState === WebSocket.OPEN;
   }
 
-  _say(message) {
-    this._said.set(message.type, message);
-    if (this.hello !== null && this._socket.readyState === WebSocket.OPEN) this._send(message);
+  #send(message) {
+    this.#socket.send(JSON.stringify(message));
   }
 
-  _status(doing, text) {
+  #say(message) {
+    this.#said.set(message.type, message);
+    if (this.#listens) this.#send(message);
+  }
+
+  #status(doing, text) {
     this.dispatchEvent(new CustomEvent("status", { detail: { doing, text } }));
   }
 }
@@ -186,55 +191,45 @@ async function whyNot({ code, reason }, url) {
   }
 }
 
-/** Fill a panel with plain controls of what the server offers; `complain` is told what is wrong. */
-function fillPanel(panel, remote, hello, complain) {
+// Fill a panel with plain controls of what the server offers; `complain` is told what is wrong.
+function fillPanel(panel, remote, { cmaps, opacities, look, range, steps }, complain) {
   const labelled = (text, ...inputs) => htmlElement("label", {}, text, ...inputs);
   const choice = (label, names, value) => {
+    const known = names.includes(value);
     const options = names.map((name) => htmlElement("option", {}, name));
     const select = htmlElement("select", { label }, ...options);
-    if (!names.includes(value)) select.prepend(htmlElement("option", { value: "" }, "as started"));
-    select.value = names.includes(value) ? value : "";
+    if (!known) select.prepend(htmlElement("option", { value: "" }, "as started"));
+    select.value = known ? value : "";
     return select;
   };
   const controls = [];
-  if (hello.cmaps.length > 0) {
-    const cmap = choice("Colours", hello.cmaps, hello.look.cmap);
-    const opacity = choice("Opacity", hello.opacities, hello.look.opacity);
-    const [low, high] = hello.range.map((value, k) => htmlElement("input", {
-      type: "number", step: "any", placeholder: String(value),
-      label: `${["Lowest", "Highest"][k]} value of the range`,
-    }));
+  if (cmaps.length > 0) {
+    const cmap = choice("Colours", cmaps, look.cmap), opacity = choice("Opacity", opacities, look.opacity);
+    const ends = range.map((value, k) => htmlElement("input", { type: "number", step: "any",
+      placeholder: String(value), label: `${["Lowest", "Highest"][k]} value of the range` }));
     let clim; // the last that was one
-    const takeRange = () => {
-      const ends = [low, high].map((end, k) => (end.value ? Number(end.value) : hello.range[k]));
-      const wrong = [low, high].some((end) => end.validity.badInput)
-        ? "the range is two numbers"
-        : ends[0] < ends[1] ? ""
-        : `the range is from the lower value to the higher: ${ends[0]} is not below ${ends[1]}`;
-      for (const end of [low, high]) {
+    const tell = ({ target }) => {
+      const [low, high] = ends.map((end, k) => (end.value ? Number(end.value) : range[k]));
+      const wrong = ends.some((end) => end.validity.badInput) ? "the range is two numbers" : low < high
+        ? "" : `the range is from the lower value to the higher: ${low} is not below ${high}`;
+      for (const end of ends) {
         end.setCustomValidity(wrong);
         end.setAttribute("aria-invalid", wrong !== "");
       }
       complain(wrong);
-      if (!wrong) clim = low.value || high.value ? ends : undefined;
-      return !wrong;
+      if (wrong && ends.includes(target)) return;
+      if (!wrong) clim = ends.some((end) => end.value) ? [low, high] : undefined;
+      const wanted = Object.entries({ cmap: cmap.value, opacity: opacity.value, clim });
+      remote.setLook(Object.fromEntries(wanted.filter(([, value]) => value)));
     };
-    const tell = () => {
-      const look = { cmap: cmap.value, opacity: opacity.value, clim };
-      remote.setLook(Object.fromEntries(Object.entries(look).filter(([, value]) => value)));
-    };
-    [cmap, opacity].forEach((input) => input.addEventListener("change", tell));
-    for (const end of [low, high]) {
-      end.addEventListener("change", () => takeRange() && tell());
-      // What is wrong is right as soon as it is: of letters that are deleted there is no change
-      end.addEventListener("input", () => end.validity.valid || (takeRange() && tell()));
-    }
-    controls.push(labelled("Colours", cmap), labelled("Opacity", opacity));
-    controls.push(labelled("Range", low, high));
+    for (const input of [cmap, opacity, ...ends]) input.addEventListener("change", tell);
+    // What is wrong is right as soon as it is: of letters that are deleted there is no change
+    for (const end of ends) end.addEventListener("input", (event) => end.validity.valid || tell(event));
+    controls.push(labelled("Colours", cmap), labelled("Opacity", opacity), labelled("Range", ...ends));
   }
-  if (hello.steps > 1) {
+  if (steps > 1) {
     const time = htmlElement("input", {
-      type: "range", min: 0, max: hello.steps - 1, value: 0, label: "Time step",
+      type: "range", min: 0, max: steps - 1, value: 0, label: "Time step",
     });
     time.addEventListener("input", () => remote.setStep(Number(time.value)));
     controls.push(labelled("Time", time));

@@ -1,10 +1,11 @@
 // What a plotter shows beside a VDI: plain meshes, other VDIs, and pictures that VTK has drawn of
 // texts, scalar bars and axes, as web/scenes/scene.py packs them.
+import { VDIFileError } from "./bytes.js";
+import { emptyTexture, programOf } from "./graphics.js";
 import { load } from "./loader.js";
-import { Raycaster, linked, programsOf } from "./raycast.js";
+import { Raycaster } from "./raycast.js";
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
 import { VERTEX_SHADER } from "./shader.js";
-import { VDIFileError } from "./unpack.js";
 import { dot, subtract } from "./vectors.js";
 
 /** Samples of a pixel where meshes are drawn, as in PyVista's windows. */
@@ -74,8 +75,8 @@ export class Scene {
   constructor(bytes) {
     /** The view that the scene begins in, if it says one; null before it is loaded. */
     this.camera = null;
-    /** Called when there is more to be seen, and with what is wrong. */
-    this.changed = this.failed = () => {};
+    /** Called when there is more to be seen. */
+    this.changed = () => {};
     /** The viewer that shows it. */
     this.viewer = null;
     /** Whether all of it can be drawn. */
@@ -87,7 +88,7 @@ export class Scene {
       this.complete = true;
       this.changed();
     });
-    this.whole.catch((error) => this.failed(error));
+    this.whole.catch(() => {}); // who shows it is told
   }
 
   // Returns promises of the VDIs that are in it.
@@ -104,7 +105,6 @@ export class Scene {
     }));
     this.head = head;
     this.camera = head.camera;
-    if (this.#gl) this.restore(this.#gl);
     this.changed();
     return head.vdis.map(({ file }, k) => file === null ? null
       : load(arrays[file], { onLevel: (prepared) => this.#take(k, prepared) }));
@@ -118,10 +118,10 @@ export class Scene {
   }
 
   /** Take the graphics that there is, at first and after it was lost. */
-  restore(gl) {
+  take(gl) {
+    if (gl === this.#gl || !this.head) return;
     this.#gl = gl;
     this.#buffers = this.#drawn = null;
-    gl.deleteVertexArray(this.#vertices);
     this.#vertices = gl.createVertexArray();
     if (this.#meshes.length && !gl.getExtension("EXT_color_buffer_float")) {
       throw new Error("This browser's graphics cannot draw depths as numbers " +
@@ -182,7 +182,7 @@ export class Scene {
 
   // The farthest first: by the middles of their boxes.
   #drawVDIs(raycaster, view) {
-    const { camera, width, height, few, clippingPlanes, look } = view;
+    const { camera, clippingPlanes } = view;
     const [, , forward] = cameraAxes(camera);
     const placed = this.#bodies.map((body, k) => ({ ...body, caster: k ? body.raycaster : raycaster }))
       .filter(({ caster }) => caster?.vdi).map((body) => {
@@ -193,7 +193,7 @@ export class Scene {
       });
     for (const { caster, matrix, planes } of placed.sort((a, b) => b.depth - a.depth)) {
       caster.draw({
-        camera: { ...camera, model_transform: matrix }, width, height, few, look,
+        ...view, camera: { ...camera, model_transform: matrix },
         depthTexture: this.#meshes.length ? this.#buffers.depth : null,
         clippingPlanes: [...planes, ...clippingPlanes],
       });
@@ -215,7 +215,7 @@ export class Scene {
     const room = 0.01 * (most - least) + 1e-6 * Math.abs(most) + 1e-18, far = most + room;
     const near = parallel ? least - room : Math.max(least - room, 0.001 * far);
     const slope = (far + near) / (far - near);
-    const { program, uniforms: u } = this.#program(MESH_VERTEX_SHADER, MESH_FRAGMENT_SHADER);
+    const { program, uniforms: u } = programOf(gl, MESH_VERTEX_SHADER, MESH_FRAGMENT_SHADER, PLACES);
     gl.useProgram(program);
     gl.uniformMatrix3fv(u.axes, true, axes.flat());
     gl.uniform4f(u.lens, ...halfExtent(camera, [width, height]), ...(camera.window_center ?? [0, 0]));
@@ -271,13 +271,10 @@ export class Scene {
     if (!this.#pictures.some(Boolean)) return;
     const canvas = new OffscreenCanvas(width, height);
     this.annotate(canvas, camera, [width, height]);
-    const picture = gl.createTexture();
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, picture);
+    const picture = emptyTexture(gl, "RGBA8", width, height);
     gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, true);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, canvas);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, canvas);
     gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.viewport(0, 0, width, height);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
@@ -288,7 +285,7 @@ export class Scene {
 
   #cover(picture, flipped) {
     const gl = this.#gl;
-    const { program, uniforms } = this.#program(VERTEX_SHADER, PICTURE_SHADER);
+    const { program, uniforms } = programOf(gl, VERTEX_SHADER, PICTURE_SHADER);
     gl.useProgram(program);
     gl.uniform1i(uniforms.flipped, flipped);
     gl.activeTexture(gl.TEXTURE0);
@@ -299,34 +296,12 @@ export class Scene {
     gl.bindVertexArray(null);
   }
 
-  #program(vertex, fragment) {
-    const gl = this.#gl, key = vertex + fragment, known = programsOf(gl);
-    if (!known.has(key)) {
-      const program = linked(gl, vertex, fragment, PLACES), uniforms = {};
-      for (let k = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k-- > 0; ) {
-        const { name } = gl.getActiveUniform(program, k);
-        uniforms[name] = gl.getUniformLocation(program, name);
-      }
-      known.set(key, { program, uniforms });
-    }
-    return known.get(key);
-  }
-
   // Framebuffers as large as the target's: of depths, of colours by samples, and of those resolved.
   #sized(width, height) {
     const gl = this.#gl;
     if (this.#buffers?.width === width && this.#buffers.height === height) return this.#buffers;
     this.#free();
     const samples = Math.min(SAMPLES, gl.getParameter(gl.MAX_SAMPLES));
-    const texture = (format) => {
-      const id = gl.createTexture();
-      gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, id);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-      gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], width, height);
-      return id;
-    };
     const renderbuffer = (format, count) => {
       const id = gl.createRenderbuffer();
       gl.bindRenderbuffer(gl.RENDERBUFFER, id);
@@ -342,7 +317,7 @@ export class Scene {
       }
       return id;
     };
-    const [depth, color] = [texture("R32F"), texture("RGBA8")];
+    const [depth, color] = ["R32F", "RGBA8"].map((format) => emptyTexture(gl, format, width, height));
     const renderbuffers = [renderbuffer("DEPTH_COMPONENT24", 0), renderbuffer("RGBA8", samples),
       renderbuffer("DEPTH_COMPONENT24", samples)];
     const passes = [framebuffer(depth, { DEPTH_ATTACHMENT: renderbuffers[0] }),
@@ -397,13 +372,6 @@ function uploaded(gl, attributes) {
 
 // -- in a page -----------------------------------------------------------------------------------
 
-/** The scene that a page holds for a viewer; null if there is none. */
-export function embeddedScene(viewer) {
-  const script = viewer.querySelector(':scope > script[type="application/vdi-scene+base64"]');
-  if (!script) return null;
-  return new Scene(Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0)));
-}
-
 /** Have the views with the same `data-link` turn with one, as those of a plotter do. */
 export function turnTogether(viewer) {
   viewer.addEventListener("camerachange", ({ detail }) => {
@@ -416,9 +384,9 @@ export function turnTogether(viewer) {
 
 function takeEmbedded() {
   for (const viewer of document.querySelectorAll("vdi-viewer")) {
-    const scene = viewer.scene ? null : embeddedScene(viewer);
-    if (!scene) continue;
-    viewer.scene = scene;
+    const script = viewer.querySelector(':scope > script[type="application/vdi-scene+base64"]');
+    if (!script || viewer.scene) continue;
+    viewer.scene = new Scene(Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0)));
     if (viewer.dataset.link) turnTogether(viewer);
   }
 }

@@ -1,7 +1,7 @@
 // A series or a set in a page: a JSON and numbered .vdi files, in a ZIP or a folder (docs/series.md).
+import { GrowingBytes, REMEDY, VDIFileError } from "./bytes.js";
 import { checkedMember, isCamera, membersOf } from "./decode.js";
-import { askPort, decodingPort } from "./port.js";
-import { GrowingBytes, REMEDY, VDIFileError } from "./unpack.js";
+import { withWorker } from "./port.js";
 
 /** The JSON's name, and its entry that has one item for each VDI. */
 const LISTED = { "series.json": "times", "set.json": "views" };
@@ -9,25 +9,23 @@ const LISTED = { "series.json": "times", "set.json": "views" };
 const NAME_AT = 30;
 /** Bytes that tell what a file is. */
 export const BEGIN = 64;
+/** Decoded VDIs that are kept. */
+const KEPT = 6;
+/** Share of the last VDI's decoding in what the next one is expected to take. */
+const LAST = 0.3;
 
 const nameOf = (i) => `${String(i).padStart(6, "0")}.vdi`;
 
-/** Whether bytes, or base64 text, are the beginning of a series' ZIP, or of a set's. */
-export function beginsAsSeries(piece) {
-  const text = typeof piece === "string" ? atob(piece.trimStart().slice(0, BEGIN)) :
-    String.fromCharCode(...piece.subarray(0, BEGIN));
-  return Object.keys(LISTED).some((name) => text.startsWith(name, NAME_AT));
+/** Whether bytes are the beginning of a series' ZIP, or of a set's. */
+export function beginsAsSeries(bytes) {
+  const text = String.fromCharCode(...bytes.subarray(NAME_AT, BEGIN));
+  return Object.keys(LISTED).some((name) => text.startsWith(name));
 }
 
 /** The VDIs of one scene at several times, or from several views. */
 export class Series {
   #read; // async (i) -> the bytes of a VDI's file, which may be handed over
   #times;
-  #of; // what one is called
-  #port = null; // a promise
-  #last = Promise.resolve(); // of what was asked for
-  #closing = () => {}; // rejects what is being decoded
-  #era = 0; // how often it was closed
 
   /** How many VDIs there are, by now. */
   length = 0;
@@ -35,7 +33,6 @@ export class Series {
   complete = false;
   /** Called when there are more. */
   changed = () => {};
-
   /** Of a set the V_Os' cameras; else null, as the two that follow. */
   views = null;
   bounds = null;
@@ -44,7 +41,6 @@ export class Series {
   constructor(name, text, read) {
     const head = headOf(name, text);
     this.#read = read;
-    this.#of = head.views ? "view" : "step";
     this.#times = head.times ?? head.views.map((_, i) => i);
     if (head.views) ({ views: this.views, bounds: this.bounds, camera: this.camera } = head);
   }
@@ -61,43 +57,24 @@ export class Series {
   }
 
   /**
-   * A VDI as prepare.js makes it; one is decoded after the other.
+   * A VDI as prepare.js makes it.
    *
    * @param {number} i Its index.
+   * @param {AbortSignal} signal Ends it.
    * @returns {Promise<object>}
    * @throws {VDIFileError} A sentence that names the step.
    */
-  prepared(i) {
-    const era = this.#era;
-    const found = this.#last.then(() => {
-      if (era !== this.#era) throw closedError();
-      return this.#decoded(i);
-    });
-    this.#last = found.catch(() => {});
-    return found;
-  }
-
-  /** End the worker; the next VDI that is asked for starts another. */
-  close() {
-    this.#port?.then((port) => port.terminate());
-    this.#port = null;
-    this.#era += 1;
-    this.#closing(closedError());
-  }
-
-  async #decoded(i) {
-    const closed = new Promise((_, reject) => (this.#closing = reject));
-    closed.catch(() => {});
-    const unlessClosed = (promise) => Promise.race([promise, closed]);
+  async prepared(i, signal) {
     try {
-      const file = await unlessClosed(this.#read(i));
-      const port = await unlessClosed(this.#port ??= decodingPort());
-      let prepared;
-      await unlessClosed(askPort(port, { file }, (data) => ({ prepared } = data), [file.buffer]));
-      return prepared;
+      return await withWorker(signal, async (ask) => {
+        const file = await this.#read(i);
+        let prepared;
+        await ask({ file }, (data) => ({ prepared } = data), [file.buffer]);
+        return prepared;
+      });
     } catch (error) {
       if (!(error instanceof VDIFileError)) throw error;
-      throw new VDIFileError(`${this.#of} ${i} cannot be shown: ${error.message}`);
+      throw new VDIFileError(`${this.views ? "view" : "step"} ${i} cannot be shown: ${error.message}`);
     }
   }
 
@@ -109,17 +86,19 @@ export class Series {
   /**
    * Read a ZIP from pieces that come one behind the other.
    *
-   * @param {AsyncIterable} pieces Uint8Array or base64 text.
+   * @param {Uint8Array} first
+   * @param {AsyncIterable} pieces Those that follow: Uint8Array or base64 text.
    * @param {(series: Series) => void} onSeries Called when its first VDI is there.
    * @returns {Promise<void>} When all has been read.
    * @throws {VDIFileError} If there is no VDI.
    */
-  static async ofPieces(pieces, onSeries) {
+  static async ofPieces(first, pieces, onSeries) {
     const bytes = new GrowingBytes();
     const places = []; // where each VDI begins and ends
     let series = null, at = 0;
-    const look = () => {
+    const take = (piece) => {
       const known = places.length;
+      bytes.push(piece);
       for (const member of membersOf(bytes.whole.subarray(at), true)) {
         const begin = member.bytes.byteOffset, end = begin + member.bytes.length;
         if (!series) {
@@ -132,10 +111,8 @@ export class Series {
       series.#take(places.length);
       if (!known) onSeries(series);
     };
-    for await (const piece of pieces) {
-      bytes.push(piece);
-      look();
-    }
+    take(first);
+    for await (const piece of pieces) take(piece);
     if (!places.length) {
       throw new VDIFileError("the series has no whole VDI: it was cut off, or none is written yet");
     }
@@ -179,6 +156,84 @@ function headOf(name, text) {
   return head;
 }
 
-function closedError() {
-  return new DOMException("The series is closed.", "AbortError");
+/** Decodes VDIs of a series before they are shown, one after the other. */
+export class Ahead {
+  #series;
+  #host;
+  #wanted = []; // indices
+  #ready = new Map(); // index -> what prepare.js made of it; what was shown last is last
+  #broken = new Set();
+  #working = false;
+  #stop = new AbortController();
+
+  /** Index of the one that was handed to be drawn. */
+  shown = -1;
+  /** Seconds that one takes to be ready. */
+  seconds = 0;
+
+  /**
+   * @param {Series} series
+   * @param {object} host `show(prepared, i)` has a VDI drawn; `came(i)` is called when one is ready,
+   *   `broken(i, error)` when it cannot be.
+   */
+  constructor(series, host) {
+    [this.#series, this.#host] = [series, host];
+  }
+
+  isReady(i) {
+    return this.#ready.has(i);
+  }
+
+  isBroken(i) {
+    return this.#broken.has(i);
+  }
+
+  /** Show one that is ready. */
+  show(i) {
+    if (this.shown === i) return;
+    this.shown = i;
+    const prepared = this.#ready.get(i);
+    this.#ready.delete(i);
+    this.#ready.set(i, prepared);
+    this.#host.show(prepared, i);
+  }
+
+  /** Have some ready, the first one first; `again`: those that could not be, too. */
+  want(indices, again = false) {
+    this.#wanted = indices;
+    if (again) this.#broken.clear();
+    this.#work();
+  }
+
+  /** Give up what is being decoded, until something is wanted again. */
+  stop() {
+    this.#stop.abort();
+    this.#stop = new AbortController();
+    this.#wanted = [];
+  }
+
+  async #work() {
+    if (this.#working) return;
+    this.#working = true;
+    const known = (i) => this.#ready.has(i) || this.#broken.has(i);
+    for (let i; (i = this.#wanted.find((each) => !known(each))) !== undefined;) {
+      const { signal } = this.#stop, began = performance.now();
+      try {
+        this.#ready.set(i, await this.#series.prepared(i, signal));
+      } catch (error) {
+        if (signal.aborted) continue;
+        this.#broken.add(i);
+        this.#host.broken(i, error);
+        continue;
+      }
+      const took = (performance.now() - began) / 1000;
+      this.seconds += (took - this.seconds) * (this.seconds ? LAST : 1);
+      for (const old of this.#ready.keys()) {
+        if (this.#ready.size <= KEPT) break;
+        if (old !== this.shown && !this.#wanted.includes(old)) this.#ready.delete(old);
+      }
+      this.#host.came(i);
+    }
+    this.#working = false;
+  }
 }

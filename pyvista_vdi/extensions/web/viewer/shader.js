@@ -48,7 +48,6 @@ uniform vec3 formValue[4], formSlope[4]; // u, v, depth coordinate, denominator:
 uniform vec3 planeValue[PLANES], planeSlope[PLANES];
 uniform mat3 direction;           // model' length per t: columns for 1, a and b
 uniform ivec2 window;             // lists
-uniform ivec2 thinned;            // along each edge: 1 for every second list, or 0
 uniform float depthOrigin;        // world'
 uniform float firstDepth, slabsPerDepth; // of the occupancy grid, offsets from the depth origin
 uniform float cutoff;
@@ -119,7 +118,7 @@ float depthOfCode(uint code) {
 #endif
 
 void enter(int i, int j) {
-  list = texelFetch(lists, ivec2(i, j) << thinned, 0);
+  list = texelFetch(lists, ivec2(i, j), 0);
 #ifdef PACKED
   count = int(list.y & 0xffffu);
 #else
@@ -276,8 +275,7 @@ CLIPPING
   vec2 step_ = mix(vec2(-1.0), vec2(1.0), upwards);
   ahead = vec2(upwards) - half_;
   vec2 cell = clamp(floor(start.xy + half_), vec2(0.0), last);
-  ivec2 stackShift = ivec2(STACK_SHIFT) - thinned;
-  vec2 stackEdge = vec2(ivec2(1) << stackShift); // of a stack, lists
+  const float stackEdge = float(1 << STACK_SHIFT); // of a stack, lists
   float depth = sense * start.z;
   bool goes = true;
   bool fresh = abs(along.x) + abs(along.y) > 2.0; // a stack that has not been looked at
@@ -288,7 +286,7 @@ CLIPPING
   for (int look = 0; goes && look < 100000; ++look) {
     if (fresh) { // pass by what is empty
       for (int stack = 0; stack < 100000; ++stack) {
-        uvec2 mask = texelFetch(masks, ivec2(cell) >> stackShift, 0).xy;
+        uvec2 mask = texelFetch(masks, ivec2(cell) >> STACK_SHIFT, 0).xy;
         int slab = int(clamp((offsetOf(sense * depth) - firstDepth) * slabsPerDepth, 0.0, 63.0));
         int nearestOne = nearestSlab(mask, slab);
         if (nearestOne == slab) break;

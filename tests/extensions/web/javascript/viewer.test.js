@@ -12,7 +12,7 @@ const textOf = (name) => readFileSync(new URL(`${viewer}/${name}`), "utf-8");
 const { checkedCamera, lookingAt } = await import(`${viewer}/camera.js`);
 const { textOfView, viewOfText } = await import(`${viewer}/link.js`);
 const { AS_MADE, checkedLook, isAsMade } = await import(`${viewer}/look.js`);
-const { inShort } = await import(`${viewer}/marks.js`);
+const { inShort } = await import(`${viewer}/html.js`);
 const { checkedTransfer, editedFrom } = await import(`${viewer}/values.js`);
 
 const camera = checkedCamera({
@@ -70,19 +70,6 @@ test("a look has factors and shares in order", () => {
   for (const look of [{ brightness: 17 }, { opacity: NaN }, { clip: [1, 0, 0, 1, 0, 1] }, { clip: [] }]) {
     assert.throws(() => checkedLook(look), TypeError);
   }
-});
-
-test("the faces of the cube name the views that they are seen from", async () => {
-  const { viewAt } = await import(`${viewer}/marks.js`);
-  const views = [["+x", [1, 0, 0], [0, 0, 1]], ["+y", [0, 1, 0], [0, 0, 1]], ["iso", [1, 1, 1], [0, 0, 1]]];
-  const at = (position, place) => viewAt(views, [320, 180], checkedCamera({
-    position, focal_point: [0, 0, 0], view_up: [0, 0, 1], view_angle: 30 }), place)?.[0] ?? null;
-  assert.equal(at([9, 0, 0], [47, 133]), "+x");
-  assert.equal(at([0, 9, 0], [47, 133]), "+y");
-  assert.equal(at([9, 9, 0], [35, 133]), "+x"); // +y is to the right of +x
-  assert.equal(at([9, 9, 0], [59, 133]), "+y");
-  assert.equal(at([-9, 0, 0], [47, 133]), null); // none of these faces is seen
-  assert.equal(at([9, 0, 0], [80, 133]), null); // beside it
 });
 
 test("a standard view sees all of a box", () => {

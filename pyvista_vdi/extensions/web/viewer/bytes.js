@@ -1,32 +1,16 @@
-// Checksums and deflate: what lies in a file to the bytes that it stands for.
+// Bytes of files: they come piece by piece, have checksums, and are inflated.
 
 /** What to do about a file that is not as it was written. */
 export const REMEDY = "load it again, or copy it from its source again";
 
 /** What is wrong with a file, as a sentence. */
 export class VDIFileError extends Error {
-  constructor(message) {
-    super(message);
-    this.name = "VDIFileError";
-  }
+  name = "VDIFileError";
 }
 
 /** Throw a {@link VDIFileError} that says why a file is not what was written. */
 export function damaged(why) {
   throw new VDIFileError(`the VDI file is damaged: ${why}; ${REMEDY}`);
-}
-
-/** The bytes that base64 text stands for; its length is a multiple of four. */
-export function bytesOfBase64(text) {
-  try {
-    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-    const letters = atob(text);
-    const bytes = new Uint8Array(letters.length);
-    for (let k = 0; k < bytes.length; ++k) bytes[k] = letters.charCodeAt(k);
-    return bytes;
-  } catch {
-    return damaged("its text is no base64");
-  }
 }
 
 /** Bytes that come piece by piece, as such or as base64 text. */
@@ -63,6 +47,17 @@ export class GrowingBytes {
   }
 }
 
+function bytesOfBase64(text) {
+  try {
+    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+    const letters = atob(text), bytes = new Uint8Array(letters.length);
+    for (let k = 0; k < bytes.length; ++k) bytes[k] = letters.charCodeAt(k);
+    return bytes;
+  } catch {
+    return damaged("its text is no base64");
+  }
+}
+
 // Four tables, by which four bytes are taken in at once
 let crcTables = null;
 
@@ -95,64 +90,19 @@ export function crc32(bytes) {
   return ~c >>> 0;
 }
 
-/** Decompress a zlib stream to exactly `raw` bytes; nothing more is ever unpacked. */
-export async function inflate(bytes, raw) {
-  const out = new Uint8Array(raw);
-  let at = 0;
-  const whole = await inflatePieces(bytes, (piece) => {
-    if (at + piece.length > raw) return false;
-    out.set(piece, at);
-    at += piece.length;
-    return true;
-  });
-  if (!whole || at !== raw) {
-    damaged(`a chunk does not decompress to the ${raw} bytes that it stands for`);
-  }
-  return out;
-}
-
-/** Decompress a zlib stream of text, of which there may be `most` bytes. */
-export async function inflateText(bytes, most) {
-  const decoder = new TextDecoder();
-  let text = "";
-  let length = 0;
-  const whole = await inflatePieces(bytes, (piece) => {
-    length += piece.length;
-    text += decoder.decode(piece, { stream: true });
-    return length <= most;
-  });
-  if (!whole) damaged("a description does not decompress");
-  return text + decoder.decode();
-}
-
-// Give the pieces of what a zlib stream stands for until one is refused; whether all were taken.
-async function inflatePieces(bytes, take) {
+/** Decompress a zlib stream to exactly as many bytes as belong; nothing more is ever unpacked. */
+export async function inflate(bytes, length) {
+  const out = new Uint8Array(length);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const reader = stream.getReader();
+  let at = 0;
   try {
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) return true;
-      if (!take(value)) return false;
-    }
+    for (let next; !(next = await reader.read()).done; at += next.value.length) out.set(next.value, at);
   } catch {
-    return false;
+    at = -1; // it is no such stream, or goes on
   } finally {
     reader.cancel().catch(() => {});
   }
-}
-
-/** Decompress a chunk of an array's rows, which were shuffled before, into `rows`. */
-export async function unpackChunk(bytes, rows, rowBytes) {
-  unshuffle(await inflate(bytes, rows.length), rows, rowBytes);
-}
-
-/** Byte planes to elements: first the first bytes of all, then the second ones. */
-export function unshuffle(planes, out, size) {
-  const n = Math.floor(out.length / size);
-  for (let plane = 0; plane < size; ++plane) {
-    const from = plane * n;
-    for (let k = 0, to = plane; k < n; ++k, to += size) out[to] = planes[from + k];
-  }
-  out.set(planes.subarray(n * size, out.length), n * size);
+  if (at !== length) damaged(`a chunk does not decompress to the ${length} bytes that it stands for`);
+  return out;
 }

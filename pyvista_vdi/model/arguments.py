@@ -1,0 +1,259 @@
+"""Functions whose arguments are options: their signature, their docstring, and what they refuse."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field, make_dataclass, replace
+from functools import wraps
+from inspect import Parameter
+from typing import Any
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
+from pyvista_vdi.model.options import (
+    RECORDS,
+    Deferral,
+    GenerationOptions,
+    Option,
+    Options,
+    QualityTarget,
+    declared,
+    entries,
+    record,
+)
+from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
+
+#: What has gone, and what is done in its place.
+_GONE = {
+    "skip_empty": "what is empty is passed by, without being asked",
+    "status": "call show_status(plotter) of the actor",
+}
+
+
+def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
+    """Raise TypeError for the first argument whose name is not known, and say what is meant."""
+    known = [name for name in known if name != "self"]
+    options = declared(*RECORDS)
+    meant = {alias: name for name, told in options.items() for alias in told.aliases}
+    for name in given:
+        if name in known:
+            continue
+        own = meant.get(name, name)
+        elsewhere = (each.elsewhere for each in RECORDS if own in vars(each)["declared"])
+        near = difflib.get_close_matches(name, known, n=1)
+        suggestion = own if own in known else near[0] if near else None
+        hint = f"did you mean {suggestion!r}?" if suggestion else f"known are {', '.join(known)}"
+        if own not in known:
+            hint = _GONE.get(name) or next(filter(None, elsewhere), "") or hint
+            if "settings" in known and own in options and options[own].setting:
+                hint = f"pass it by settings=pyvista_vdi.Settings({own}=...)"
+        raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
+
+
+def _of_settings() -> type[Options]:
+    """Return a record of the options that are settings, of whichever record."""
+    records = (GenerationOptions, QualityTarget, Deferral, RenderOptions, DrawingOptions)
+    found = [
+        (name, told.kind, field(default=told.default, metadata={"option": told}))
+        for name, told in declared(*records).items()
+        if told.setting
+    ]
+    return record(make_dataclass("_Fields", found, bases=(Options,), frozen=True, kw_only=True))
+
+
+_Fields: Any = _of_settings()
+
+
+class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the options' texts
+    __doc__ = f"""Options that are seldom turned, for ``settings=`` of whatever has a use for them.
+
+    Parameters
+    ----------
+{"".join(entries(_Fields.declared.values()))}
+    Raises
+    ------
+    TypeError
+        If a keyword is unknown.
+    InvalidArgumentError
+        If a value is out of range.
+
+    Examples
+    --------
+    >>> import pyvista_vdi as pvdi
+    >>> pvdi.Settings(tolerance=0.01, memory_limit="2 GiB").given
+    {{'memory_limit': 2147483648, 'tolerance': 0.01}}
+    """
+    __signature__ = inspect.signature(_Fields)
+
+    def __init__(self, **given: Any) -> None:
+        refuse_unknown(given, "Settings", self.declared)
+        super().__init__(**given)
+        object.__setattr__(self, "_said", tuple(given))
+
+    @property
+    def said(self) -> dict[str, Any]:
+        """What was given, defaults among it."""
+        return {name: getattr(self, name) for name in self._said}
+
+
+class Raw:
+    """In place of a record: its options as they are given, to be checked by the function."""
+
+    def __init__(self, record: type[Options]) -> None:
+        self.declared = record.declared
+
+    def checked(self, **given: Any) -> dict[str, Any]:
+        """Return all of the options by their names."""
+        return {name: given.get(name, told.default) for name, told in self.declared.items()}
+
+
+def takes(
+    *,
+    order: Iterable[str] = (),
+    aliases: Mapping[str, str] | None = None,
+    returns: Mapping[str, Any] | None = None,
+    kinds: Mapping[str, str] | None = None,
+    defaults: Mapping[str, Any] | None = None,
+    flat: bool = False,
+    **records: Any,
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make the options of records the arguments of a function, which gets the records.
+
+    The function has a parameter for each record, by the names of ``records``. Its signature then
+    has the options instead, by keyword, or where ``order`` has their names as positional arguments
+    of that order; and its docstring an entry for each that it does not describe itself.
+    ``aliases`` are other names that are taken as well. ``returns``: what the function returns, by
+    the values of an option, of which the first is its default; ``kinds``: types of options that
+    are others than declared, and ``defaults``. What is seldom turned is taken as ``settings``,
+    or where that is to be ``flat`` like the others.
+    """
+    options: dict[str, Option] = {}
+    for each in records.values():
+        options |= each.declared
+    for name, kind in (kinds or {}).items():
+        options[name] = replace(options[name], kind=kind)
+    for name, default in (defaults or {}).items():
+        options[name] = replace(options[name], default=default)
+    hidden = {name: told for name, told in options.items() if told.setting and not flat}
+    shown = {name: told for name, told in options.items() if name not in hidden}
+    if hidden:
+        what = f"options that are seldom turned; here {', '.join(sorted(hidden))}"
+        shown["settings"] = Option("settings", None, what, kind="Settings | None")
+    other = dict(aliases or {})
+
+    def decorated(function: Callable[..., Any]) -> Callable[..., Any]:
+        signature = _signature(function, records, shown, [*order])
+        named = signature.parameters
+        open_ended = any(each.kind is Parameter.VAR_KEYWORD for each in named.values())
+        first = [
+            each.name for each in named.values() if each.kind is Parameter.POSITIONAL_OR_KEYWORD
+        ]
+        called_by = "add_vdi" if function.__name__ == "__call__" else function.__name__
+
+        @wraps(function)
+        def called(*args: Any, **given: Any) -> Any:
+            for alias in other.keys() & given.keys():
+                given[other[alias]] = given.pop(alias)
+            if not open_ended and not given.keys() <= named.keys():
+                refuse_unknown(given, called_by, (*named, *other))
+            try:
+                signature.bind(*args, **given)
+            except TypeError as error:
+                raise TypeError(f"{called_by}() {error}") from None
+            given |= zip(first, args, strict=False)
+            made = records_of(given, called_by, *records.values(), defaults=defaults, flat=flat)
+            return function(**given, **dict(zip(records, made, strict=True)))
+
+        told: Any = called
+        told.__signature__, told.__doc__, told.returns = (
+            signature,
+            _documented(function.__doc__ or "", shown.values()),
+            returns,
+        )
+        return called
+
+    return decorated
+
+
+def _signature(
+    function: Callable[..., Any],
+    records: Mapping[str, Any],
+    options: Mapping[str, Option],
+    order: list[str],
+) -> inspect.Signature:
+    """Return the signature of a function with options in place of its records."""
+    own = inspect.signature(function)
+    kept = {each.name: each for each in own.parameters.values() if each.name not in records}
+    for name, told in options.items():
+        kept[name] = Parameter(
+            name, Parameter.KEYWORD_ONLY, default=told.default, annotation=told.kind
+        )
+    ahead = [each for each in kept.values() if each.kind is Parameter.POSITIONAL_OR_KEYWORD]
+    ahead += [
+        kept[name].replace(kind=Parameter.POSITIONAL_OR_KEYWORD)
+        for name in order
+        if name in kept and kept[name] not in ahead
+    ]
+    taken = {each.name for each in ahead}
+    behind = sorted(
+        (each for name, each in kept.items() if name not in taken),
+        key=lambda each: (each.kind, each.name not in options),  # stable
+    )
+    return own.replace(parameters=[*ahead, *behind])
+
+
+def records_of(
+    given: dict[str, Any],
+    function: str,
+    *records: Any,
+    defaults: Mapping[str, Any] | None = None,
+    flat: bool = False,
+) -> list[Any]:
+    """Return records of the options that a function was given, which are taken out of ``given``.
+
+    ``settings``, where they are among it, say some of them, which are taken by themselves only
+    where they are to be ``flat``; ``defaults`` are others than declared.
+    """
+    options = {name: told for each in records for name, told in each.declared.items()}
+    hidden = {name: told for name, told in options.items() if told.setting}
+    said = {**(defaults or {}), **_settings(given.pop("settings", None), function, hidden)}
+    direct = options if flat else options.keys() - hidden.keys()
+    said |= {name: given.pop(name) for name in direct if name in given}
+    return [each.checked(**{n: said[n] for n in each.declared if n in said}) for each in records]
+
+
+def names_of(*records: Any) -> list[str]:
+    """Return the arguments that records of options bring, ``settings`` among them."""
+    return [n for n, told in declared(*records).items() if not told.setting] + ["settings"]
+
+
+def _settings(settings: Any, function: str, known: Mapping[str, Option]) -> dict[str, Any]:
+    """Return what settings say, or refuse what means nothing to a function."""
+    if settings is None:
+        return {}
+    if not isinstance(settings, Settings):
+        raise InvalidArgumentTypeError(f"settings must be a pyvista_vdi.Settings; got {settings!r}")
+    if without := [name for name in settings.given if name not in known]:
+        raise InvalidArgumentError(
+            f"{', '.join(without)} of the settings means nothing to {function}, which has "
+            f"{', '.join(sorted(known))}: leave it out"
+        )
+    return {name: value for name, value in settings.said.items() if name in known}
+
+
+def _documented(text: str, options: Iterable[Option]) -> str:
+    """Return a docstring with entries behind those of its parameters, for what they lack."""
+    section = re.search(r"\n( +)(Returns|Raises)\n", text)
+    at, margin = (section.start(), len(section[1])) if section else (len(text), 4)
+    head, tail = text[:at], text[at:]
+    described = {
+        name
+        for names in re.findall(rf"^ {{{margin}}}(\w[\w, *]*?)(?: :.*)?$", head, re.MULTILINE)
+        for name in names.split(", ")
+    }
+    new = "".join(entries((each for each in options if each.name not in described), margin))
+    if "Parameters\n" not in head:
+        new = f"\n{' ' * margin}Parameters\n{' ' * margin}----------\n{new}"
+    return head.rstrip() + "\n" + new + tail

@@ -1,0 +1,144 @@
+"""Checkers of types are told the arguments that options bring: the stubs are those of the records.
+
+``python tests/api/test_stubs.py`` writes them anew.
+"""
+
+from __future__ import annotations
+
+import collections.abc
+import dataclasses
+import inspect
+import re
+import textwrap
+import typing
+from pathlib import Path
+
+import numpy.typing as npt
+import pytest
+
+import pyvista_vdi
+from pyvista_vdi import api
+from pyvista_vdi.model import types
+from pyvista_vdi.model.arguments import Settings
+from pyvista_vdi.model.options import GenerationOptions
+
+PACKAGE = Path(pyvista_vdi.__file__).parent
+#: Modules that names in annotations are imported from; else it is where the class is.
+HOMES = (collections.abc, typing, npt, types)
+CLASSES = {
+    "AddTransferFunctionEditor": "plotting.add_transfer_function_editor",
+    "AddVDIClipPlane": "plotting.clip_plane",
+    "AmbientOcclusion": "model.ambient_occlusion",
+    "DeferredVDI": "model.deferred",
+    "Estimate": "generation.slices",
+    "Pick": "raycasting.picking",
+    "PlotterVDIActor": "plotting.actor",
+    "PlotterVDIs": "plotting.pages",
+    "Settings": "api",
+    "TransferFunction": "model.transfer_function",
+    "VDI": "model.vdi",
+    "VDICollection": "model.collection",
+}
+WIDTH = 100
+OTHERS = {"np.": "import numpy as np", "os.": "import os", "pv.": "import pyvista as pv"}
+
+
+def definition(thing, name, required=(), margin="", **kinds):
+    """Yield a definition with a signature; ``kinds`` are types in place of what it has."""
+    arguments, star = [], False
+    signature = inspect.signature(thing)
+    for each in signature.parameters.values():
+        if each.kind is each.KEYWORD_ONLY and not star:
+            arguments, star = [*arguments, "*"], True
+        kind = kinds.get(each.name, each.annotation)
+        text = "**" * (each.kind is each.VAR_KEYWORD) + each.name
+        text += "" if each.name == "self" else f": {kind}"
+        if each.default is not each.empty and each.name not in required:
+            text += f" = {each.default!r}"
+        arguments.append(text)
+    made = kinds.get("return", signature.return_annotation)
+    return wrapped(f"def {name}(", ", ".join(arguments), f") -> {made}: ...", margin)
+
+
+def wrapped(head, text, tail, margin=""):
+    """Return a text between others, in lines of which none is too long."""
+    if len(margin + head + text + tail) < WIDTH:
+        return f"{margin}{head}{text}{tail}\n"
+    inner = margin + "    "
+    body = textwrap.fill(text, WIDTH, initial_indent=inner, subsequent_indent=inner)
+    return f"{margin}{head}\n{body},\n{margin}{tail}\n"
+
+
+def overloads(function, name):
+    """Return the definitions of a function, where an option says what it returns."""
+    ((option, kinds),) = function.returns.items()
+    standard = inspect.signature(function).parameters[option].default
+    return "".join(
+        "@overload\n"
+        + definition(
+            function,
+            name,
+            required=() if value == standard else (option,),
+            **{option: f"Literal[{value!r}]", "return": made},
+        )
+        for value, made in kinds.items()
+    )
+
+
+def stub(about, text):
+    """Return a stub: its imports, and a text."""
+    lines = [line for used, line in OTHERS.items() if used in text]
+    found = {}
+    for word in sorted({*re.findall(r"(?<![\w.\"'])[A-Za-z]\w*", text)}):
+        home = next((each.__name__ for each in HOMES if word in vars(each)), None)
+        if word in CLASSES and f"class {word}:" not in text:
+            found.setdefault(f"pyvista_vdi.{CLASSES[word]}", []).append(word)
+        elif home and (word == "overload" or word[0].isupper()):
+            found.setdefault(home, []).append(word)
+    for home, words in sorted(found.items()):
+        lines.append(wrapped(f"from {home} import (", ", ".join(words), ")").rstrip())
+    head = f'"""{about}, written by tests/api/test_stubs.py."""\n# fmt: off\n# ruff: noqa: I001'
+    return "\n".join([head, "", *lines, "", text])
+
+
+def stubs():
+    """Yield files and what is to be in them."""
+    text = ""
+    for name, function in sorted(vars(api).items()):
+        if inspect.isfunction(function):
+            told = getattr(function, "returns", None)
+            text += overloads(function, name) if told else definition(function, name)
+    made = inspect.signature(Settings)
+    made = made.replace(parameters=[inspect.Parameter("self", 0), *made.parameters.values()])
+    text += "class Settings:\n    given: dict[str, Any]\n"
+    text += "".join(f"    {name}: {told.kind}\n" for name, told in Settings.declared.items())
+    maker = type("", (), {"__signature__": made})
+    text += definition(maker, "__init__", margin="    ", **{"return": None})
+    yield "api/__init__.pyi", stub("The public functions and their options", text)
+    pytest.importorskip("pyvista")
+    from pyvista_vdi.plotting.component import AddVDI
+
+    text = "class Plotter(pv.Plotter):\n    add_vdi_clip_plane: AddVDIClipPlane\n"
+    text += "    add_transfer_function_editor: AddTransferFunctionEditor\n    vdi: PlotterVDIs\n"
+    text += definition(AddVDI.__call__, "add_vdi", margin="    ")
+    yield "plotting/plotter.pyi", stub("A plotter with what this package adds", text)
+    text = "class OptionMethods:\n"
+    for each in dataclasses.fields(GenerationOptions):
+        if each.name != "lights":
+            name = each.name.title().replace("_", "")
+            kind = GenerationOptions.declared[each.name].kind
+            text += f"    def Set{name}(self, value: {kind}) -> None: ...\n"
+            text += f"    def Get{name}(self) -> {each.type}: ...\n"
+    about = "Set and Get of each option of how a VDI is made"
+    yield "vtk_pipeline/filters/option_methods.pyi", stub(about, text)
+
+
+def test_stubs_are_those_of_the_records():
+    for file, text in stubs():
+        found = (PACKAGE / file).read_text(encoding="utf-8")
+        assert found == text, f"{file} is not of the records: python {__file__}"
+
+
+if __name__ == "__main__":
+    for file, text in stubs():
+        (PACKAGE / file).write_text(text, encoding="utf-8")
