@@ -12,9 +12,9 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.model.options import QualityTarget
 from pyvista_vdi.quality import probe as dial_measurement
-from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.quality.background import Worker, vdi_job
 from pyvista_vdi.quality.dial import LADDER
-from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
+from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 
@@ -150,9 +150,9 @@ def test_what_is_made_in_the_background_is_chosen_there():
     source.SetDial("balanced")
     request = source.MakeRequest()
     dial_measurement.forget()
-    with BackgroundGeneration() as background:
-        background.start(request.generation, target=request.target)
-        finish()
-        made = background.take()
+    background = Worker("pyvista-vdi generation")
+    background.put(vdi_job(request.generation, request.target))
+    finish()
+    made = background.take()
     assert made.equals(source.GetVDI())
     assert made.metadata["dial"]["asked"] == {"quality": "balanced"}

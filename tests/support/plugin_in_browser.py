@@ -32,7 +32,7 @@ from wslink.chunking import UnChunker, generate_chunks
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning
-from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.quality.rate import FrameRate
 
 LONG = 250.0
 WINDOW = (241, 203)
@@ -224,7 +224,7 @@ def main():
     """Run all cases, or those that are named."""
     warnings.simplefilter("error", VDIWarning)
     # Every preview as coarse as it may be, whatever frames take
-    FrameRateController.choose = lambda controller, full: 1
+    FrameRate.chosen = lambda rate, full: 1
     failed = 0
     for case in CASES:
         if len(sys.argv) > 1 and case.__name__ not in sys.argv[1:]:

@@ -23,8 +23,8 @@ from skimage.io import imread
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.plotting import refinement
-from pyvista_vdi.quality.frame_rate import FrameRate
-from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor
+from pyvista_vdi.quality.rate import FrameRate
+from pyvista_vdi.vtk_pipeline.drawing.screen import Scissor
 from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtk_to_numpy, vtkUnsignedCharArray
 
 LONG = 250.0

@@ -9,7 +9,7 @@ from plugin_scenes import LOOKS, soft_ball
 from watched_windows import MOVING, frame, on_screen, turned, watched
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.quality.pace import HEADROOM
+from pyvista_vdi.quality.rate import HEADROOM
 
 pytestmark = pytest.mark.gl
 

@@ -30,7 +30,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.interaction.behind import Estimators
+from pyvista_vdi.vtk_pipeline.drawing.background import Estimators
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -197,15 +197,14 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     assert actor.vdi is old
 
 
-def test_auto_bears_more_while_the_view_moves(plotter, no_estimates, gate):
+def test_nothing_is_estimated_or_made_while_a_hand_moves(plotter, no_estimates, gate):
     actor = coarse(plotter, regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9))
     no_estimates.ssim = 0.85
-    plotter.camera.Azimuth(30)
-    frames_until(plotter, lambda: actor.status.ssim is not None, rate=MOVING)
-    frame(plotter, MOVING)
-    assert actor.status.progress is None
-    frame(plotter)
+    for _ in range(5):
+        turned(plotter, 10, MOVING)
+    assert (no_estimates.asked, actor.status.progress) == (0, None)
     frames_until(plotter, lambda: actor.status.progress is not None)
+    assert no_estimates.asked == 1
 
 
 def test_auto_with_the_real_estimate(plotter):

@@ -562,7 +562,7 @@ def test_methods_from_a_table_say_what_they_do():
     for method, name, arguments, doc in (
         (pvdi.VDISource.SetViewCone, "SetViewCone", ["self", "value"], "Set `view_cone`"),
         (pvdi.VDISource.GetCoverage, "GetCoverage", ["self"], "Return what the VDI's window"),
-        (pvdi.VDIMapper.SetRegenerateBelow, "SetRegenerateBelow", ["self", "ssim"], "Set the est"),
+        (pvdi.VDIMapper.SetRegenerateBelow, "SetRegenerateBelow", ["self", "value"], "Set the est"),
     ):
         assert method.__name__ == name
         assert list(inspect.signature(method).parameters) == arguments
