@@ -76,7 +76,7 @@ class _Client:
         await self.socket.send_json({"type": kind, **entries})
 
     async def end(self, code: int, reason: str) -> None:
-        """Say goodbye, and go."""
+        """Close the connection with a goodbye."""
         # The protocol has 123 bytes for a reason, none of them a part of a letter
         message = reason.encode("ascii", "replace")[:120]
         await self.socket.close(code=code, message=message, drain=False)
