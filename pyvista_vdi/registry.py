@@ -65,7 +65,7 @@ class Extension:
     formats: tuple[FileFormat, ...] = ()
     readers: Places = field(default_factory=dict)  # of volumes, by ends of files' names
     shown: Places = field(default_factory=dict)  # what makes a mapper's Input, by classes of data
-    generators: Places = field(default_factory=dict)  # "blocks", "ranks" of MPI, Dask's "clients"
+    generators: Places = field(default_factory=dict)  # of chunked volumes: "blocks"
     verbs: tuple[Verb, ...] = ()
     methods: Places = field(default_factory=dict)  # of a VDI, or "plotter.vdi.export_html"
     requires: tuple[str, ...] = ()  # extensions without which it is left out

@@ -24,7 +24,6 @@ from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.classification import IN_PLACE, Look
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.registry import FileFormat
 
@@ -144,9 +143,7 @@ def save(
         )
     found = format_named(path)
     if found is not None and found.page:
-        as_vdi(vdis[0])  # refuses what has no colours
-        write_page = getattr(found.load(), f"write_{kind.holds}")
-        return write_page(vdis, path, **options)  # type: ignore[no-any-return]
+        return found.load().write(vdis, path, **options)  # type: ignore[no-any-return]
     target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.holds}"))
     if target.exists() and not zipfile.is_zipfile(target):
         raise VDIFileError(f"{target} holds something else: choose another name, or remove it")

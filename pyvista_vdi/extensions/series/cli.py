@@ -6,12 +6,10 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from pyvista_vdi import registry
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     LOOK,
@@ -59,14 +57,12 @@ def series(options: argparse.Namespace) -> int:
     refuse_with_values(options)
     how = look | given(options, GenerationOptions, Deferral)
     check_writable(with_suffix(Path(options.output), (".vdis",), "a series"))
-    address = options.scheduler
-    connected = nullcontext() if address is None else registry.generator("clients")(address)
-    with connected as client, measuring("writing a series") as bar:
+    with measuring("writing a series") as bar:
         with naming(steps[0].name):
             first = steps[0].read()
         if not of_vdis:
             view = generating_view(options, first)
-            how |= {"device": options.device, "client": client}
+            how |= {"device": options.device, "client": options.scheduler}
             make = StepMaker("series", view, options.size, **how)
 
         def vdi_of(i: int) -> VDI:

@@ -17,7 +17,7 @@ from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.worker import Job, Worker
+from pyvista_vdi.quality.background import Job, Worker
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
@@ -43,7 +43,7 @@ def bring(runtime: Runtime, vdi: Any) -> None:
 class Decoding(Job):
     """Work beside the frames, and not in turns with them: what it makes is what they wait for."""
 
-    def done(self) -> Any:
+    def done(self, paused: Callable[[], bool] = lambda: False) -> Any:
         """Do the work on a queue of this thread's own, and return its result."""
         runtime = get_runtime(self._device)
         with runtime.queue_scope():

@@ -234,6 +234,12 @@ class SourceInput(Input):
         """Whether somebody, or a frame, has given a view to make the VDI of."""
         return self.source.GetCamera() is not None and self.source.GetWindowSize() is not None
 
+    def view_is_chosen(self, wanted: Request | None, made: Request | None) -> bool:
+        """Whether somebody has chosen the view: since the last VDI, or for the first one."""
+        if made is None or wanted is None:
+            return made is None and self.source.GetCamera() is not self._camera
+        return bool(wanted.key != made.key and wanted.screen != made.screen)
+
     def set_view_if_missing(
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
