@@ -36,7 +36,7 @@ EXTENSION = Extension(
     verbs=(
         Verb(
             "serve",
-            "serve VDIs of a volume to web pages, in which it is turned while it stays here",
+            "serve VDIs of a volume to web pages that turn it",
             "pyvista-vdi serve knee.nrrd --cmap bone --opacity sigmoid_6",
             "pyvista_vdi.extensions.web.cli:add_options",
             "pyvista_vdi.extensions.web.cli:serve",

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.api import render
 from pyvista_vdi.errors import InvalidVDIError, NoDeviceError, UnsupportedError
-from pyvista_vdi.extensions.series.archive import SERIES, SET
+from pyvista_vdi.extensions.series.archive import SERIES
 from pyvista_vdi.extensions.series.archive import write_to as write_several
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.files import about
+from pyvista_vdi.extensions.sets.files import SET, about
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.io import to_bytes

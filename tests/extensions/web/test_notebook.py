@@ -274,7 +274,8 @@ def test_what_is_seen_of_a_vdi_in_its_plotter_is_seen_in_the_viewer(plotter):
     actor.mapper.AddClippingPlane(plane)
     plotter.render()
     assert widget.clipping_planes == [[1.2, 0.8, 1.3, -1, 0.3, 0]]
-    camera = pvdi.Camera.from_any(plotter.camera, model_transform=pv.array_from_vtkmatrix(actor.GetMatrix()))
+    matrix = pv.array_from_vtkmatrix(actor.GetMatrix())
+    camera = pvdi.Camera.from_any(plotter.camera, model_transform=matrix)
     shown = {"clipping_planes": widget.clipping_planes, "opacity_multiplier": 0.5}
     expected = pvdi.render(actor.vdi, camera, SIZE, **shown)[..., :3]
     # One step for rounding, another for that of the moved view
