@@ -83,7 +83,9 @@ def stub(about, text):
             lines.append(f"from pyvista_vdi.{CLASSES[word]} import {word}")
         elif home and (word == "overload" or word[0].isupper()):
             lines.append(f"from {home} import {word}")
-    return f'"""{about}, written by tests/api/test_stubs.py."""\n\n' + "\n".join(lines) + f"\n\n{text}"
+    return (
+        f'"""{about}, written by tests/api/test_stubs.py."""\n\n' + "\n".join(lines) + f"\n\n{text}"
+    )
 
 
 def stubs():
@@ -97,7 +99,9 @@ def stubs():
     made = made.replace(parameters=[inspect.Parameter("self", 0), *made.parameters.values()])
     text += "class Settings:\n    given: dict[str, Any]\n"
     text += "".join(f"    {name}: {told.kind}\n" for name, told in Settings.declared.items())
-    text += "    " + definition(type("", (), {"__signature__": made}), "__init__", **{"return": None})
+    text += "    " + definition(
+        type("", (), {"__signature__": made}), "__init__", **{"return": None}
+    )
     yield "api/__init__.pyi", stub("The public functions and their options", text)
     pytest.importorskip("pyvista")
     from pyvista_vdi.plotting.component import AddVDI

@@ -332,7 +332,7 @@ class _Marched:
             launch = RayLaunch(
                 runtime,
                 OPTICAL_DEPTHS,
-                            variant.defines,
+                variant.defines,
                 one_by_one=variant.one_by_one,
                 **medium.medium_arguments(task.camera),
                 view=medium.rays.view(task.size, march.planes, window),
