@@ -121,11 +121,8 @@ class Light:
                 "a light must be a Light, a vtkLight or a pyvista.Light; "
                 f"got {type(light).__name__}"
             )
-        kind = "scene"
-        if light.LightTypeIsHeadlight():
-            kind = "headlight"
-        elif light.LightTypeIsCameraLight():
-            kind = "camera"
+        of_camera = "camera" if light.LightTypeIsCameraLight() else "scene"
+        kind = "headlight" if light.LightTypeIsHeadlight() else of_camera
         follows = kind != "scene"  # its matrix is what VTK last made of the camera
         return cls(
             kind,

@@ -193,17 +193,16 @@ def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float])
     """Return how the rays through a box are cropped."""
     if cropping is None:
         return CroppedRays([], [], 0)
-    within = cropping.within(bounds)
-    if within.box is None:
+    cuts, box = cropping.within(bounds)
+    if box is None:
         normals = np.repeat(cropping.normals, 2, axis=0)
-        offsets = within.cuts.ravel()
-        forms = [rays.form(normal, -at) for normal, at in zip(normals, offsets, strict=True)]
+        forms = [rays.form(normal, -at) for normal, at in zip(normals, cuts.ravel(), strict=True)]
         return CroppedRays([], forms, cropping.regions)
-    if np.isnan(within.box).any():
+    if np.isnan(box).any():
         return CroppedRays([np.array([-1.0, 0, 0, 0, 0, 0])], [], 0)  # a plane that keeps nothing
-    if np.array_equal(within.box, cropping.reach(bounds)):
+    if np.array_equal(box, cropping.reach(bounds)):
         return CroppedRays([], [], 0)
-    return CroppedRays(box_planes(rays, within.box.ravel().tolist(), cropping.normals), [], 0)
+    return CroppedRays(box_planes(rays, box.ravel().tolist(), cropping.normals), [], 0)
 
 
 def direction_forms(
