@@ -115,10 +115,8 @@ def render(
             "preview_samples": "give several a smaller window_size",
             "transmittance_cutoff": "leave it out for several",
         }
-        standard = RenderOptions.declared
-        for name, remedy in remedies.items():
-            if options.pop(name) != standard[name].default:
-                raise InvalidArgumentError(f"{name} is for a single VDI: {remedy}")
+        for name in RenderOptions.checked(**{name: options.pop(name) for name in remedies}).given:
+            raise InvalidArgumentError(f"{name} is for a single VDI: {remedies[name]}")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
         several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]

@@ -245,15 +245,15 @@ def _settings(settings: Any, function: str, known: Mapping[str, Option]) -> dict
 
 def _documented(text: str, options: Iterable[Option]) -> str:
     """Return a docstring with entries behind those of its parameters, for what they lack."""
-    head, line, tail = text.partition("\n    Returns\n")
-    margin = 4
-    if not line:
-        head, line, tail = text.partition("\n        Returns\n")
-        margin = 8
+    section = re.search(r"\n( +)(Returns|Raises)\n", text)
+    at, margin = (section.start(), len(section[1])) if section else (len(text), 4)
+    head, tail = text[:at], text[at:]
     described = {
         name
         for names in re.findall(rf"^ {{{margin}}}(\w[\w, *]*?)(?: :.*)?$", head, re.MULTILINE)
         for name in names.split(", ")
     }
     new = "".join(entries((each for each in options if each.name not in described), margin))
-    return head.rstrip() + "\n" + new + line + tail
+    if "Parameters\n" not in head:
+        new = f"\n{' ' * margin}Parameters\n{' ' * margin}----------\n{new}"
+    return head.rstrip() + "\n" + new + tail

@@ -9,7 +9,6 @@ of the command line, Set and Get of VTK's filters, and ParaView's properties.
 from __future__ import annotations
 
 import math
-import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -207,9 +206,10 @@ def record(cls: type[_Record]) -> type[_Record]:
     """Gather the options that a record's fields declare; for classes, above ``@dataclass``."""
     told = {each.name: (each.metadata.get("option"), str(each.type)) for each in fields(cls)}
     cls.declared = {name: each.named(name, kind) for name, (each, kind) in told.items() if each}
-    text = "".join(entries(cls.declared.values()))
     RECORDS.append(cls)
-    cls.__doc__ = re.sub(r"\n +\{options\}\n", lambda _: f"\n{text}", cls.__doc__ or "")
+    listed = "".join(["\n\n    Attributes\n    ----------\n", *entries(cls.declared.values())])
+    about, raises, tail = (cls.__doc__ or "").partition("\n    Raises\n")
+    cls.__doc__ = about.rstrip() + listed + raises + tail
     return cls
 
 
@@ -235,10 +235,6 @@ def entries(options: Iterable[Option], indent: int = 4) -> Iterator[str]:
 @dataclass(frozen=True)
 class MediumOptions(Options):
     """How a classified volume is sampled: what generation and volume rendering both need.
-
-    Attributes
-    ----------
-    {options}
 
     Raises
     ------
@@ -290,10 +286,6 @@ class MediumOptions(Options):
 @dataclass(frozen=True)
 class GenerationOptions(MediumOptions):
     """How a VDI is made.
-
-    Attributes
-    ----------
-    {options}
 
     Raises
     ------
@@ -362,10 +354,6 @@ class GenerationOptions(MediumOptions):
 class Deferral(Options):
     """When scalars are classified, and what is kept of them until then: docs/deferred.md.
 
-    Attributes
-    ----------
-    {options}
-
     Raises
     ------
     InvalidArgumentError
@@ -430,10 +418,6 @@ class Deferral(Options):
 @dataclass(frozen=True)
 class QualityTarget(Options):
     """What is asked of a VDI in place of settings, which are chosen to reach it: docs/dial.md.
-
-    Attributes
-    ----------
-    {options}
 
     Raises
     ------

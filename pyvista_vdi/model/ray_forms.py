@@ -42,6 +42,11 @@ class Rectangle(NamedTuple):
     y1: int
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows."""
+        return self.x1 - self.x0, self.y1 - self.y0
+
+    @property
     def pixels(self) -> int:
         """How many there are."""
         return max(self.x1 - self.x0, 0) * max(self.y1 - self.y0, 0)

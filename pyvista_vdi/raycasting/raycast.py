@@ -67,7 +67,7 @@ def draw(
     scene = Scene.of(prepared, request, hit)
     # Buffers that are host memory in use are waited for when they are released
     with scene.on_device() as (forms, ends):
-        enqueue(scene, scene.arguments(forms, ends, has_ends=scene.ends is not None), image)
+        enqueue(scene, scene.arguments(forms, ends), image)
 
 
 def enqueue(scene: Scene, arguments: dict[str, Any], image: DeviceBuffer) -> None:

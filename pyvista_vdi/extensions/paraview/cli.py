@@ -32,17 +32,11 @@ _NO_DEVICE = 3
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the verb ``paraview``."""
-    declare.switch(
-        parser,
-        "--environment",
-        "print, for a shell's eval, the variables that make ParaView find this package and "
-        "load the plugin",
-    )
-    check = (
-        "start ParaView's Python, see that it loads the plugin, and list the devices that it "
-        "finds; PVPYTHON: where that is, if not on the PATH"
-    )
-    declare.option(parser, "--check", check, "PVPYTHON", nargs="?", const="pvpython")
+    text = "print, for a shell's eval, the variables by which ParaView finds plugin and package"
+    declare.add(parser, "environment", environment=declare.Option(text))
+    text = "start ParaView's Python (PVPYTHON, if not on the PATH), see that it loads the plugin, "
+    text += "and list the devices that it finds"
+    parser.add_argument("--check", help=text, metavar="PVPYTHON", nargs="?", const="pvpython")
 
 
 def paraview(options: argparse.Namespace) -> int:

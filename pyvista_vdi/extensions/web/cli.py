@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from pyvista_vdi.cli import declare
-from pyvista_vdi.cli.inputs import ambient_occlusion, classification, read_volume
+from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.errors import naming
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.volume import Volume
 
 
@@ -45,10 +46,7 @@ def serve(options: argparse.Namespace) -> int:
         token=options.token,
         hosts=options.allow_host,
         lists=math.prod(options.lists),
-        max_supersegments=options.max_supersegments,
-        sample_distance=options.sample_distance,
-        ambient_occlusion=ambient_occlusion(options),
-        memory_limit=options.memory_limit,
+        **given(options, GenerationOptions, flat=True),
         device=options.device,
         announce=lambda line: print(line, flush=True),
         **arguments,
@@ -59,22 +57,19 @@ def serve(options: argparse.Namespace) -> int:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the verb ``serve``."""
-    declare.volumes(parser)
+    declare.add(parser, "volumes")
     group = parser.add_argument_group("server")
-    host = "address to listen at (default: 127.0.0.1, this machine alone)"
-    declare.option(group, "--host", host, "ADDRESS", default="127.0.0.1")
-    port = "(default: 8765; 0: one that is free)"
-    declare.option(group, "--port", port, "N", declare.parse_port, default=8765)
-    token = "what the URL must carry (default: a random one)"
-    declare.option(group, "--token", token, "TEXT")
+    lists = declare.Option("most lists of a VDI", "WxH", declare.parse_size, default=(1280, 720))
+    text = "address to listen at, by default this machine's alone"
+    host = declare.Option(text, "ADDRESS", default="127.0.0.1")
+    token = declare.Option("what the URL must carry (default: a random one)", "TEXT")
+    read = declare.number("a port's number, up to 65535", 0, 65535, whole=True)
+    port = declare.Option("0: one that is free", "N", read, default=8765)
+    declare.add(group, "host port token lists", host=host, port=port, token=token, lists=lists)
     names = "another name by which browsers may call this server; may be repeated"
-    declare.option(group, "--allow-host", names, "NAME", action="append", default=[])
-    text = "most lists of a VDI (default: 1280x720)"
-    declare.option(group, "--lists", text, "WxH", declare.parse_size, default=(1280, 720))
-    declare.classification(parser)
-    declare.occlusion(parser)
+    group.add_argument("--allow-host", help=names, metavar="NAME", action="append", default=[])
+    declare.add(parser, "look: occlusion:")
     group = parser.add_argument_group("limits")
-    declare.longest(group, 8)
-    declare.step(group)
-    declare.memory_limit(group)
-    declare.device(parser)
+    names = "max_supersegments sample_distance memory_limit"
+    declare.add(group, names, max_supersegments=8)
+    declare.add(parser, "device")

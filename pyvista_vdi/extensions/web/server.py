@@ -14,6 +14,7 @@ import ipaddress
 import logging
 import secrets
 import threading
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -22,8 +23,8 @@ from urllib.parse import quote, urlsplit
 
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
 from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, Wish, wish_after
-from pyvista_vdi.extensions.web.placing import encoded
 from pyvista_vdi.extensions.web.served_page import served_page
+from pyvista_vdi.extensions.web.shown import bare_file
 from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
@@ -142,7 +143,7 @@ class Server:
             self.close()
             why = f"cannot listen at {self.host}, port {self.port}: {error}; choose another"
             if getattr(error, "errno", None) == errno.EADDRINUSE:
-                why = f"port {self.port} of {self.host} is in use: choose another, or 0 for a free one"
+                why = f"port {self.port} of {self.host} is in use: choose another, or 0: a free one"
             raise InvalidArgumentError(why) from error
         return self
 
@@ -154,8 +155,8 @@ class Server:
     def wait(self) -> None:
         """Return when it has ended; Ctrl-C ends it."""
         try:
-            while self._thread.is_alive():
-                self._thread.join(0.5)  # a wait without end would not let Ctrl-C through on Windows
+            while self._loop is not None:
+                time.sleep(0.2)
         finally:
             self.close()
 
@@ -295,7 +296,7 @@ class Server:
 
     def _made(self, wish: Wish, cancelled: Callable[[], bool]) -> tuple[tuple[int, int], bytes]:
         vdi = self._source.make(wish, cancelled)
-        return ((0, 0), b"") if vdi is None else (vdi.window_size, encoded(vdi, coarse=True))
+        return ((0, 0), b"") if vdi is None else (vdi.window_size, bare_file(vdi))
 
 
 def serve(
