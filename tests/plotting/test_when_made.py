@@ -32,7 +32,7 @@ def picture(show, **options):
     """The picture of a plotter to which something was added, and the status of its actor."""
     plotter = new_plotter(**options)
     actor = show(plotter)
-    seen, status = shown(plotter), actor.status
+    seen, status = shown(plotter), getattr(actor, "status", None)
     plotter.close()
     return seen, status
 
