@@ -32,5 +32,5 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.series.cli:series",
         ),
     ),
-    methods={"VDISeries.save": "pyvista_vdi.extensions.series.files:save"},
+    methods={"VDISeries.save": "pyvista_vdi.extensions.series.archive:save"},
 )

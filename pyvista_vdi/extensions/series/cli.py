@@ -26,7 +26,7 @@ from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.extensions.series.generate import StepMaker
-from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range, range_of
+from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range
 from pyvista_vdi.io import is_vdi_file, read, read_info
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
@@ -45,8 +45,7 @@ def series(options: argparse.Namespace) -> int:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
     if of_vdis:
         refuse(options, (*_OF_VOLUMES, "scheduler", *declared(Deferral)), "volumes")
-        times = [as_number(read_info(file).metadata.get("time")) for file in files]
-        known = [None if math.isnan(time) else time for time in times]
+        known = (as_number(read_info(file).metadata.get("time")) for file in files)
         steps = [Step(f, t, partial(read, f)) for f, t in zip(files, known, strict=True)]
     else:
         steps = steps_of_volumes(files, options, in_chunks=True)
@@ -70,7 +69,7 @@ def series(options: argparse.Namespace) -> int:
                 found = steps[i].read() if i else first
                 if not of_vdis:
                     return make(as_seen(options, found, view))
-                check_range(found, range_of(first), steps[i].name)
+                check_range(found, getattr(first, "value_range", None), steps[i].name)
                 return found  # type: ignore[no-any-return]
 
         vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
@@ -90,7 +89,7 @@ def _times(steps: Sequence[Step], asked: Sequence[float] | None) -> Sequence[flo
                 f"{len(asked)} times"
             )
         return asked
-    known = [step.time for step in steps if step.time is not None]
+    known = [t for t in (step.time for step in steps) if t is not None and not math.isnan(t)]
     if len(known) == len(steps) and all(a < b for a, b in pairwise(known)):
         return known
     if known:
