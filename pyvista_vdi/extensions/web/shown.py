@@ -15,10 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.api import render
 from pyvista_vdi.errors import InvalidVDIError, NoDeviceError, UnsupportedError
-from pyvista_vdi.extensions.series.archive import SERIES
 from pyvista_vdi.extensions.series.archive import write_to as write_several
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.files import SET, about
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.io import to_bytes
@@ -115,10 +113,8 @@ def file_of(
     """
     stream = io.BytesIO()
     if isinstance(shown, VDISeries | VDISet):
-        series = isinstance(shown, VDISeries)
-        kind, entries = (SERIES, {"times": shown.times}) if series else (SET, about(shown))
         options = {"precision": precision, "compression": DEFLATE, "level": level}
-        first = write_several(stream, kind, entries, shown, progress=progress, **options)
+        first = write_several(stream, shown, progress=progress, **options)
         return stream.getvalue(), first
     lists, values = shown.with_precision(precision), None
     if isinstance(lists, DeferredVDI):
