@@ -172,7 +172,7 @@ class _ListsInPlace(GrowingLists):
         """Wait until so many supersegments are in the arrays, and release the buffers."""
         for target, part in zip(self._targets, self._parts, strict=True):
             filled = part[: made - self._begin]
-            self._runtime.download(target, filled, count=filled.size)
+            self._runtime.download(target, filled)
         self._release_targets()
 
     def _release_targets(self) -> None:
