@@ -42,17 +42,15 @@ class PinnedArrays:
         """Return an uninitialised array, ordinary memory where there is no room."""
         nbytes = math.prod(shape) * dtype.itemsize
         with self._lock:
-            places = (k for k, (memory, _) in enumerate(self._free) if memory.nbytes == nbytes)
-            place = next(places, None)
-            if place is not None:
-                block = self._free.pop(place)
+            sizes = [memory.nbytes for memory, _ in self._free]
+            while nbytes not in sizes and sizes and self._taken + nbytes > PINNED_BYTES:
+                self._taken -= sizes.pop(0)
+                self._free.pop(0)[1]()
+            if nbytes in sizes:
+                block = self._free.pop(sizes.index(nbytes))
+            elif self._taken + nbytes > PINNED_BYTES:
+                return np.empty(shape, dtype)
             else:
-                while self._free and self._taken + nbytes > PINNED_BYTES:
-                    memory, release = self._free.pop(0)
-                    self._taken -= memory.nbytes
-                    release()
-                if self._taken + nbytes > PINNED_BYTES:
-                    return np.empty(shape, dtype)
                 try:
                     block = self._allocate(nbytes)
                 except DeviceMemoryError:
@@ -316,14 +314,9 @@ class Memory(Turns):
         """Return memory for kernels to write what an array is to hold, see :meth:`download`.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array, or its beginning, copies nothing. The array is C-contiguous and writable
-        (InvalidArgumentError else); what is in it is not read. Leave it alone until the download.
+        that very array, or its beginning, copies nothing. What is in it is not read. Leave it alone
+        until the download.
         """
-        if not (array.flags.c_contiguous and array.flags.writeable):
-            raise InvalidArgumentError(
-                f"the array for {name!r} must be C-contiguous and writable; its strides are "
-                f"{array.strides}, writeable={array.flags.writeable}"
-            )
         access, host = self.cl.mem_flags.READ_WRITE, None
         if self.in_place(array):
             access, host = access | self.cl.mem_flags.USE_HOST_PTR, array
@@ -539,21 +532,10 @@ class Memory(Turns):
     def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
         """Fill a buffer, not one from :meth:`upload`, with one byte or one element.
 
-        A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is, which divides
-        the buffer (InvalidArgumentError else).
+        A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is.
         """
         _check_writable(buffer)
-        if isinstance(value, int) and not 0 <= value <= 255:
-            raise InvalidArgumentError(
-                f"{value} is no byte to fill the buffer {buffer.name!r} with; give a NumPy scalar "
-                f"such as np.{buffer.dtype}({value})"
-            )
         pattern = np.uint8(value) if isinstance(value, int) else value
-        if buffer.nbytes % pattern.nbytes:
-            raise InvalidArgumentError(
-                f"a pattern of {pattern.nbytes} bytes does not divide the buffer "
-                f"{buffer.name!r} of {buffer.nbytes} bytes"
-            )
         memory, queue, cl = buffer.used(), self.queue, self.cl
         if buffer.nbytes == 0:
             return

@@ -52,16 +52,17 @@ class Struct:
 
     def __init__(self, name: str, /, **fields: str) -> None:
         self.name, self.fields = name, fields
-        formats, offsets, end, alignment = [], [], 0, 1
-        for kind in fields.values():
-            number, count = _numbers(kind, {})
-            assert number is not None, f"{kind} is no type of a number in OpenCL"
-            size = number.itemsize * count  # a vector is aligned to its size
-            offsets.append(-(-end // size) * size)
-            formats.append(number if count == 1 else np.dtype((number, (count,))))
-            end, alignment = offsets[-1] + size, max(alignment, size)
-        layout = {"names": list(fields), "formats": formats, "offsets": offsets}
-        self.dtype = np.dtype({**layout, "itemsize": -(-end // alignment) * alignment})  # type: ignore[call-overload]
+        kinds: list[Any] = [_kind(kind, {}) for kind in fields.values()]
+        assert None not in kinds, f"{name} has a field of no type of a number in OpenCL"
+        # Each is aligned to its size
+        offsets = [0]
+        for kind, after in itertools.pairwise(kinds):
+            end = offsets[-1] + kind.itemsize
+            offsets.append(-(-end // after.itemsize) * after.itemsize)
+        largest, end = max(kind.itemsize for kind in kinds), offsets[-1] + kinds[-1].itemsize
+        layout: Any = {"names": list(fields), "formats": kinds, "offsets": offsets}
+        layout["itemsize"] = -(-end // largest) * largest
+        self.dtype = np.dtype(layout)
 
     def __call__(self, **values: Any) -> NDArray[np.void]:
         """Return a value of it, with every field given by name."""
@@ -74,13 +75,14 @@ class Struct:
 
 
 class Parameter:
-    """An argument of a compiled kernel: its place and type, and the numbers that it consists of.
+    """An argument of a compiled kernel: its place, and its type in OpenCL C and in NumPy.
 
-    ``number`` is None where it is not known: of a type that the kernel's file defines.
+    ``dtype`` is that of what a pointer points to, None where it is not known: of a type that the
+    kernel's file defines.
     """
 
-    def __init__(self, index: int, kind: str, number: np.dtype[Any] | None, count: int = 1) -> None:
-        self.index, self.kind, self.number, self.count = index, kind, number, count
+    def __init__(self, index: int, kind: str, dtype: np.dtype[Any] | None) -> None:
+        self.index, self.kind, self.dtype = index, kind, dtype
 
     def holds(self, dtype: np.dtype[Any]) -> bool:
         """Return whether a buffer may be given: of its numbers, or of parts of them.
@@ -89,27 +91,29 @@ class Parameter:
         """
         if self.kind.startswith("local ") or not self.kind.endswith("*"):
             return False
-        number = self.number
-        return number is None or number == dtype or number.itemsize % (2 * dtype.itemsize) == 0
+        own = self.dtype and self.dtype.base
+        return own is None or own == dtype or own.itemsize % (2 * dtype.itemsize) == 0
 
     def given(self, cl: Any, value: Any) -> Any:
         """Return a number, a vector, a structure or local memory as the driver takes it.
 
         None is a null pointer. TypeError, or what NumPy raises, for what is not of its type.
         """
-        kind, number, count = self.kind, self.number, self.count
-        if kind.startswith("local ") and number is not None:
-            return cl.LocalMemory(operator.index(value) * count * number.itemsize)
-        if kind.endswith("*") and value is None:
+        dtype = self.dtype
+        if self.kind.startswith("local ") and dtype is not None:
+            return cl.LocalMemory(operator.index(value) * dtype.itemsize)
+        if self.kind.endswith("*") and value is None:
             return _NULL
-        if number is None or number.names is not None:
-            if value.dtype != number:
+        if dtype is None or dtype.names is not None:
+            if value.dtype != dtype:
                 raise TypeError
             return value
-        if value is None or kind.endswith("*"):
+        if value is None or self.kind.endswith("*"):
             raise TypeError
-        converted = number.type(value) if count == 1 else np.array(value, number)
-        if converted.size != count or (number.kind != "f" and np.any(converted != value)):
+        converted = np.array(value, dtype.base) if dtype.shape else dtype.type(value)
+        if converted.shape != dtype.shape or (
+            dtype.base.kind != "f" and np.any(converted != value)
+        ):
             raise TypeError
         return converted
 
@@ -140,7 +144,7 @@ class KernelDeclaration:
             kind, *conditions = declared.split(" if ")
             if all(_holds(condition, defines) for condition in conditions):
                 element = kind.removeprefix("local ").removesuffix("*")
-                found[name] = Parameter(len(found), kind, *_numbers(element, defines))
+                found[name] = Parameter(len(found), kind, _kind(element, defines))
         return found
 
 
@@ -151,11 +155,12 @@ def _holds(condition: str, defines: Mapping[str, Define]) -> bool:
     return there != condition.startswith("not ")
 
 
-def _numbers(kind: str, defines: Mapping[str, Define]) -> tuple[np.dtype[Any] | None, int]:
-    """Return the numbers that a type consists of, None if not known, and how many."""
+def _kind(kind: str, defines: Mapping[str, Define]) -> np.dtype[Any] | None:
+    """Return a number's or a vector's type as NumPy has it, None if it is not known."""
     kind = str(defines.get(kind, kind))
     name = kind.rstrip("0123456789")
-    return SCALARS.get(name), int(kind[len(name) :] or 1)
+    number, count = SCALARS.get(name), int(kind[len(name) :] or 1)
+    return number if number is None or count == 1 else np.dtype((number, (count,)))
 
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')

@@ -162,12 +162,6 @@ def test_a_target_gets_what_kernels_write(runtime, aligned):
         elsewhere = np.empty_like(array)
         np.testing.assert_array_equal(runtime.download(buffer, elsewhere), np.full((40, 50), 0.5))
     assert runtime.allocated == before
-    for bad in (array[:, ::2], array.T):
-        with pytest.raises(InvalidArgumentError, match="'values' must be C-contiguous"):
-            runtime.target(bad, "values")
-    array.flags.writeable = False
-    with pytest.raises(InvalidArgumentError, match="writeable=False"):
-        runtime.target(array, "values")
 
 
 def test_write_fill_and_download_into(runtime):
@@ -188,8 +182,6 @@ def test_write_fill_and_download_into(runtime):
             (lambda: runtime.write(buffer, np.zeros(7, np.int32)), "6 at most; the array has 7"),
             (lambda: runtime.download(buffer, out=np.zeros(6, np.float32)), "'six'"),
             (lambda: runtime.download(buffer, out=np.zeros((3, 2), np.int32).T[::-1]), "'six'"),
-            (lambda: runtime.fill(buffer, 256), "256 is no byte"),
-            (lambda: runtime.fill(buffer, np.complex128(0)), "does not divide"),
         ):
             with pytest.raises(InvalidArgumentError, match=message):
                 use()
