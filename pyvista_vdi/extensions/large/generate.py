@@ -23,8 +23,9 @@ from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task
 from pyvista_vdi.generation.generate import made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.model.options import GenerationRequest
+from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.types import ClientLike
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, made_vdi
 from pyvista_vdi.model.volume import Grid
 
 #: Blocks that would fit into a limit of memory: beside one there are lists, and its halo.
@@ -134,14 +135,10 @@ def vdi_of(task: Task, request: GenerationRequest, rows: Sequence[Rows], device_
     np.cumsum(lengths, out=offsets[1:])
     asked = request.replace(transfer_function=task.transfer_function, options=task.options)
     made_by = made_from(asked, task.rays, device_name)
-    return VDI(
+    return made_vdi(
         task.camera,
         task.size,
-        offsets,
-        front,
-        back,
-        color,
-        depth,
+        Arrays(offsets, front, back, color, depth),
         task.blocks.grid.bounds,
         depth_origin=task.rays.forms(task.camera, task.size).rays.reference_depth,
         metadata={**made_by, "blocks": list(task.blocks.counts), **request.metadata},

@@ -35,7 +35,7 @@ from pyvista_vdi.extensions.large.kernels import (
     COPY_RUNS,
     OPTICAL_DEPTHS,
 )
-from pyvista_vdi.generation.list_arrays import growing_lists
+from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
@@ -269,7 +269,7 @@ class Task:
         slices = self._slices_to_merge(runtime, y1 - y0)
         with (
             Records(runtime, self.rays, self.camera, self.size, slices, options, window) as made,
-            growing_lists(
+            GrowingLists(
                 runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
             ) as lists,
         ):
@@ -308,7 +308,7 @@ class Task:
         lit: bool = True,
         ambient: NDArray[np.float32] | None = None,
     ) -> Iterator[DeviceVolume]:
-        """Have a block on a device: with its neighbours' points, if it is ``lit``."""
+        """Bring a block to a device: with its neighbours' points, if it is ``lit``."""
         grid, runtime, limit = self.blocks.grid, get_runtime(self.device), self.options.memory_limit
         window = self.window(block)
         if limit is not None and window.pixels:
