@@ -101,7 +101,7 @@ class Launch:
                 f"{', '.join(self._missing)}"
             )
         for buffer in self._buffers.values():
-            buffer.used()
+            device.note_use(buffer)
 
         # Check the sizes
         whole = tuple(map(int, size)) if isinstance(size, tuple) else (int(size),)

@@ -65,12 +65,12 @@ class PinnedArrays:
 class Held:
     """What goes back with a buffer: bytes that are accounted for, and the driver's memory.
 
-    ``in_place``: the memory is a host's array, which kernels may still use.
+    ``queues``: where the memory is a host's array, those whose kernels use it.
     """
 
     nbytes = 0
     memory: Any = None
-    in_place = False
+    queues: set[Any] | None = None
 
 
 class DeviceBuffer:
@@ -394,17 +394,24 @@ class Memory(Turns):
         except BaseException:
             buffer.release()  # now: whoever keeps the error keeps this frame
             raise
-        held.in_place, buffer.memory = in_place, held.memory
+        held.queues, buffer.memory = set() if in_place else None, held.memory
         buffer.host = host if in_place and writable else None
         return buffer
+
+    def note_use(self, buffer: DeviceBuffer) -> Any:
+        """Return the driver's memory for the calling thread's queue, and remember who uses it."""
+        memory, held, queue = buffer.used(), buffer.held, self.queue
+        if held.queues is not None and queue not in held.queues:
+            with self._ledger:
+                held.queues = {each for each in held.queues if each in self._queues} | {queue}
+        return memory
 
     def _release(self, held: Held) -> None:
         """Take back what a buffer has held."""
         with self._ledger:
             self.allocated, held.nbytes = self.allocated - held.nbytes, 0
         try:
-            if held.in_place:
-                self._finish(tuple(self._queues))  # the array may go when the buffer has gone
+            self._finish(held.queues or ())  # the array may go when the buffer has gone
         finally:
             if held.memory is not None:
                 held.memory.release()
@@ -540,7 +547,7 @@ class Memory(Turns):
         """
         _check_writable(buffer)
         pattern = np.uint8(value) if isinstance(value, int) else value
-        memory, queue, cl = buffer.used(), self.queue, self.cl
+        memory, queue, cl = self.note_use(buffer), self.queue, self.cl
         if buffer.nbytes == 0:
             return
         with self.failing(f"filling the buffer {buffer.name!r}"):
