@@ -20,7 +20,7 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
-from pyvista_vdi.extensions.web.shown import Shown, as_shown, file_of, needs_of, seen_of
+from pyvista_vdi.extensions.web.shown import Shown, as_shown, file_of, seen_of
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
@@ -104,7 +104,6 @@ class View:
     background: str  # as CSS has it
     still: NDArray[np.uint8]  # (H, W, 3), the picture where nothing can be turned
     size: Sequence[int]  # width and height that it is shown as, or smaller
-    needs: dict[str, bool]  # of the viewer's script
     #: What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scene`
     scene: bytes | None = None
     attributes: dict[str, str] = field(default_factory=dict)  # of the element
@@ -143,7 +142,6 @@ def page(
         background=f"rgb({percents})",
         still=still.astype(np.uint8),
         size=size,
-        needs=needs_of(shown),
         attributes={"autoplay": ""} if autoplay else {},
     )
     return assembled([view], title=title, controls=controls)
@@ -151,7 +149,7 @@ def page(
 
 def assembled(views: Sequence[View], *, title: str, controls: str = "all") -> bytes:
     """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
-    needs = {name: any(view.needs[name] for view in views) for name in views[0].needs}
+    more = ["scene.js"] if any(view.scene is not None for view in views) else []
     title, body = html.escape(title), ""
     for number, view in enumerate(views):
         said = {"fit": "{}/{}".format(*view.size), **view.attributes}
@@ -159,7 +157,7 @@ def assembled(views: Sequence[View], *, title: str, controls: str = "all") -> by
         before, script, of = "", "", f' data-of="{number}"'  # read() looks for the first one's
         if number == 0:
             said["hash"] = ""  # what the first one shows is in the address
-            before, script, of = _NO_SCRIPT, f"<script>\n{viewer_script(**needs)}</script>\n", ""
+            before, script, of = _NO_SCRIPT, f"<script>\n{viewer_script(*more)}</script>\n", ""
         texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in view.parts]
         if view.scene is not None:
             script = f'<script type="{_SCENE_TYPE}">{_text(view.scene)}</script>\n{script}'

@@ -15,7 +15,7 @@ import numpy as np
 
 from pyvista_vdi.extensions.web.camera import viewer_camera
 from pyvista_vdi.extensions.web.scene import Scene, look_of, part_of, scene_of, state_of
-from pyvista_vdi.extensions.web.shown import png, stand_in
+from pyvista_vdi.extensions.web.shown import png, with_still
 from pyvista_vdi.extensions.web.widget import VDIWidget
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction import browser
@@ -34,7 +34,6 @@ class PlotterWidget(VDIWidget):
     the browser; the step at which it is paused is the actor's, and the other way round.
     """
 
-    _has_scene = True
     _look: Any = None  # what the VDIs that the browser has depend on
 
     def __init__(self, plotter: Any, renderer: Any, scene: Scene, picture: Any) -> None:
@@ -175,9 +174,7 @@ class SubplotsWidget(ipywidgets.GridBox):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the view, and a picture for where there can be no view."""
-        data, shown = super()._repr_mimebundle_(**kwargs), png(self._picture)
-        stand_in(shown, self._key, self.model_id)
-        return {**data, "image/png": shown}
+        return with_still(super()._repr_mimebundle_(**kwargs), png(self._picture), self)
 
 
 def _camera_of(renderer: Any) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
 from pyvista_vdi.extensions.web.page import CONTROLS, View, assembled, in_parts
-from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of, needs_of
+from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.cropping import PRESETS, Cropping
 from pyvista_vdi.model.vdi import VDI
@@ -397,7 +397,6 @@ def export_html(
             background=scene.background,
             still=part_of(picture, renderer),
             size=renderer.GetSize(),
-            needs={**needs_of(scene.shown), "scene": True},
             scene=scene.data,
         )
         if len(scenes) > 1:
