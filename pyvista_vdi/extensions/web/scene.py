@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
-from pyvista_vdi.extensions.web.page import CONTROLS, View, assembled, in_parts
+from pyvista_vdi.extensions.web.page import CONTROLS, POLICY, html_page, viewer
 from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.cropping import PRESETS, Cropping
@@ -50,16 +50,16 @@ class Scene:
     left_out: list[str]  # what is not shown, by name
 
 
-def scenes_of(plotter: Any, viewer: str, *, follow: bool = False) -> list[Scene]:
+def scenes_of(plotter: Any, where: str, *, follow: bool = False) -> list[Scene]:
     """Return what each renderer of a plotter that has been drawn shows; warn of what is left out.
 
-    ``viewer``: what the warning calls it. ``follow``: as for :func:`scene_of`.
+    ``where``: what the warning calls it. ``follow``: as for :func:`scene_of`.
     """
     scenes = [scene_of(renderer, follow=follow) for renderer in plotter.renderers]
     left_out = dict.fromkeys(what for scene in scenes for what in scene.left_out)
     if left_out:
         more = ': see all by jupyter_backend="server"' if follow else ""
-        warn_external(f"{viewer} shows the scene without {', '.join(left_out)}{more}")
+        warn_external(f"{where} shows the scene without {', '.join(left_out)}{more}")
     return scenes
 
 
@@ -378,35 +378,37 @@ def export_html(
     finally:
         window.SetOffScreenRendering(off_screen)
 
-    # Write a viewer for each renderer, where it is in the window; linked ones turn together
-    views = []
-    # Which they are, not how they look: cameras of PyVista that are alike are equal
+    # Put a viewer where each renderer is in the window; linked ones turn together
+    target = None if filename is None else Path(filename).with_suffix(".html")
+    title = plotter.title if target is None else target.stem
+    # Which cameras they are, not how they look: PyVista's that are alike are equal
     cameras = [r.GetActiveCamera().GetAddressAsString("") for r in plotter.renderers]
-    scenes = scenes_of(plotter, "the page")
-    for renderer, scene, camera in zip(plotter.renderers, scenes, cameras, strict=True):
+    shown = list(zip(plotter.renderers, scenes_of(plotter, "the page"), cameras, strict=True))
+    shown.sort(key=lambda each: each[1].shown is None)  # the first can be read again
+    body = ""
+    for number, (renderer, scene, camera) in enumerate(shown):
         attributes = {}
-        if len(scenes) > 1:
+        if len(shown) > 1:
             left, bottom, right, top = renderer.GetViewport()
             place = f"position: absolute; left: {left:%}; bottom: {bottom:%}"
             size = f"width: {right - left:%}; height: {top - bottom:%}"
             attributes = {"style": f"{place}; {size}", "data-link": str(cameras.index(camera))}
-        view = View(
-            [] if scene.shown is None else in_parts(*file_of(scene.shown)),
+        body += viewer(
+            None if scene.shown is None else file_of(scene.shown),
+            part_of(picture, renderer),
+            renderer.GetSize(),
+            title=title,
             background=scene.background,
-            still=part_of(picture, renderer),
-            size=renderer.GetSize(),
-            scene=scene.data,
             attributes=attributes,
+            controls=controls,
+            scene=scene.data,
+            number=number,
         )
-        views.append(view)
-    views.sort(key=lambda view: not view.parts)  # the first can be read again
-    target = None if filename is None else Path(filename).with_suffix(".html")
-    title = plotter.title if target is None else target.stem
-    page = assembled(views, title=title, controls=controls)
+    page = html_page(title, body, shown[0][1].background, POLICY)
     if target is None:
-        return io.StringIO(page.decode())
+        return io.StringIO(page)
     with whole_file(target) as stream:
-        stream.write(page)
+        stream.write(page.encode())
     return None
 
 
