@@ -15,7 +15,7 @@ import pytest
 import pyvista as pv
 from browsers import assert_axe_finds_nothing, in_base64, picture
 from PIL import Image
-from web_client import soft_ball
+from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError
@@ -29,7 +29,7 @@ from pyvista_vdi.extensions.web import VDIWidget  # noqa: E402
 
 WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
 SIZE = (96, 64)
-BALL = soft_ball()
+BALL = soft_volume()
 EYE = ((3, 2, 5), (0, 0, 0), (0, 1, 0))
 
 
