@@ -1,8 +1,8 @@
 """A real browser: Chromium, driven by Playwright, with WebGL 2 by SwiftShader.
 
 ``PYVISTA_VDI_CHROMIUM`` names an executable where it is not in the path, or not the first there;
-``PYVISTA_VDI_REQUIRE_BROWSER=1`` makes a missing one a failure, as in CI. All tests of a process have
-one browser; Playwright keeps an event loop running in its thread, so a file of tests has a
+``PYVISTA_VDI_REQUIRE_BROWSER=1`` makes a missing one a failure, as in CI. All tests of a process
+have one browser; Playwright keeps an event loop running in its thread, so a file of tests has a
 connection of its own, which ends with it.
 """
 

@@ -1,13 +1,13 @@
-"""The bar of a viewer and its settings: names, keys, fingers, the editor, links, and their pictures."""
+"""The bar of a viewer and its settings: names, keys, fingers, the editor, links, pictures."""
 
 import numpy as np
 import pytest
 from browsers import assert_axe_finds_nothing, file_of, picture
 from in_node import in_node
 from PIL import Image
+from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from plugin_scenes import soft_ball
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.extensions.web import _LOOK
 from pyvista_vdi.extensions.web.page import page as page_of
@@ -68,7 +68,7 @@ def ball(data, open_page):
 
 @pytest.fixture
 def from_disk(open_page, tmp_path):
-    """Open a page of what is written, a VDI or one that keeps values, with ``settings`` open or not."""
+    """Open a page of a VDI, or of one that keeps values, with ``settings`` open or not."""
 
     def from_disk(shown, *, settings=False, hash_="", **options):
         path = tmp_path / "a.html"

@@ -304,7 +304,10 @@ def test_what_is_wrong_with_a_set_is_said(vdis, set_path, shown_from):
     head = json.loads(files["lumps.vdiset/set.json"]) | {"bounds": [1, 2]}
     wrong = {"lumps.vdiset/set.json": json.dumps(head).encode()}
     broken = {f"lumps.vdiset/{nearest:06}.vdi": b"broken" * 9}
-    for change, why in ((wrong, "set.json says what cannot be"), (broken, f"view {nearest} cannot")):
+    for change, why in (
+        (wrong, "set.json says what cannot be"),
+        (broken, f"view {nearest} cannot"),
+    ):
         page = shown_from("lumps.vdiset/", files | change, ready=False)
         page.wait_for('heard.some(([name]) => name === "error")')
         assert why in page.evaluate('heard.find(([name]) => name === "error")[1].message')

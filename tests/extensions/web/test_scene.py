@@ -354,6 +354,5 @@ def test_a_renderer_without_vdis_is_none_for_the_viewer(plotter):
 
 
 def test_the_viewer_is_small():
-    assert len(viewer_script().encode()) <= 155_000
-    everything = viewer_script(scene=True, series=True, remote=True, values=True)
-    assert len(everything.encode()) <= 235_000
+    assert len(viewer_script(values=True).encode()) <= 150_000
+    assert len(viewer_script(scene=True, series=True, remote=True, values=True).encode()) <= 190_000

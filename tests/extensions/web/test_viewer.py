@@ -1,4 +1,4 @@
-"""The element of pages, in a real browser: what it shows, tells and does, among what else is there."""
+"""The element of pages, in a real browser: what it shows, tells and does, among other things."""
 
 from io import BytesIO
 
@@ -587,7 +587,8 @@ def test_what_is_set_before_the_module_has_come_is_taken(around):
 SCENES = """async () => {
   const { Scene } = await import("./scene.js");
   const head = { camera: null, size: [1, 1], meshes: [], pictures: [], arrays: [],
-    vdis: [{ file: null, planes: [], matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] }] };
+    vdis: [{ file: null, planes: [],
+      matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] }] };
   const json = JSON.stringify(head), text = json + " ".repeat(-json.length & 3);
   const stream = new Blob([new Uint32Array([text.length]), text]).stream();
   const packed = stream.pipeThrough(new CompressionStream("deflate"));
