@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pyvista_vdi.device import KernelDeclaration, Struct
+from pyvista_vdi.device import KernelDeclaration
 from pyvista_vdi.generation.kernels import RECORDING
 from pyvista_vdi.volume.kernels import MEDIUM, VIEW
 
