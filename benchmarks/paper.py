@@ -26,7 +26,7 @@ from skimage.transform import resize
 from pyvista_vdi import TransferFunction, read_volume
 from pyvista_vdi.cli.declare import parse_size
 from pyvista_vdi.measure.bench import Bench, accuracy, take_turns
-from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.quality.rate import FrameRate
 
 PAPER = json.loads(Path(__file__).with_name("paper_tables.json").read_text(encoding="utf-8"))
 
@@ -159,12 +159,12 @@ def previews(bench: Bench, vdi: Any, angle: float) -> dict[str, Any]:
 def settled(way: Callable[[int], Any], most: int, target_fps: float) -> tuple[int, float]:
     """Return the controller's choice once it has settled, and the median time of its frames."""
     way(most)  # not counted: its kernel may have to be compiled
-    controller = FrameRateController(target_fps, floor=1 / most)
+    rate = FrameRate(target_fps, floor=1 / most)
     for _ in range(SETTLING):
-        samples = controller.choose(most)
+        samples = rate.chosen(most)
         (seconds,) = take_turns({"way": partial(way, samples)}, 1, warm_up=False)["way"]
-        controller.record(samples, seconds, seconds)
-    samples = controller.choose(most)
+        rate = rate.record(samples, seconds, seconds).choose(most)
+    samples = rate.chosen(most)
     taken = take_turns({"way": partial(way, samples)}, MEASURED, warm_up=False)["way"]
     return samples, statistics.median(taken)
 

@@ -29,8 +29,9 @@ def main() -> None:
         plotter.set_background("black")
         # Off-screen a plotter draws a volume itself, by default: a VDI pays from some frames on
         actor = plotter.add_vdi(
-            brain, cmap="bone", quality=quality, draw="vdi", status=True, show_scalar_bar=False
+            brain, cmap="bone", quality=quality, draw="vdi", show_scalar_bar=False
         )
+        actor.show_status(plotter)
         plotter.camera.azimuth = 0
     plotter.show(auto_close=False, interactive=False)  # the VDIs are made in this view
     for column in range(3):

@@ -140,6 +140,8 @@ def small(make: Any, volume: pvdi.Volume, function: Any = None, **options: Any) 
     camera = options.pop("camera", None) or outside(volume.bounds, 25.0)
     function = function or over(volume, interpolation="linear")
     size = options.pop("size", SMALL)
+    seldom = {name: options.pop(name) for name in [*options] if name in pvdi.Settings.declared}
+    options |= {"settings": pvdi.Settings(**seldom)} if seldom else {}
     return make(volume, camera, size, transfer_function=function, **options)
 
 
@@ -205,7 +207,7 @@ def generation_cases() -> Cases:
     yield from both("dense", noise, {"unit_distance": 1e-3})
     graded = {"gradient_opacities": (0.0, 0.2, 1.0, 0.7), "gradient_range": (0.0, 9.0)}
     yield from both("gradient", noise, graded)
-    yield "volume/whole", lambda: pictured(noise(), early_termination=False, skip_empty=False)
+    yield "volume/whole", lambda: pictured(noise(), early_termination=False)
     # Lights, materials, ambient occlusion
     spot = pvdi.Light("scene", (30, -20, 40), (16, 10, 17), positional=True, cone_angle=25)
     lamp = pvdi.Light("camera", (0.5, 0.7, 1.0), ambient=(0.2, 0.1, 0.3), intensity=0.7)
@@ -263,9 +265,8 @@ def frame_options(bounds: Any, camera: pvdi.Camera, size: tuple[int, int]) -> di
         "box": {"cropping": third},
         "regions": {"cropping": (third, 0x2A5F0C3)},
         "thick": {"opacity_multiplier": 6.0},
-        "no-skip": {"skip_empty": False},
         "all": {"opaque_depth": ends, "clipping_planes": [plane], "cropping": (third, "fence")},
-        "cutoff": {"transmittance_cutoff": 0.5},
+        "cutoff": {"settings": pvdi.Settings(transmittance_cutoff=0.5)},
         "preview-30": {"preview_samples": 30, "opaque_depth": ends, "clipping_planes": [plane]},
         "preview-9000": {"preview_samples": 9000},
     }

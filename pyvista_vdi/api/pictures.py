@@ -108,17 +108,15 @@ def render(
             for each in given
         ]
         vdi = given if isinstance(vdi, list | tuple) else given[0]
-    else:
+    elif look:
         refuse_unknown(look, "render", _names(render))
     if isinstance(vdi, list | tuple) or model_transforms is not None:
         remedies = {
             "preview_samples": "give several a smaller window_size",
             "transmittance_cutoff": "leave it out for several",
         }
-        standard = RenderOptions.declared
-        for name, remedy in remedies.items():
-            if options.pop(name) != standard[name].default:
-                raise InvalidArgumentError(f"{name} is for a single VDI: {remedy}")
+        for name in RenderOptions.checked(**{name: options.pop(name) for name in remedies}).given:
+            raise InvalidArgumentError(f"{name} is for a single VDI: {remedies[name]}")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
         several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
@@ -176,7 +174,7 @@ def render_depth(
     view = Camera.from_any(camera)
     if look and _keeps_values(vdi):
         vdi = vdi.classified(**look, device=device)  # type: ignore[union-attr]
-    else:
+    elif look:
         refuse_unknown(look, "render_depth", _names(render_depth))
     seen = _seen(vdi, view)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size
@@ -244,7 +242,7 @@ def pick(
     kept = near if isinstance(near, DeferredVDI) else None
     if kept is not None and look:
         near = kept.classified(**look)
-    else:
+    elif look:
         refuse_unknown(look, "pick", _names(pick))
     seen = _seen(near, view)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size

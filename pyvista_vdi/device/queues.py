@@ -236,14 +236,18 @@ class Device(Turns):
             readers.add(self.thread.number)
 
     @contextlib.contextmanager
-    def background(self, cancelled: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    def background(
+        self,
+        cancelled: Callable[[], bool] = lambda: False,
+        paused: Callable[[], bool] = lambda: False,
+    ) -> Iterator[None]:
         """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
 
         The calling thread gets a queue of its own. Its launches and copies are cut into pieces
         that take no longer than a turn; each is finished when the call returns. ``cancelled`` is
         asked between pieces: True ends the work with :class:`Cancelled`, from any method.
         """
-        with self.queue_scope(), super().background(cancelled):
+        with self.queue_scope(), super().background(cancelled, paused):
             yield
 
     def profile(self) -> list[KernelTime]:

@@ -41,12 +41,16 @@ POLL = 0.02
 class Worker:
     """A thread inside :meth:`Turns.background`.
 
-    ``cancelled`` says whether the work is no longer wanted; ``turn_began`` when its turn began, by
-    ``time.perf_counter``, and ``worked`` how long its turns before took, seconds.
+    ``cancelled`` says whether the work is no longer wanted, ``paused`` whether it is to wait;
+    ``turn_began`` when its turn began, by ``time.perf_counter``, and ``worked`` how long its turns
+    before took, seconds.
     """
 
-    def __init__(self, cancelled: Callable[[], bool]) -> None:
+    def __init__(
+        self, cancelled: Callable[[], bool], paused: Callable[[], bool] = lambda: False
+    ) -> None:
         self.cancelled = cancelled
+        self.paused = paused
         self.turn_began = 0.0
         self.worked = 0.0
         self._rates: dict[str, deque[float]] = {}  # items per second of the last pieces
@@ -113,7 +117,7 @@ class Turns:
         with self._changed:
             self._arriving += 1
             try:
-                while self._holder is not None or (self._owed and self._waiting):
+                while self._holder is not None or (self._owed and self._next() is not None):
                     self._changed.wait()
             finally:
                 self._arriving -= 1
@@ -124,15 +128,20 @@ class Turns:
         self.thread.in_frame = False
         with self._changed:
             self._frames -= 1
-            self._owed = bool(self._waiting)
+            self._owed = self._next() is not None
             self._changed.notify_all()
 
     @contextlib.contextmanager
-    def background(self, cancelled: Callable[[], bool]) -> Iterator[None]:
-        """Work inside the ``with`` block only when no frame is in progress, see `foreground`."""
+    def background(
+        self, cancelled: Callable[[], bool], paused: Callable[[], bool] = lambda: False
+    ) -> Iterator[None]:
+        """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
+
+        Nor while ``paused()`` is true: frames then wait for nothing of it.
+        """
         if self.thread.worker is not None or self.thread.in_frame:
             raise RuntimeError("background work cannot begin inside a frame or background work")
-        worker = Worker(cancelled)
+        worker = Worker(cancelled, paused)
         self._take_turn(worker)
         self.thread.worker = worker
         try:
@@ -156,7 +165,7 @@ class Turns:
         left = worker.turn_began + turn - time.perf_counter()
         over = left <= LEAST_REMAINDER * turn
         with self._changed:  # throughout, so that who is let in finds this thread waiting already
-            if over and self._wanted():
+            if (over and self._wanted()) or worker.paused():
                 self._end_turn(worker)
             if self._holder is not worker:
                 self._take_turn(worker)
@@ -196,9 +205,13 @@ class Turns:
                 self._changed.notify_all()
         worker.turn_began = time.perf_counter()
 
+    def _next(self) -> Worker | None:
+        """Return who waits for a turn first, and may work."""
+        return next((worker for worker in self._waiting if not worker.paused()), None)
+
     def _free_for(self, worker: Worker) -> bool:
         frames_first = self._frames > 0 or (self._arriving > 0 and not self._owed)
-        return not frames_first and self._holder is None and self._waiting[0] is worker
+        return not frames_first and self._holder is None and self._next() is worker
 
     def _end_turn(self, worker: Worker) -> None:
         with self._changed:

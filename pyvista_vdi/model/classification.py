@@ -82,12 +82,7 @@ class Described(Options):
 @record
 @dataclass(frozen=True, eq=False)
 class ArrayChoice(Described):
-    """``add_volume``'s arguments that say which scalars are seen, and how along a ray.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """``add_volume``'s arguments that say which scalars are seen, and how along a ray."""
 
     scalars: ScalarsLike | None = option(
         None,
@@ -124,10 +119,6 @@ class Look(Described):
 
     ``interpolation``, which ``add_volume`` leaves at VTK's default, is one of them. What is not
     checked here is refused where a table is built of it.
-
-    Attributes
-    ----------
-    {options}
     """
 
     elsewhere = (
@@ -181,10 +172,6 @@ class Classification(Look, ArrayChoice):
 
     InvalidArgumentError if ``transfer_function`` or ``volume_property`` is mixed with arguments
     that it replaces, or a value cannot be used.
-
-    Attributes
-    ----------
-    {options}
     """
 
     volume_property: VTKObject | None = option(

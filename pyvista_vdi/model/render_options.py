@@ -56,12 +56,7 @@ _RATE = Number("a number of frames per second, 0 or above")
 @record
 @dataclass(frozen=True)
 class SceneOptions(Options):
-    """What of a VDI, or of a volume, is drawn, and how dense it is.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """What of a VDI, or of a volume, is drawn, and how dense it is."""
 
     clipping_planes: Any = option(
         None,
@@ -98,12 +93,6 @@ class RenderOptions(SceneOptions):
     """How a VDI, or a volume, is drawn.
 
     Options that compare equal give the same picture of the same view.
-
-    Attributes
-    ----------
-    {options}
-    skip_empty : bool
-        Pass by what is empty: the picture is the same to the last bit.
     """
 
     preview_samples: int | None = option(
@@ -185,12 +174,7 @@ def checked_policy(policy: Any) -> Policy:
 @record
 @dataclass(frozen=True)
 class DrawingOptions(Options):
-    """How frames are drawn.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """How frames are drawn."""
 
     elsewhere = "it is of add_vdi, how it draws; the least rate of still frames is full_fps"
 

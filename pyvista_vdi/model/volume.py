@@ -326,18 +326,9 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     if isinstance(array, ChunkedArray):
         return array
     packing: Any = packing_of(array)
-    stored = array.dtype if packing is None else packing.dtype
-    kind = np.dtype(stored).newbyteorder("=").name
-    long = kind in ("int64", "uint64")
-    kind = "float64" if long else _WIDENED.get(kind, kind)
-    if kind not in VOXEL_TYPES:
-        raise InvalidVolumeError(_unsupported(array.dtype))
-    found = ChunkedArray(
-        array,
-        index=index,
-        checked=_from_long_integers if long else packing,
-        dtype=kind,
-    )
+    kind, long = _voxel_type(array.dtype if packing is None else packing.dtype)
+    checked = _from_long_integers if long else packing
+    found = ChunkedArray(array, index=index, checked=checked, dtype=kind)
     _check_planes(found.shape)
     return found
 
@@ -350,8 +341,18 @@ def _check_planes(shape: tuple[int, ...]) -> None:
         )
 
 
-def _unsupported(dtype: Any) -> str:
-    return f"voxels of type {dtype} are not supported: convert to one of {', '.join(VOXEL_TYPES)}"
+def _voxel_type(dtype: Any) -> tuple[str, bool]:
+    """Return the type that voxels of a type are held as, and whether those are 64-bit integers."""
+    kind = np.dtype(dtype).newbyteorder("=").name
+    if kind in ("int64", "uint64"):
+        return "float64", True
+    kind = _WIDENED.get(kind, kind)
+    if kind not in VOXEL_TYPES:
+        known = ", ".join(VOXEL_TYPES)
+        raise InvalidVolumeError(
+            f"voxels of type {dtype} are not supported: convert to one of {known}"
+        )
+    return kind, False
 
 
 def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
@@ -372,13 +373,8 @@ def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
     if array.size == 0:
         raise InvalidVolumeError(f"the volume is empty: its shape is {array.shape}")
     _check_planes(array.shape)
-    kind = array.dtype.newbyteorder("=").name
-    if kind in ("int64", "uint64"):
-        return _from_long_integers(array)
-    kind = _WIDENED.get(kind, kind)
-    if kind not in VOXEL_TYPES:
-        raise InvalidVolumeError(_unsupported(array.dtype))
-    return np.ascontiguousarray(array, dtype=kind)
+    kind, long = _voxel_type(array.dtype)
+    return _from_long_integers(array) if long else np.ascontiguousarray(array, dtype=kind)
 
 
 def _from_long_integers(array: NDArray[np.generic]) -> NDArray[np.generic]:

@@ -40,11 +40,12 @@ from pyvista_vdi.plotting.refinement import Refinement
 from pyvista_vdi.plotting.uniform import UniformGrid
 from pyvista_vdi.plotting.volumes import as_image, held, require_grid
 from pyvista_vdi.quality.dial import refuse_settings
-from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
+from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
+from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
 
 #: What ``add_actor`` understands as culling, besides nothing.
 _CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
@@ -74,12 +75,7 @@ def _culling(given: Any) -> str | bool:
 @record
 @dataclass(frozen=True, eq=False)
 class Placement(Options):
-    """Where an actor is put in a plotter, and what is shown beside it.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """Where an actor is put in a plotter, and what is shown beside it."""
 
     reset_camera: bool | None = option(None, "whether the view is reset, as in ``add_volume``")
     name: str | None = option(None, "of the actor; another of this name is replaced")
@@ -102,12 +98,7 @@ class Placement(Options):
 @record
 @dataclass(frozen=True, eq=False)
 class Making(Options):
-    """What a VDI is made of, from where, and by what.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """What a VDI is made of, from where, and by what."""
 
     resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
     resample: str | Sequence[int] | None = option(
@@ -115,8 +106,7 @@ class Making(Options):
         "resample any grid, and blocks of them, to a uniform one",
         'Of so many points along x, y and z; ``"auto"``: voxels as large as the mean cell, a '
         "uniform grid as it is. What lies outside their cells is not drawn. With ``categories``, "
-        "by the nearest value. The log says the largest and the mean difference at the grid's own "
-        "points.",
+        "by the nearest value.",
     )
     mask: VolumeLike | NDArray[Any] | None = option(
         None,
@@ -206,18 +196,19 @@ class _Shown(NamedTuple):
     bar: bool | None = None  # whether there is a scalar bar; None: as the theme says
 
 
-def added(
-    plotter: Any, volume: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
-) -> PlotterVDIActor:
-    """Add a volume, or what is made of one already, to a plotter, and return its actor."""
+def added(plotter: Any, volume: Any, asked: Addition) -> Any:
+    """Add a volume, or what is made of one already, to a plotter, and return its actor.
+
+    Of blocks a list is returned.
+    """
+    if isinstance(volume, vtkMultiBlockDataSet):
+        return _blocks(plotter, pv.wrap(volume), asked)
     get_runtime(asked.making.device)  # a missing device is said here, not while a frame is drawn
     volume, stored = prepared(plotter, volume, asked)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
         first = vdi_from_image(first)
-    if asked.deferral.given and (several is not None or isinstance(first, VDI | DeferredVDI)):
-        _refuse_deferral(first, asked.deferral)
     if isinstance(first, DeferredVDI):
         asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
         title = str(first.metadata.get("scalars") or "Data")
@@ -245,7 +236,6 @@ def added(
     actor.mapper = mapper
     place = asked.place
     actor.user_matrix = np.eye(4) if place.user_matrix is None else place.user_matrix
-    remember(actor)
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
     render = not plotter._first_time if place.render is None else place.render
     camera = plotter.renderer.camera  # plotter.camera would set it
@@ -277,15 +267,12 @@ def added(
     return actor
 
 
-def added_blocks(
-    plotter: Any, blocks: Any, asked: Addition, remember: Callable[[PlotterVDIActor], object]
-) -> list[Any]:
+def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
     """Add each block of a ``MultiBlock``; return their actors, lists of those within blocks.
 
     Blocks that are missing are left out, and a name gets the block's number. A block that is no
     uniform grid, and cannot be resampled to one, is refused before anything is added.
     """
-    blocks = pv.wrap(blocks)
     for block in blocks.recursive_iterator(skip_none=True):
         require_grid(block, uniform=asked.making.resample is None)
     actors: list[Any] = []
@@ -299,8 +286,7 @@ def added_blocks(
                 own = replace(own, look=replace(own.look, cmap=next(maps)))
             if asked.place.name is not None:
                 own = replace(own, place=replace(own.place, name=f"{asked.place.name}-{i}"))
-            add = added_blocks if isinstance(block, pv.MultiBlock) else added
-            actors.append(add(plotter, block, own, remember))
+            actors.append(added(plotter, block, own))
     return actors
 
 
@@ -330,22 +316,6 @@ def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
         table.annotations = annotations
     title = str(shown.metadata.get("scalars") or "Data")
     return _Shown(shown, table, table.scalar_range, title, bar=bar)
-
-
-def _refuse_deferral(vdi: VDI | DeferredVDI, deferral: Deferral) -> None:
-    """Refuse to change what is kept: it was decided when a VDI was made of the volume."""
-    names = ", ".join(sorted(deferral.given))
-    if isinstance(vdi, DeferredVDI):
-        low, high = vdi.value_range
-        what = f"this one keeps values from {low:g} to {high:g} already"
-        remedy = "; cmap, opacity and clim say how it looks"
-    else:
-        what = "this one has its colours"
-        remedy = ", or add the volume, or a file of it that keeps values, in its place"
-    raise UnsupportedError(
-        f"{names} cannot be given with a VDI: what is kept is said where one is made of a volume, "
-        f"and {what}: leave {names} out{remedy}"
-    )
 
 
 def _deferred(volume: Any, asked: Addition) -> _Shown:

@@ -58,12 +58,7 @@ def _categories(count: Any) -> bool | int:
 @record
 @dataclass(frozen=True, eq=False)
 class Looks(Look):
-    """What a scalar looks like in a plotter, whose ``theme`` has the default colour map.
-
-    Attributes
-    ----------
-    {options}
-    """
+    """What a scalar looks like in a plotter, whose ``theme`` has the default colour map."""
 
     categories: bool | int = option(
         False, "as many colours as there are different values, or this many", check=_categories

@@ -13,10 +13,10 @@ import pyvista.plotting  # whole: pv.Plotter is missing while another thread imp
 from pyvista_vdi.model.arguments import takes
 from pyvista_vdi.model.types import AnyVolume
 from pyvista_vdi.plotting.actor import PlotterVDIActor
-from pyvista_vdi.plotting.adding import Addition, added, added_blocks
+from pyvista_vdi.plotting.adding import Addition, added
 from pyvista_vdi.plotting.classify import note_mapper
 from pyvista_vdi.plotting.registration import Component
-from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet, weakly
+from pyvista_vdi.vtk_pipeline.vtk import weakly
 
 
 @pv.register_plotter_component("add_vdi", override=True)  # of registration._Pending
@@ -102,15 +102,19 @@ class AddVDI(Component):
         if mapper is not None:
             note_mapper(mapper)
         asked = replace(asked, look=replace(asked.look, theme=self._plotter._theme))
-        if isinstance(volume, vtkMultiBlockDataSet):
-            return added_blocks(self._plotter, volume, asked, self._remember)
-        return added(self._plotter, volume, asked, self._remember)
+        made = added(self._plotter, volume, asked)
+        self._remember(made)
+        return made  # type: ignore[no-any-return]
 
     __doc__ = __call__.__doc__  # PyVista hands out an object where users look for the method
 
-    def _remember(self, actor: PlotterVDIActor) -> None:
-        """Keep an actor in mind, weakly, until the plotter is closed."""
-        self._actors.append(weakly(actor))
+    def _remember(self, made: Any) -> None:
+        """Keep actors in mind, weakly, until the plotter is closed."""
+        for each in made if isinstance(made, list) else [made]:
+            if isinstance(each, list):
+                self._remember(each)
+            else:
+                self._actors.append(weakly(each))
 
     def __plotter_close__(self) -> None:
         """Release images and textures, even where the user keeps an actor."""

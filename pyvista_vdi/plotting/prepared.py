@@ -19,7 +19,6 @@ from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.plotting.actor import first_camera
-from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import load
 from pyvista_vdi.plotting.uniform import UniformGrid
 from pyvista_vdi.plotting.volumes import as_grid
@@ -55,7 +54,6 @@ def prepared(plotter: Any, volume: Any, asked: Any) -> tuple[Any, StoredVolume |
         resample=asked.making.resample,
         mask=None if asked.making.mask is None else _mask(asked.making.mask, grid, stored),
         categorical=bool(asked.look.categories),
-        progress=progress_callback(asked.making.progress_bar, "resampling a grid"),
     )
     # It has the points of one level
     return uniform, None if stored is None else stored.at_level(stored.level)

@@ -12,7 +12,7 @@ from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
 from pyvista_vdi.plotting.volumes import held
-from pyvista_vdi.quality.worker import Job, Worker
+from pyvista_vdi.quality.background import Job, Worker
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of
 from pyvista_vdi.vtk_pipeline.interaction.status import Warnings

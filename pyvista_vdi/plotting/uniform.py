@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import (
-    Cancelled,
     InvalidArgumentError,
     InvalidVolumeError,
     UnsupportedError,
@@ -36,12 +34,8 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkStreamingDemandDrivenPipeline,
 )
 
-_log = logging.getLogger(__name__)
-
 #: Points that ``resample="auto"`` takes, at most.
 _MOST_POINTS = 2**27
-#: Points that are sampled at a time, about, between reports of how far it is.
-_SLAB = 2**22
 #: Cells whose boxes are looked at for the shape of the mean cell.
 _CELLS_SEEN = 1000
 #: How far a mask's points may lie from the volume's, in voxels.
@@ -71,8 +65,6 @@ class UniformGrid(Algorithm):
         its active one.
     categorical : bool
         Resample by the nearest value.
-    progress : callable, optional
-        Gets the fraction that is resampled; stops the work if it returns ``False``.
 
     Attributes
     ----------
@@ -97,7 +89,6 @@ class UniformGrid(Algorithm):
         resample: str | Sequence[int] | None = None,
         mask: Any = None,
         categorical: bool = False,
-        progress: Callable[[float], object] | None = None,
     ) -> None:
         super().__init__(
             nInputPorts=2, inputType="vtkDataSet", nOutputPorts=1, outputType="vtkImageData"
@@ -106,7 +97,7 @@ class UniformGrid(Algorithm):
         held = pv.wrap(grid).copy(deep=False)
         chosen = scalars_of(held, name, preference)
         self.name, self.values = chosen.GetName(), as_numpy(chosen)
-        self._resample, self._progress = resample, progress
+        self._resample = resample
         self._categorical = categorical and not is_of_cells(held, chosen)
         of_points = held.GetPointData().GetArray(self.name)
         if resample is not None and of_points is not None and of_points is not chosen:
@@ -185,10 +176,8 @@ class UniformGrid(Algorithm):
             kept = _kept(pv.wrap(vtkDataObject.GetData(inputs[1], 0)), grid)
         numbers = _numbers(grid, self._resample)
         if numbers is not None:
-            image = _resampled(grid, numbers, kept, self._categorical, self._progress)
+            image = _resampled(grid, numbers, kept, self._categorical)
             image.set_active_scalars(self.name, "point")
-            if _log.isEnabledFor(logging.INFO):
-                _say_difference(grid, image, self.name)
             return image
         image = grid.copy(deep=False)
         if kept is not None:
@@ -343,7 +332,6 @@ def _resampled(
     numbers: NDArray[Any],
     kept: tuple[NDArray[np.bool_], bool] | None,
     categorical: bool,
-    progress: Callable[[float], object] | None,
 ) -> pv.ImageData:
     """Return a grid's arrays at the points of a uniform one, and what of that is blank.
 
@@ -364,15 +352,11 @@ def _resampled(
         low = image.origin = np.array(grid.bounds)[::2]
     image.spacing = spacing = np.diff(np.reshape(grid.bounds, (3, 2))).ravel() / (numbers - 1)
 
-    def advance(fraction: float) -> None:
-        if progress is not None and progress(fraction) is False:
-            raise Cancelled("resampling was stopped by its progress callback")
-
     # Which octants are drawn
     box = isinstance(grid, pv.ImageData | pv.RectilinearGrid) and not _marked(grid)
-    blank, share = None, 0.0
+    blank = None
     if kept is not None or not box:
-        share, structure = 0.7, type(grid)()
+        structure = type(grid)()
         structure.CopyStructure(grid)
         for data, marks in (
             (structure.GetPointData(), grid.GetPointGhostArray()),
@@ -382,14 +366,8 @@ def _resampled(
         labels, of_cells = kept or (np.ones(grid.n_points, bool), False)
         data = structure.GetCellData() if of_cells else structure.GetPointData()
         data.SetScalars(to_vtk("kept", labels.astype(np.uint8)))
-        found = _sampled(
-            structure,
-            2 * (numbers - 1),
-            spacing / 2,
-            low + spacing / 4,
-            not of_cells,
-            lambda done: advance(done * share),
-        )
+        centres = low + spacing / 4
+        found = _sampled(structure, 2 * (numbers - 1), spacing / 2, centres, not of_cells)
         drawn = found["vtkValidPointMask"] != 0
         if not drawn.any():
             raise InvalidVolumeError("no point of the uniform grid lies in a cell of the other")
@@ -398,22 +376,14 @@ def _resampled(
         blank = _blank(drawn, numbers[::-1], 2)
 
     # Values; rounded up, the last points would lie outside
-    found = _sampled(
-        grid,
-        numbers,
-        spacing * (1 - 2**-50),
-        low,
-        categorical,
-        lambda done: advance(share + done * (1 - share)),
-    )
+    found = _sampled(grid, numbers, spacing * (1 - 2**-50), low, categorical)
     lacking = np.flatnonzero(found["vtkValidPointMask"] == 0)
     if lacking.size and blank is not None:
         _fill(found, lacking, blank, grid, image, low, categorical)
-    for name in found.keys() - {*_MARKS}:
+    for name in {*found.keys()} - {*_MARKS}:
         image.point_data[name] = found[name]
     if blank is not None:
         image.GetPointData().AddArray(to_vtk(BLANKED, blank))
-    advance(1.0)
     return image
 
 
@@ -423,35 +393,15 @@ def _marked(grid: Any) -> bool:
 
 
 def _sampled(
-    grid: Any,
-    numbers: NDArray[Any],
-    spacing: NDArray[Any],
-    origin: Any,
-    categorical: bool,
-    advance: Callable[[float], None],
-) -> dict[str, NDArray[Any]]:
-    """Return a grid's arrays at the points of a uniform one, slab by slab."""
-    nx, ny, nz = numbers.tolist()
-    count = min(nz, 16, -(-nx * ny * nz // _SLAB))  # each goes through all cells
-    edges = np.linspace(0, nz, count + 1).astype(int).tolist()
-    arrays: dict[str, Any] = {}
-    for low, high in itertools.pairwise(edges):
-        advance(low / nz)
-        slab = pv.ImageData(
-            dimensions=(nx, ny, high - low),
-            spacing=spacing,
-            origin=np.add(origin, (0, 0, low * spacing[2])),
-        )
-        found = slab.sample(grid, categorical=categorical, mark_blank=False).point_data
-        for name, values in found.items():
-            shape = (nx * ny * nz, *values.shape[1:])
-            whole = arrays.setdefault(name, np.empty(shape, values.dtype))
-            whole[low * nx * ny : high * nx * ny] = values
-    return arrays
+    grid: Any, numbers: NDArray[Any], spacing: NDArray[Any], origin: Any, categorical: bool
+) -> Any:
+    """Return a grid's arrays at the points of a uniform one."""
+    points = pv.ImageData(dimensions=numbers, spacing=spacing, origin=origin)
+    return points.sample(grid, categorical=categorical, mark_blank=False).point_data
 
 
 def _fill(
-    found: dict[str, NDArray[Any]],
+    found: Any,
     lacking: NDArray[Any],
     blank: NDArray[np.uint8],
     grid: Any,
@@ -470,28 +420,7 @@ def _fill(
     known = np.ones(len(blank), bool)
     known[lacking] = False
     known[beside[at]] = True
-    for name in found.keys() - {*_MARKS}:
+    for name in {*found.keys()} - {*_MARKS}:
         found[name][beside[at]] = there[name][at]
         if known.any():
             found[name][~known] = found[name][known.argmax()]
-
-
-def _say_difference(grid: Any, image: pv.ImageData, name: str) -> None:
-    """Log how far a uniform grid is from another's values, at the other's points or cells."""
-    own = grid if name in grid.point_data else grid.cell_centers()
-    seen = pv.PolyData(np.asarray(own.points)).sample(image)
-    at = seen["vtkValidPointMask"] != 0
-    off = np.abs(seen[name][at].astype(float) - own.point_data[name][at].astype(float))
-    off = off[np.isfinite(off)]
-    if off.size:
-        _log.info(
-            "%s resampled to %s points: at %d of its own %d, %r differs by %.3g at most, %.3g on "
-            "average",
-            type(grid).__name__,
-            " x ".join(map(str, image.dimensions)),
-            np.count_nonzero(at),
-            len(at),
-            name,
-            off.max(),
-            off.mean(),
-        )

@@ -1,148 +1,185 @@
-"""A new VDI made in a thread of its own while frames of the old one are drawn."""
+"""Threads that work in the background of frames: each does the last job that it was given."""
 
 from __future__ import annotations
 
+import atexit
+import threading
+import time
+import traceback
 import weakref
 from collections.abc import Callable, Hashable
 from typing import Any
 
-from pyvista_vdi.device import Runtime
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.options import GenerationRequest, QualityTarget
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.worker import Job, Worker
+from pyvista_vdi.quality.probe import generate_to_target
 from pyvista_vdi.raycasting.raycast import render_vdi
+
+#: Does a job on a device, and returns what is not None; it is given what takes note of the fraction
+#: that is done.
+Work = Callable[[Runtime, Callable[[float], None]], Any]
 
 #: Pixels along each edge of the frame that a new VDI is tried with: what the first real frame
 #: would have to compile and upload is there then.
 TRIAL_SIZE = 8
 
 
-class BackgroundGeneration:
-    """Makes one VDI at a time, giving way to frames drawn inside ``Runtime.foreground``.
+class Job:
+    """Work that is done in pieces, between frames that are drawn inside ``Runtime.foreground``."""
 
-    The thread is started by :meth:`start` and ends when there is nothing left to make, on
-    :meth:`close`, when this object is collected, and at the interpreter's exit, within one piece
-    of work (``pyvista_vdi.device.scheduling``; a kernel that is being compiled is finished
-    first). Its methods are meant for one thread, the one that draws.
+    def __init__(self, work: Work, device: Any, key: Hashable = None) -> None:
+        self.key = key
+        self.progress = 0.0
+        self.cancelled = threading.Event()
+        self._work = work
+        self._device = device
 
-    Parameters
-    ----------
-    device : optional
-        See :func:`pyvista_vdi.list_devices`; the one that frames are drawn on.
-    on_finished : callable, optional
-        Called without arguments, **from the worker thread**, when :meth:`take` has something to
-        give or to raise: it may set a flag or post an event.
+    def done(self, paused: Callable[[], bool] = lambda: False) -> Any:
+        """Do the work on a queue of this thread's own, and return its result."""
+        runtime = get_runtime(self._device)
+        with runtime.background(self.cancelled.is_set, paused):
+            return self._work(runtime, self._report)
+
+    def _report(self, fraction: float) -> None:
+        self.progress = fraction
+
+
+class Worker:
+    """Where one thread, which draws, puts jobs, and another lays what it has made of them.
+
+    The thread begins with a job and ends when there is none, on :meth:`close`, and at the
+    interpreter's exit, within one piece of work (``pyvista_vdi.device.scheduling``; a kernel that
+    is being compiled is finished first).
+
+    ``name``: of the thread.
     """
 
-    def __init__(
-        self, device: Any = None, *, on_finished: Callable[[], object] | None = None
-    ) -> None:
-        self._on_finished = on_finished
-        self._device = device
-        # The thread knows only the worker, so that this object can be collected while it works
-        self._worker = Worker("pyvista-vdi generation", weakref.WeakMethod(self._notify))
-        self._finalizer = weakref.finalize(self, self._worker.clear)
-        self._finalizer.atexit = False  # the workers' own end waits for the threads as well
-
-    def start(
-        self,
-        request: GenerationRequest,
-        *,
-        key: Hashable = None,
-        target: QualityTarget | None = None,
-    ) -> None:
-        """Make a VDI, in place of whatever is being made or was not taken yet.
-
-        Parameters
-        ----------
-        request : GenerationRequest
-            What is asked for; device and progress are this object's. The volume's values must stay
-            until the VDI is finished or cancelled with ``wait=True``.
-        key : hashable
-            What the VDI is for; see :attr:`key`.
-        target : QualityTarget, optional
-            Chooses the window, max_supersegments and precision.
-
-        Raises
-        ------
-        RuntimeError
-            After :meth:`close`.
-        """
-
-        def make(runtime: Runtime, report: Callable[[float], None]) -> VDI:
-            here = request.replace(device=runtime, progress=report)
-            if target:
-                from pyvista_vdi.quality.probe import generate_to_target
-
-                vdi = generate_to_target(here, target)
-            else:
-                vdi = generate_vdi(here)
-            trial = FrameRequest(vdi.camera, (TRIAL_SIZE, TRIAL_SIZE), device=runtime)
-            render_vdi(vdi, trial)
-            return vdi
-
-        self._worker.put(Job(make, self._device, key))
-
-    def cancel(self, *, wait: bool = False) -> None:
-        """Cancel what is being made, and drop what was made and not taken.
-
-        Parameters
-        ----------
-        wait : bool
-            Return only when the thread has ended; the volume may change then.
-        """
-        self._worker.clear()
-        if wait:
-            self._worker.join()
-
-    def close(self) -> None:
-        """Cancel, and wait for the thread; a second call does nothing."""
-        self._worker.close()
-        self._worker.join()
-
-    def __enter__(self) -> BackgroundGeneration:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def take(self) -> VDI | None:
-        """Return the VDI that was finished, once; None where there is none.
-
-        It is on the device already: the next frame can be its first.
-
-        Raises
-        ------
-        VDIError, Exception
-            What made the generation fail, once.
-        """
-        return self._worker.take()  # type: ignore[no-any-return]
+    def __init__(self, name: str) -> None:
+        self.job: Job | None = None  # to be done, being done, or done and not taken
+        self._name = name
+        self._closed = False
+        self._lock = threading.RLock()  # a collection inside may clear another worker, or this one
+        self._working = False
+        self._thread: threading.Thread | None = None
+        self._made: Any = None
+        self._error: BaseException | None = None
+        self._paused_until = 0.0  # by the clock of time.monotonic
+        with _workers_lock:
+            _workers.add(self)
 
     @property
     def running(self) -> bool:
-        """Whether a VDI is being made or waits to be."""
-        return self._worker.running
-
-    @property
-    def key(self) -> Hashable:
-        """The key of what is being made, or was made and not taken; None if there is nothing."""
-        job = self._worker.job
-        return None if job is None else job.key
+        """Whether there is a job that is not done."""
+        with self._lock:
+            return self.job is not None and self._made is None and self._error is None
 
     @property
     def progress(self) -> float | None:
-        """Fraction of the lists made, 0 to 1; 1 also while they go to the device.
-
-        None when nothing is being made.
-        """
-        job = self._worker.job
+        """Fraction of the job that is done, 0 to 1; None where there is none to be done."""
+        job = self.job
         return job.progress if job is not None and self.running else None
 
-    def _notify(self) -> None:
-        if self._on_finished is not None:
-            self._on_finished()
+    def put(self, job: Job) -> None:
+        """Replace the job, and see to it that a thread works; RuntimeError after ``close``."""
+        if self._closed:
+            raise RuntimeError(f"this {self._name} was closed")
+        with self._lock:
+            self.clear()
+            self.job = job
+            if not self._working:
+                self._working = True
+                # Ended at exit by _end_all; a thread that is no daemon would keep Python alive
+                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+                self._thread.start()
+
+    def pause(self, seconds: float) -> None:
+        """Pause the thread for so long from now on; 0: it continues."""
+        self._paused_until = time.monotonic() + seconds if seconds else 0.0
+
+    def clear(self) -> None:
+        """Cancel the job, and drop what was not taken."""
+        with self._lock:
+            if self.job is not None:
+                self.job.cancelled.set()
+            self.job = self._made = self._error = None
+
+    def take(self) -> Any:
+        """Hand out what was made, or raise what went wrong, once; None where there is nothing."""
+        with self._lock:
+            made, error = self._made, self._error
+            if made is not None or error is not None:
+                self.clear()
+        if error is not None:
+            raise error
+        return made
+
+    def close(self) -> None:
+        """Cancel, and take no more jobs."""
+        self._closed = True
+        self.clear()
+
+    def join(self) -> None:
+        """Wait for the thread to end, unless this is it."""
+        thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            thread.join()
+
+    def _run(self) -> None:
+        """Do jobs as long as there is one that is still to be done."""
+        while True:
+            with self._lock:
+                self._working = self.running
+                job = self.job
+                if job is None or not self._working:
+                    return
+            self._do(job)
+
+    def _do(self, job: Job) -> None:
+        made, failed = None, None
+        try:
+            made = job.done(lambda: time.monotonic() < self._paused_until)
+        except Cancelled:
+            return
+        except BaseException as error:  # take() raises it where somebody can act on it
+            traceback.clear_frames(error.__traceback__)  # they hold buffers
+            failed = error
+        # Keep what became of the job, unless it is out of date
+        with self._lock:
+            if job is self.job:
+                self._made, self._error = made, failed
 
 
-__all__ = ["BackgroundGeneration"]
+def vdi_job(
+    request: GenerationRequest, target: QualityTarget | None = None, key: Hashable = None
+) -> Job:
+    """Return the job that makes a VDI: with it, the next frame can be its first.
+
+    The volume's values must stay until it is done, or cancelled and its thread has ended.
+    """
+
+    def make(runtime: Runtime, report: Callable[[float], None]) -> VDI:
+        here = request.replace(device=runtime, progress=report)
+        vdi = generate_to_target(here, target) if target else generate_vdi(here)
+        render_vdi(vdi, FrameRequest(vdi.camera, (TRIAL_SIZE, TRIAL_SIZE), device=runtime))
+        return vdi
+
+    return Job(make, request.device, key)
+
+
+_workers: weakref.WeakSet[Worker] = weakref.WeakSet()
+_workers_lock = threading.Lock()  # a set that grows cannot be walked
+
+
+@atexit.register
+def _end_all() -> None:
+    """End every thread before drivers are unloaded."""
+    with _workers_lock:
+        workers = list(_workers)
+    for worker in workers:
+        worker.close()
+    for worker in workers:
+        worker.join()

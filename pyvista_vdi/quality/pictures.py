@@ -1,19 +1,19 @@
-"""What draws a picture that is kept, VDI or volume: told by the view, never by time."""
+"""What pictures that are kept have told, by which VDI or volume draws the next one."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.frame_state import FrameAsked, Pictures, Sight
-from pyvista_vdi.quality.records import replace
 
 #: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn where the volume is at
 #: hand, and by what share the contrast within 4 x 4 pixels may differ, where nobody said otherwise.
 SIMILAR, _SAME_CONTRAST = 0.98, 0.1
 #: Pixels as wide as one list from which on a picture has less detail than its pixels could show.
 FINE_ENOUGH = 1.25
-#: Degrees from V_O beyond which the volume's picture takes no longer than the VDI's.
+#: Degrees from the VDI's view beyond which the volume's picture takes no longer than its own.
 _FASTER_WITHIN = 10.0
 #: Pictures by the volume, as near to the view at hand as this (about radians), that make a VDI of
 #: the view worth while: about as many as it takes the time of, so that what is made in vain at most
@@ -28,54 +28,95 @@ _JUDGED = 2 * 16 * 24**2
 _ANOTHER_JUDGEMENT = 0.02
 
 
-def serves(
-    pictures: Pictures, seen: Sight, f: FrameAsked, bound: float | None
-) -> tuple[Pictures, bool | None]:
-    """Return whether a VDI's picture of a view does; ``None`` where an estimate has to tell."""
-    if pictures.vdi != seen.vdi:
-        pictures = replace(pictures, vdi=seen.vdi, judged=(), poor_from=math.inf)
-    if bound is None and seen.magnification > FINE_ENOUGH:
-        return pictures, False
-    # What fails near V_O fails farther away: the loss comes with the first degrees
-    within = 180.0 if f.joint else _FASTER_WITHIN
-    if seen.angle > within or seen.angle >= pictures.poor_from or seen.coverage < 1:
-        return pictures, False
-    if f.judged is False:
-        return pictures, False
-    alone = f.joint and f.one_view and f.own_pixels  # what is made is kept
-    at_home = seen.request is not None and seen.request.screen == f.view
-    if alone and not at_home and seen.pixels <= _JUDGED:
-        return pictures, False
-    if f.judged is not None and f.judged not in pictures.judged:
-        pictures = replace(pictures, judged=(*pictures.judged[1 - _ESTIMATES :], f.judged))
-    apart, error = min(
-        (
-            (f.view.distance(each.view, seen.bounds), each)
-            for each in pictures.judged
-            if each.options == seen.options
-        ),
-        key=lambda found: found[0],
-        default=(math.inf, None),
-    )
-    if error is None or apart > _ANOTHER_JUDGEMENT:
-        return pictures, None
-    does = error.ssim >= (SIMILAR if bound is None else bound)
-    if bound is None:
-        does = does and abs(error.contrast - 1) <= _SAME_CONTRAST
-    if not does and seen.magnification <= FINE_ENOUGH:
-        in_vain = pictures.in_vain or seen.angle <= _FASTER_WITHIN
-        pictures = replace(pictures, poor_from=seen.angle, in_vain=in_vain)
-    return pictures, does
+@dataclass(frozen=True)
+class Made:
+    """A VDI that is there, as a view shows it; see :mod:`pyvista_vdi.quality.view_error`."""
+
+    number: int  # by which it is known
+    bounds: tuple[float, ...]  # of the volume, model frame
+    content: Any = None  # of what it was made, and for which view
+    screen: Any = None
+    angle: float = 0.0
+    magnification: float = 1.0
+    coverage: float = 1.0
+    pixels: float = 0.0  # in which it may be seen
+    options: Any = None  # how it is drawn (clipping planes in world coordinates), compared by ==
 
 
-def drawn_by_volume(pictures: Pictures, view: View) -> Pictures:
-    """Note a picture that the volume drew; the same one once more costs nothing."""
-    if pictures.by_volume and pictures.by_volume[-1] == view:
-        return pictures
-    return replace(pictures, by_volume=(*pictures.by_volume[1 - _PICTURES :], view))
+@dataclass(frozen=True)
+class Estimate:
+    """What the SSIM of a VDI's picture was found to be."""
+
+    vdi: int
+    view: View
+    ssim: float
+    contrast: float = 1.0
+    options: Any = None
 
 
-def deserves_vdi(pictures: Pictures, view: View, bounds: tuple[float, ...]) -> bool:
-    """Whether so many pictures were drawn near this view that a VDI of it is worth while."""
-    near = sum(view.distance(other, bounds) <= _NEAR for other in pictures.by_volume)
-    return not pictures.in_vain and near >= _WORTH_A_VDI
+@dataclass(frozen=True)
+class Pictures:
+    """What pictures that are kept have told; it is the same in every run."""
+
+    content: Any = None  # of which they are
+    vdi: int | None = None  # of which the estimates are
+    by_volume: tuple[View, ...] = ()
+    judged: tuple[Estimate, ...] = ()
+    poor_from: float = math.inf  # degrees, of the nearest view that the VDI fails
+    in_vain: bool = False  # whether a VDI was too poor near its own view
+
+    def of(self, content: Any) -> Pictures:
+        """Return the same, or of another content nothing."""
+        return self if self.content == content else Pictures(content)
+
+    def serves(
+        self,
+        made: Made,
+        view: View,
+        judged: Estimate | Literal[False] | None,
+        bound: float | None,
+        *,
+        joint: bool,
+        alone: bool,
+    ) -> tuple[Pictures, bool | None]:
+        """Return whether a VDI's picture of a view does; ``None`` where an estimate has to tell.
+
+        ``judged`` is what that has told, ``alone`` whether a VDI of this very view would be kept.
+        """
+        known = self
+        if known.vdi != made.number:
+            known = replace(known, vdi=made.number, judged=(), poor_from=math.inf)
+        if bound is None and made.magnification > FINE_ENOUGH:
+            return known, False
+        # What fails near the generating view fails farther away: the loss comes at once
+        within = 180.0 if joint else _FASTER_WITHIN
+        if made.angle > within or made.angle >= known.poor_from or made.coverage < 1:
+            return known, False
+        at_home = made.screen == view
+        if judged is False or (joint and alone and not at_home and made.pixels <= _JUDGED):
+            return known, False
+        if judged is not None and judged not in known.judged:
+            known = replace(known, judged=(*known.judged[1 - _ESTIMATES :], judged))
+        same = [each for each in known.judged if each.options == made.options]
+        apart = [view.distance(each.view, made.bounds) for each in same]
+        if not apart or min(apart) > _ANOTHER_JUDGEMENT:
+            return known, None
+        error = same[apart.index(min(apart))]
+        does = error.ssim >= (SIMILAR if bound is None else bound)
+        if bound is None:
+            does = does and abs(error.contrast - 1) <= _SAME_CONTRAST
+        if not does and made.magnification <= FINE_ENOUGH:
+            in_vain = known.in_vain or made.angle <= _FASTER_WITHIN
+            known = replace(known, poor_from=made.angle, in_vain=in_vain)
+        return known, does
+
+    def drawn_by_volume(self, view: View) -> Pictures:
+        """Note a picture that the volume drew; the same one once more costs nothing."""
+        if self.by_volume and self.by_volume[-1] == view:
+            return self
+        return replace(self, by_volume=(*self.by_volume[1 - _PICTURES :], view))
+
+    def deserve_vdi(self, view: View, bounds: tuple[float, ...]) -> bool:
+        """Whether so many were drawn near this view that a VDI of it is worth while."""
+        near = sum(view.distance(other, bounds) <= _NEAR for other in self.by_volume)
+        return not self.in_vain and near >= _WORTH_A_VDI

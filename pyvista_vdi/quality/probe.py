@@ -19,6 +19,7 @@ from pyvista_vdi.errors import Cancelled, InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_WINDOW, ListEdges, list_edges, list_places
 from pyvista_vdi.model.options import GenerationRequest, QualityTarget
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -298,7 +299,7 @@ class Probe:
         """Return the loss of the volume itself where V_O covers it, lit as V_O has it."""
         sides = viewport_planes(self._camera, self._size)
         world = self._camera.model_transform
-        corners = rays.corners(self._volume.bounds) @ world[:3, :3].T + world[:3, 3]
+        corners = bounds_corners(self._volume.bounds) @ world[:3, :3].T + world[:3, 3]
         covered = all(((corners - side[:3]) @ side[3:]).min() >= 0 for side in sides)
         if covered and self._request.transfer_function.shading is None:
             return 0.0

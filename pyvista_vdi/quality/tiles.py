@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -203,7 +204,7 @@ def seen_region(
     The whole picture where a box reaches behind the eye. SSIM is not told within five pixels of
     the picture's border.
     """
-    corners = np.concatenate([rays.corners(box) for box in boxes])
+    corners = np.concatenate([bounds_corners(box) for box in boxes])
     points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
     depth = points[:, 2]
     if not camera.parallel_projection and depth.max() <= 0:

@@ -121,7 +121,7 @@ CLEAR_HITS = KernelDeclaration("raycasting/clear.cl", "clear_hits", **_CLEARED, 
 PREPARE_LISTS = KernelDeclaration(
     "raycasting/prepare.cl",
     "prepare_lists",
-    starts="OFFSET_T*",
+    starts="ulong*",
     headers="HEADER_T*",
     fronts="float*",
     backs="float*",
@@ -138,7 +138,7 @@ PREPARE_LISTS = KernelDeclaration(
 PREPARE_PACKED = KernelDeclaration(
     "raycasting/prepare_packed.cl",
     "prepare_packed",
-    starts="OFFSET_T*",
+    starts="ulong*",
     headers="OFFSET_T*",
     origins="int*",
     strides="ushort*",
@@ -164,7 +164,7 @@ CLASSIFY_VALUES = KernelDeclaration(
 PREPARE_VALUES = KernelDeclaration(
     "raycasting/prepare_values.cl",
     "prepare_values",
-    starts="OFFSET_T*",
+    starts="ulong*",
     places="ulong*",
     fronts="float*",
     backs="float*",
@@ -184,7 +184,7 @@ PREPARE_VALUES = KernelDeclaration(
 COUNT_SUPERSEGMENTS = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_supersegments",
-    offsets="OFFSET_T*",
+    starts="ulong*",
     fronts="float*",
     backs="float*",
     **_COUNTS,
@@ -192,12 +192,21 @@ COUNT_SUPERSEGMENTS = KernelDeclaration(
 COUNT_PACKED = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_packed",
-    offsets="OFFSET_T*",
+    starts="ulong*",
     origins="int*",
     strides="ushort*",
     words="uint2*",
     step="float",
     **_COUNTS,
+)
+ENDS_OF_LISTS = KernelDeclaration(
+    "raycasting/occupancy.cl",
+    "ends_of_lists",
+    starts="ulong*",
+    fronts="float*",
+    backs="float*",
+    lists="uint",
+    ends="float2*",
 )
 OCCUPIED_SLABS = KernelDeclaration(
     "raycasting/occupancy.cl", "occupied_slabs", counts="uint*", stacks="uint", masks="ulong*"

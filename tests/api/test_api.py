@@ -109,7 +109,8 @@ def test_estimate_says_bytes(volume):
     assert needed.total == needed.volume + needed.vdi_worst_case + needed.working
     # More of a ray is recorded before it is cut, and four rows are made at least
     merged, cut = (
-        api.estimate(volume, (8192, 8), criterion=name) for name in ("least-error", "homogeneity")
+        api.estimate(volume, (8192, 8), settings=pvdi.Settings(criterion=name))
+        for name in ("least-error", "homogeneity")
     )
     assert cut.working > 2 * merged.working
     assert cut.vdi_worst_case == merged.vdi_worst_case
@@ -118,7 +119,7 @@ def test_estimate_says_bytes(volume):
     for clim, nbytes in ((None, 4 * 504), ((0, 60100), 2 * 504)):
         assert api.estimate(counts, (64, 48), clim=clim).volume == nbytes
     with pytest.raises(InvalidArgumentError, match="criterion must be .*; got 'depth'"):
-        api.estimate(volume, (640, 480), criterion="depth")
+        api.estimate(volume, (640, 480), settings=pvdi.Settings(criterion="depth"))
     with pytest.raises(TypeError, match="color_map"):
         api.estimate(volume, (64, 48), color_map="bone")
 

@@ -1,160 +1,119 @@
-"""Each option is declared once: what the public functions write out is what is declared."""
+"""Each option is declared once, and all else follows from what is declared."""
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
-from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import api
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
-from pyvista_vdi.model.classification import Classification, Look
-from pyvista_vdi.model.lighting import Light, Lights
-from pyvista_vdi.model.options import (
-    GenerationOptions,
-    MediumOptions,
-    QualityTarget,
-    declared,
-)
-from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.lighting import Lights
+from pyvista_vdi.model.options import GenerationOptions, QualityTarget, declared
 
-#: The functions, with the records whose options they take.
-MADE = (Classification, GenerationOptions, QualityTarget)
-FUNCTIONS = {
-    "generate": (api.generate, MADE),
-    "estimate": (api.estimate, MADE),
-    "render": (api.render, (RenderOptions,)),
-    "render_depth": (api.render_depth, (RenderOptions,)),
-    "pick": (api.pick, (RenderOptions,)),
-    "render_volume": (api.render_volume, (Classification, MediumOptions, RenderOptions)),
-}
+CAMERA = pvdi.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))
 
 
-def add_vdi():
+def add_vdi(*arguments, **named):
+    pv = pytest.importorskip("pyvista")
+    plotter = pv.Plotter(off_screen=True)
+    try:
+        return plotter.add_vdi(*arguments, **named)
+    finally:
+        plotter.close()
+
+
+def function(name):
+    """Return a public function by its name, and how many arguments it has at most."""
+    if name != "add_vdi":
+        most = {"generate": 35, "render_volume": 30}
+        return getattr(api, name), most.get(name, 30)
     pytest.importorskip("pyvista")
-    from pyvista_vdi.plotting.adding import Placement
-    from pyvista_vdi.plotting.classify import Looks
     from pyvista_vdi.plotting.component import AddVDI
 
-    return AddVDI.__call__, (*MADE, Looks, DrawingOptions, Placement)
+    return AddVDI.__call__, 1 + 48  # self
 
 
-def of(name):
-    return add_vdi() if name == "add_vdi" else FUNCTIONS[name]
+@pytest.mark.parametrize("name", ["view_cone", "log_scale", "tolerance"])
+def test_an_option_stands_in_one_place(name):
+    """No other function or record of the package has it as an argument or a field."""
+    places = []
+    for path in Path(pvdi.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            of_function = isinstance(node, ast.arg) and node.arg == name
+            of_record = isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == name
+            places += [path.name] * (of_function or of_record)
+    assert len(places) == 1, places
 
 
-def entries(function):
-    """Yield the names, the type and the text of each entry of a docstring's parameters."""
-    text = re.search(r"Parameters\n-+\n(.*?)\n\n\w+\n-+\n", inspect.getdoc(function), re.DOTALL)[1]
-    for entry in re.split(r"\n(?=\S)", text):
-        head, _, what = entry.partition("\n")
-        names, _, kind = head.partition(" : ")
-        yield names.split(", "), kind, " ".join(what.split())
+NAMES = ["estimate", "generate", "pick", "render", "render_depth", "render_volume", "add_vdi"]
 
 
-@pytest.mark.parametrize("name", [*FUNCTIONS, "add_vdi"])
-def test_signatures_have_the_defaults_that_are_declared(name):
-    function, records = of(name)
-    known = declared(*records)
-    for each in inspect.signature(function).parameters.values():
-        if each.name in known:
-            assert each.default == known[each.name].default, each.name
-    if name in ("generate", "render"):
-        assert set(declared(*records)) <= set(inspect.signature(function).parameters)
-
-
-@pytest.mark.parametrize("name", [*FUNCTIONS, "add_vdi"])
-def test_docstrings_have_each_parameter_once_and_say_what_is_declared(name):
-    function, records = of(name)
-    known, found, mistakes = declared(*records), list(entries(function)), []
-    documented = [each.lstrip("*") for names, _, _ in found for each in names]
-    kinds = (inspect.Parameter.VAR_KEYWORD,) * (name != "add_vdi")
-    parameters = inspect.signature(function).parameters.values()
-    taken = [each.name for each in parameters if each.name != "self" and each.kind not in kinds]
+@pytest.mark.parametrize("name", NAMES)
+def test_docstrings_have_each_parameter_once(name):
+    called, most = function(name)
+    parameters = inspect.signature(called).parameters.values()
+    assert len(parameters) <= most
+    text = inspect.getdoc(called)
+    section = re.search(r"Parameters\n-+\n(.*?)\n\n\w+\n-+\n", text, re.DOTALL)[1]
+    heads = re.findall(r"^(?! )(.*?)(?: : .*)?$", section, re.MULTILINE)
+    documented = [each.lstrip("*") for head in heads for each in head.split(", ")]
+    taken = [each.name for each in parameters if each.name not in ("self", "look")]
     assert sorted(documented) == sorted(taken)
-    for names, kind, text in found:
-        told = known.get(names[0])
-        if told is None or len(names) > 1 or re.match(r"(As (for|in)|The same|Likewise)\b", text):
-            continue
-        wanted = told.what[0].upper() + told.what[1:].partition(";")[0].partition(",")[0]
-        choices = "{" + ", ".join(f'"{each}"' for each in told.choices) + "}"
-        if not text.startswith(wanted) or (told.choices and not kind.startswith(choices)):
-            mistakes.append(f"{names[0]} : {kind}: {text}, where {told.what}")
-    assert not mistakes, "\n".join(mistakes)
 
 
-def test_defaults_of_a_look_are_add_volume_s():
+def test_add_vdi_begins_as_add_volume():
     theirs = inspect.signature(pytest.importorskip("pyvista").Plotter.add_volume).parameters
-    for name, told in declared(Classification).items():
-        if name not in ("interpolation", "volume_property", "transfer_function"):
-            assert theirs[name].default == told.default, name
+    ours = inspect.signature(function("add_vdi")[0]).parameters
+    known = [each.name for each in theirs.values() if each.kind is each.POSITIONAL_OR_KEYWORD]
+    assert [*ours][: len(known)] == known
+    assert {n: ours[n].default for n in known} == {n: theirs[n].default for n in known}
 
 
-#: Of each option another value than the default, and what is kept of it.
-OTHERS = {
-    "scalars": "a", "preference": "cell", "clim": (0, 1), "n_colors": 7, "opacity": "geom",
-    "cmap": "bone", "flip_scalars": True, "opacity_unit_distance": 3.0, "log_scale": True,
-    "shade": True, "ambient": 0.1, "diffuse": 0.3, "specular": 0.4, "specular_power": 2.0,
-    "interpolation": "linear", "max_supersegments": 5, "criterion": "homogeneity",
-    "sample_distance": 0.25, "tolerance": 0.5, "view_cone": 30.0, "precision": "8-byte",
-    "lights": (Light(intensity=0.5),), "ambient_occlusion": 4.0, "memory_limit": "1 GiB",
-}  # fmt: skip
-KEPT = {
-    "lights": Lights((Light(intensity=0.5),)),
-    "ambient_occlusion": AmbientOcclusion(4.0),
-    "memory_limit": 2**30,
-}
-
-
-def test_each_argument_of_generate_reaches_its_option(monkeypatch):
-    """Records are made of arguments in their order: none may be taken for another."""
-    seen = {}
-
-    def note(record):
-        def made(*given, **named):
-            made = record(*given, **named)
-            seen.update({name: getattr(made, name) for name in declared(record)})
-            return made
-
-        return made
-
-    def stop(*_):
-        raise InterruptedError
-
-    for record in (Classification, GenerationOptions, QualityTarget):
-        monkeypatch.setattr(record, "checked", note(record))
-    monkeypatch.setattr("pyvista_vdi.api.vdis.as_volume", stop)
-    asked = {"target_ssim": 0.9, "target_fps": 5.0, "max_bytes": 10, "target_angle": 20.0}
-    with pytest.raises(InterruptedError):
-        pvdi.generate(None, None, None, **OTHERS, **asked)
-    assert {name: seen[name] for name in OTHERS} == {**OTHERS, **KEPT}
-    assert {name: seen[name] for name in asked} == asked
-
-
-def test_each_argument_of_add_vdi_reaches_its_option(monkeypatch):
+def test_by_position_and_by_other_names_it_is_the_same():
     pv = pytest.importorskip("pyvista")
-    from pyvista_vdi.plotting import component
+    ball = pv.Wavelet()
+    one = add_vdi(ball, "RTData", (0, 100), None, "linear", 12, "bone")
+    other = add_vdi(ball, scalars="RTData", rng=(0, 100), n_colors=12, colormap="bone")
+    for actor in (one, other):
+        assert actor.mapper.lookup_table.n_values == 12
+        assert actor.mapper.scalar_range == (0, 100)
+    with pytest.raises(TypeError, match=r"add_vdi\(\) multiple values for argument 'scalars'"):
+        add_vdi(ball, "RTData", scalars="RTData")
+    with pytest.raises(TypeError, match=r"generate\(\) missing a required argument: 'camera'"):
+        pvdi.generate(ball)
 
-    monkeypatch.setattr(component, "added", lambda plotter, volume, asked, remember: asked)
-    drawing = {"target_fps": 9.0, "adjust_multi_samples": False, "regenerate": "never"}
-    drawing |= {"regenerate_below": 0.5, "draw": "vdi"}
-    place = {"name": "n", "culling": "front", "reset_camera": False, "pickable": False}
-    place |= {"render": False, "scalar_bar_args": {"title": "t"}, "show_scalar_bar": True}
-    place |= {"status": True, "multi_colors": True}
-    given = {name: value for name, value in OTHERS.items() if name != "lights"}
-    plotter = pv.Plotter(off_screen=True)
-    asked = plotter.add_vdi(None, **given, **drawing, **place, categories=3, annotations={1.0: "a"})
-    plotter.close()
-    wanted = {**given, **drawing, **place, **KEPT, "categories": 3, "annotations": {1.0: "a"}}
-    del wanted["lights"]
-    found = {}
-    for record in (asked.array, asked.look, asked.options, asked.drawing, asked.place):
-        found.update((each.name, getattr(record, each.name)) for each in fields(record))
-    assert {name: found[name] for name in wanted} == wanted
-    assert set(declared(Look)) <= set(given)
+
+@pytest.mark.parametrize(
+    ("name", "given", "says"),
+    [
+        ("generate", {"tolerance": 0.1}, r"settings=pyvista_vdi\.Settings\(tolerance=\.\.\.\)"),
+        ("generate", {"step": 0.1}, r"Settings\(sample_distance=\.\.\.\)"),
+        ("generate", {"n_supersegments": 9}, "did you mean 'max_supersegments'"),
+        ("generate", {"target_fps": 9}, "it is of add_vdi.*full_fps"),
+        ("render_volume", {"skip_empty": True}, "passed by, without being asked"),
+        ("add_vdi", {"status": True}, r"call show_status\(plotter\) of the actor"),
+        ("add_vdi", {"coverage": "view"}, r"Settings\(coverage=\.\.\.\)"),
+        ("Settings", {"tolerence": 1}, "did you mean 'tolerance'"),
+    ],
+)
+def test_what_has_moved_is_refused_with_its_new_place(name, given, says):
+    called = add_vdi if name == "add_vdi" else getattr(pvdi, name)
+    with pytest.raises(TypeError, match=says):
+        called(**given)
+
+
+def test_settings_that_mean_nothing_are_refused():
+    with pytest.raises(pvdi.InvalidArgumentError, match="coverage of the settings means nothing"):
+        pvdi.generate(None, CAMERA, (8, 8), settings=pvdi.Settings(coverage="view"))
+    with pytest.raises(pvdi.InvalidArgumentError, match="settings must be a pyvista_vdi.Settings"):
+        pvdi.generate(None, CAMERA, (8, 8), settings={"tolerance": 0.1})
+    with pytest.raises(pvdi.InvalidArgumentError, match="did you mean 'homogeneity'"):
+        pvdi.Settings(criterion="homogenity")
 
 
 def test_what_is_made_twice_is_equal_and_what_is_given_is_told():
@@ -165,3 +124,4 @@ def test_what_is_made_twice_is_equal_and_what_is_given_is_told():
     options = GenerationOptions()
     assert GenerationOptions.of(options, {}) is options
     assert GenerationOptions.of(options, {"view_cone": 5}).view_cone == 5
+    assert set(declared(Classification)) <= set(inspect.signature(pvdi.generate).parameters)

@@ -5,29 +5,30 @@
 
 from __future__ import annotations
 
-import ast
 import collections.abc
+import dataclasses
 import inspect
 import re
-import subprocess
-import sys
+import textwrap
 import typing
 from pathlib import Path
 
-import numpy.typing
+import numpy.typing as npt
 import pytest
 
 import pyvista_vdi
 from pyvista_vdi import api
 from pyvista_vdi.model import types
 from pyvista_vdi.model.arguments import Settings
+from pyvista_vdi.model.options import GenerationOptions
 
 PACKAGE = Path(pyvista_vdi.__file__).parent
 #: Modules that names in annotations are imported from; else it is where the class is.
-HOMES = (collections.abc, typing, numpy.typing, types)
+HOMES = (collections.abc, typing, npt, types)
 CLASSES = {
     "AddTransferFunctionEditor": "plotting.add_transfer_function_editor",
     "AddVDIClipPlane": "plotting.clip_plane",
+    "AmbientOcclusion": "model.ambient_occlusion",
     "DeferredVDI": "model.deferred",
     "Estimate": "generation.slices",
     "Pick": "raycasting.picking",
@@ -38,10 +39,11 @@ CLASSES = {
     "VDI": "model.vdi",
     "VDICollection": "model.collection",
 }
+WIDTH = 100
 OTHERS = {"np.": "import numpy as np", "os.": "import os", "pv.": "import pyvista as pv"}
 
 
-def definition(thing, name, required=(), **kinds):
+def definition(thing, name, required=(), margin="", **kinds):
     """Yield a definition with a signature; ``kinds`` are types in place of what it has."""
     arguments, star = [], False
     signature = inspect.signature(thing)
@@ -55,7 +57,16 @@ def definition(thing, name, required=(), **kinds):
             text += f" = {each.default!r}"
         arguments.append(text)
     made = kinds.get("return", signature.return_annotation)
-    return f"def {name}({', '.join(arguments)}) -> {made}: ...\n"
+    return wrapped(f"def {name}(", ", ".join(arguments), f") -> {made}: ...", margin)
+
+
+def wrapped(head, text, tail, margin=""):
+    """Return a text between others, in lines of which none is too long."""
+    if len(margin + head + text + tail) < WIDTH:
+        return f"{margin}{head}{text}{tail}\n"
+    inner = margin + "    "
+    body = textwrap.fill(text, WIDTH, initial_indent=inner, subsequent_indent=inner)
+    return f"{margin}{head}\n{body},\n{margin}{tail}\n"
 
 
 def overloads(function, name):
@@ -77,13 +88,17 @@ def overloads(function, name):
 def stub(about, text):
     """Return a stub: its imports, and a text."""
     lines = [line for used, line in OTHERS.items() if used in text]
+    found = {}
     for word in sorted({*re.findall(r"(?<![\w.\"'])[A-Za-z]\w*", text)}):
         home = next((each.__name__ for each in HOMES if word in vars(each)), None)
         if word in CLASSES and f"class {word}:" not in text:
-            lines.append(f"from pyvista_vdi.{CLASSES[word]} import {word}")
+            found.setdefault(f"pyvista_vdi.{CLASSES[word]}", []).append(word)
         elif home and (word == "overload" or word[0].isupper()):
-            lines.append(f"from {home} import {word}")
-    return f'"""{about}, written by tests/api/test_stubs.py."""\n\n' + "\n".join(lines) + f"\n\n{text}"
+            found.setdefault(home, []).append(word)
+    for home, words in sorted(found.items()):
+        lines.append(wrapped(f"from {home} import (", ", ".join(words), ")").rstrip())
+    head = f'"""{about}, written by tests/api/test_stubs.py."""\n# fmt: off\n# ruff: noqa: I001'
+    return "\n".join([head, "", *lines, "", text])
 
 
 def stubs():
@@ -97,37 +112,33 @@ def stubs():
     made = made.replace(parameters=[inspect.Parameter("self", 0), *made.parameters.values()])
     text += "class Settings:\n    given: dict[str, Any]\n"
     text += "".join(f"    {name}: {told.kind}\n" for name, told in Settings.declared.items())
-    text += "    " + definition(type("", (), {"__signature__": made}), "__init__", **{"return": None})
+    maker = type("", (), {"__signature__": made})
+    text += definition(maker, "__init__", margin="    ", **{"return": None})
     yield "api/__init__.pyi", stub("The public functions and their options", text)
     pytest.importorskip("pyvista")
     from pyvista_vdi.plotting.component import AddVDI
 
     text = "class Plotter(pv.Plotter):\n    add_vdi_clip_plane: AddVDIClipPlane\n"
     text += "    add_transfer_function_editor: AddTransferFunctionEditor\n    vdi: PlotterVDIs\n"
-    text += "    " + definition(AddVDI.__call__, "add_vdi")
+    text += definition(AddVDI.__call__, "add_vdi", margin="    ")
     yield "plotting/plotter.pyi", stub("A plotter with what this package adds", text)
-
-
-def statements(text):
-    """Return what a stub says, in whatever layout and order of imports."""
-    tree, said = ast.parse(text), []
-    for each in tree.body:
-        if isinstance(each, ast.ImportFrom):
-            said += [f"from {each.module} import {name.name}" for name in each.names]
-        else:
-            said.append(ast.unparse(each))
-    return sorted(said)
+    text = "class OptionMethods:\n"
+    for each in dataclasses.fields(GenerationOptions):
+        if each.name != "lights":
+            name = each.name.title().replace("_", "")
+            kind = GenerationOptions.declared[each.name].kind
+            text += f"    def Set{name}(self, value: {kind}) -> None: ...\n"
+            text += f"    def Get{name}(self) -> {each.type}: ...\n"
+    about = "Set and Get of each option of how a VDI is made"
+    yield "vtk_pipeline/filters/option_methods.pyi", stub(about, text)
 
 
 def test_stubs_are_those_of_the_records():
     for file, text in stubs():
         found = (PACKAGE / file).read_text(encoding="utf-8")
-        assert statements(found) == statements(text), f"{file}: python {__file__}"
+        assert found == text, f"{file} is not of the records: python {__file__}"
 
 
 if __name__ == "__main__":
     for file, text in stubs():
-        path = PACKAGE / file
-        path.write_text(text, encoding="utf-8")
-        for command in (["format", "-q"], ["check", "-q", "--fix"]):
-            subprocess.run([sys.executable, "-m", "ruff", *command, path], check=True)
+        (PACKAGE / file).write_text(text, encoding="utf-8")

@@ -69,7 +69,7 @@ def a_page_without_all(plotter, tmp_path):
 
 
 def a_view_from_inside(plotter, tmp_path):
-    plotter.add_vdi(VALUES, coverage="bounds", draw="vdi")
+    plotter.add_vdi(VALUES, settings=pvdi.Settings(coverage="bounds"), draw="vdi")
     plotter.camera.position, plotter.camera.focal_point = (5, 5, 5), (6, 5, 5)
     plotter.camera_set = True
     plotter.screenshot(return_img=True)

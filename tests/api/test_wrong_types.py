@@ -22,7 +22,6 @@ from pyvista_vdi.cli import main
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import declared
-from pyvista_vdi.model.volume import Grid
 
 PACKAGE = Path(pvdi.__file__).parent
 ARRAY = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)
@@ -86,6 +85,8 @@ OF_GENERATE = [
     for each in inspect.signature(pvdi.generate).parameters.values()
     if each.name not in (*MADE, *LOOK) and each.kind is not each.VAR_KEYWORD
 ]
+#: Settings that generate has no use for.
+_OF_PICTURES = ("transmittance_cutoff", "adjust_multi_samples", "regenerate_below", "coverage")
 #: For each entry: the function, what is right, and further arguments.
 ENTRIES = {
     "generate": lambda vdi: (pvdi.generate, TABLED, OF_GENERATE),
@@ -97,16 +98,21 @@ ENTRIES = {
     "estimate": lambda vdi: (
         pvdi.estimate,
         {"volume": VOLUME, "window_size": SIZE, "transfer_function": TABLE},
-        ["max_supersegments", "criterion", "ambient_occlusion", "memory_limit", "device"],
+        ["max_supersegments", "ambient_occlusion", "settings", "device"],
     ),
     "render_volume": lambda vdi: (
         pvdi.render_volume,
         TABLED,
         [
-            *("sample_distance", "opaque_depth", "clipping_planes", "cropping", "lights"),
-            *("early_termination", "skip_empty", "ambient_occlusion", "memory_limit"),
-            "opacity_multiplier",
+            *("opaque_depth", "clipping_planes", "cropping", "lights"),
+            *("early_termination", "ambient_occlusion", "opacity_multiplier", "settings"),
         ],
+    ),
+    "Settings": lambda vdi: (pvdi.Settings, {}, None),
+    "Settings of a VDI": lambda vdi: (
+        lambda **given: pvdi.generate(**TABLED, settings=pvdi.Settings(**given)),
+        {},
+        [name for name in pvdi.Settings.declared if name not in _OF_PICTURES],
     ),
     "render": lambda vdi: (pvdi.render, {"vdi": vdi, "camera": CAMERA}, None),
     "several": lambda vdi: (pvdi.render, {"vdi": [vdi, vdi], "camera": CAMERA}, None),
@@ -142,12 +148,6 @@ ENTRIES = {
         | {"every": 1, "values": ARRAY, "first": (0, 0, 0), "at": 0.0, "overwrite": True}
         | {"comm": OneRank(), "transfer_function": TABLE},
         ["spacing", "origin", "append", "device", "max_supersegments"],
-    ),
-    "generate_on_mpi": lambda vdi: (
-        importlib.import_module("pyvista_vdi.extensions.large.on_mpi").generate_on_mpi,
-        {"values": ARRAY, "first": (0, 0, 0), "grid": Grid.of(VOLUME), "camera": CAMERA}
-        | {"window_size": SIZE, "transfer_function": TABLE, "comm": OneRank()},
-        ["options", "device", "name", "metadata", "tolerance"],
     ),
     "Volume": lambda vdi: (pvdi.Volume, {"array": ARRAY}, None),
     "Camera": lambda vdi: (

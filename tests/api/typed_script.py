@@ -23,10 +23,9 @@ def without_vtk(folder: Path) -> pvdi.VDI:
         camera,
         (64, 48),
         max_supersegments=10,
-        tolerance=0.01,
+        settings=pvdi.Settings(tolerance=0.01, memory_limit="1 GiB"),
         lights=[pvdi.Light()],
         ambient_occlusion=True,
-        memory_limit="1 GiB",
         progress=print,
         transfer_function=table,
     )
@@ -37,7 +36,7 @@ def without_vtk(folder: Path) -> pvdi.VDI:
         (64, 48),
         clipping_planes=[(5, 4, 9, 1, 0, 0)],
         cropping=(0, 5, 0, 5, 0, 5),
-        transmittance_cutoff=0.004,
+        settings=pvdi.Settings(transmittance_cutoff=0.004),
     )
     depth = pvdi.render_depth(vdi, camera, opaque_depth=np.full((48, 64), np.inf))
     several = pvdi.render([vdi, vdi], camera, opacity_multiplier=[1.0, 0.5])

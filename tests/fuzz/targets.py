@@ -609,8 +609,7 @@ class _Session:
         return np.full(size[::-1], self.choices.number(), np.float64)
 
     def cuts(self, size: Any) -> dict[str, Any]:
-        ends = {"clipping_planes": self.planes(), "opaque_depth": self.ends(size)}
-        return {**ends, "skip_empty": self.choices.chance(2)}
+        return {"clipping_planes": self.planes(), "opaque_depth": self.ends(size)}
 
     def options(self, known: dict[str, tuple[Any, ...]]) -> dict[str, Any]:
         given = {}
@@ -623,11 +622,12 @@ class _Session:
         options = self.options(
             {"max_supersegments": (1, 5, 20), "tolerance": (0.1,), "view_cone": (0, 90, 30)}
         )
+        seldom = {name: options.pop(name) for name in ("tolerance", "view_cone") if name in options}
         step = self.choices.pick((None, 0.5, 3, 0, "x", float("nan"), 1e300, -1))
         made = pvdi.generate(
             *(self.volume, self.camera, self.size()),
             transfer_function=self.table,
-            sample_distance=step,
+            settings=pvdi.Settings(sample_distance=step, **seldom),
             **options,
         )
         _check_valid(made)

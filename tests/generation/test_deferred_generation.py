@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
@@ -218,7 +219,9 @@ def test_what_cannot_be_deferred_is_refused_by_name(runtime, asked, error, says)
     volume, camera = columns(np.random.default_rng(9).random(EDGES[::-1]).astype(np.float32))
     with pytest.raises(error, match=says):
         pvdi.generate(
-            volume, camera, (NX, NY), device=runtime, **{"classification": "deferred", **asked}
+            *(volume, camera, (NX, NY)),
+            device=runtime,
+            **{"classification": "deferred", **with_settings(**asked)},
         )
 
 

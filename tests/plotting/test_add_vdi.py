@@ -151,7 +151,9 @@ def test_user_matrix_name_pickable_and_culling(plotter):
 
 
 def test_the_view_is_that_of_the_first_frame_and_kept_while_nothing_changes(plotter, calls):
-    actor = plotter.add_vdi(soft_ball(), coverage="view", draw="vdi", **LOOKS)
+    actor = plotter.add_vdi(
+        soft_ball(), settings=pvdi.Settings(coverage="view"), draw="vdi", **LOOKS
+    )
     plotter.camera_position = view(9, 1, 1)
     shown(plotter)
     made = actor.vdi
@@ -190,7 +192,9 @@ def test_given_camera_and_the_scale_of_the_renderer(plotter):
     plotter.set_scale(zscale=2.0)
     camera = pv.Camera()
     camera.position, camera.focal_point, camera.up = view(0, 7, 0)
-    actor = plotter.add_vdi(soft_ball(), camera=camera, coverage="view", **LOOKS)
+    actor = plotter.add_vdi(
+        soft_ball(), camera=camera, settings=pvdi.Settings(coverage="view"), **LOOKS
+    )
     shown(plotter)
     assert actor.vdi.camera.position == (0, 7, 0)
     np.testing.assert_array_equal(actor.vdi.camera.model_transform, np.diag([1, 1, 2, 1]))
@@ -235,7 +239,7 @@ def test_changed_property_and_data_generate_anew(plotter, calls):
 def test_what_has_changed_is_made_anew_from_the_frame_s_view(plotter, calls):
     """Off-screen as on it; a view that somebody chose, and ``regenerate="never"``, keep theirs."""
     volume = soft_ball()
-    actor = plotter.add_vdi(volume, coverage="view", draw="vdi", **LOOKS)
+    actor = plotter.add_vdi(volume, settings=pvdi.Settings(coverage="view"), draw="vdi", **LOOKS)
     shown(plotter)
     plotter.camera_position = view(0, 9, 1)
     plotter.render()
@@ -265,7 +269,9 @@ def test_settings_reach_the_generator(plotter):
         "tolerance": 0.01,
         "view_cone": 30.0,
     }
-    actor = plotter.add_vdi(soft_ball(), max_supersegments=3, ambient_occlusion=0.4, **settings)
+    actor = plotter.add_vdi(
+        soft_ball(), max_supersegments=3, ambient_occlusion=0.4, settings=pvdi.Settings(**settings)
+    )
     shown(plotter)
     made_by = actor.vdi.metadata
     assert actor.vdi.counts.max() <= 3

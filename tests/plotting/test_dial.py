@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from plugin_scenes import LOOKS, soft_ball
+from settings import with_settings
 from vtk_sources import SIZE, executions, ready_source, some_property
 from watched_windows import finish, small_vdi
 
@@ -11,9 +12,9 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.model.options import QualityTarget
 from pyvista_vdi.quality import probe as dial_measurement
-from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.quality.background import Worker, vdi_job
 from pyvista_vdi.quality.dial import LADDER
-from pyvista_vdi.quality.regeneration_policy import REGENERATE_BELOW
+from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 
@@ -29,7 +30,8 @@ def shown(plotter, **arguments):
 
 
 def test_the_status_says_what_was_chosen_and_is_predicted(plotter):
-    actor = shown(plotter, quality="balanced", status=True)
+    actor = shown(plotter, quality="balanced")
+    actor.show_status(plotter)
     status = actor.status
     assert status.dial == actor.vdi.metadata["dial"]
     assert status.dial["asked"] == {"quality": "balanced"}
@@ -65,7 +67,7 @@ def test_precision_and_limits_reach_the_vdi(plotter):
         ({}, None),
         ({"quality": "high"}, REGENERATE_BELOW),  # .98 less .02 is above it
         ({"quality": "fast"}, 0.91),
-        ({"target_ssim": 0.5, "regenerate_below": 0.3}, 0.3),
+        ({"target_ssim": 0.5, "settings": pvdi.Settings(regenerate_below=0.3)}, 0.3),
         ({"max_bytes": 1e9}, None),
     ],
 )
@@ -80,7 +82,7 @@ def test_views_regenerate_below_what_was_asked_for(plotter, arguments, bound):
         ({"quality": "best"}, "quality must be one of"),
         ({"quality": "fast", "target_ssim": 0.9}, "give one of them"),
         ({"quality": "fast", "max_supersegments": 9}, "max_supersegments=9"),
-        ({"full_fps": -1}, "target_fps must be"),
+        ({"full_fps": -1}, "full_fps must be"),
         ({"precision": "half"}, "precision must be .exact. or .8-byte."),
     ],
 )
@@ -101,7 +103,7 @@ def test_a_source_makes_what_generate_makes():
     assert source.GetDial() == QualityTarget("high", **asked)
     looks = {"volume_property": some_property()}
     expected = pvdi.generate(
-        soft_ball(12), source.GetCamera(), SIZE, quality="high", **asked, **looks
+        soft_ball(12), source.GetCamera(), SIZE, quality="high", **with_settings(**asked), **looks
     )
     assert source.GetVDI().equals(expected)
     assert source.GetVDI().metadata["dial"]["chosen"] == expected.metadata["dial"]["chosen"]
@@ -148,9 +150,9 @@ def test_what_is_made_in_the_background_is_chosen_there():
     source.SetDial("balanced")
     request = source.MakeRequest()
     dial_measurement.forget()
-    with BackgroundGeneration() as background:
-        background.start(request.generation, target=request.target)
-        finish()
-        made = background.take()
+    background = Worker("pyvista-vdi generation")
+    background.put(vdi_job(request.generation, request.target))
+    finish()
+    made = background.take()
     assert made.equals(source.GetVDI())
     assert made.metadata["dial"]["asked"] == {"quality": "balanced"}

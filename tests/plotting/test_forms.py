@@ -18,6 +18,7 @@ from plugin_scenes import (
     vdi_of_one_list,
 )
 from pyvista.plotting.plotter import _ALL_PLOTTERS
+from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -113,7 +114,9 @@ def test_a_plane_widget_clips_as_it_clips_a_volume(given):
     def scene(plotter, add):
         if add is add_ours and given == "volume":
             looks = {"interpolation": "linear", "sample_distance": 0.02, "max_supersegments": 64}
-            widget = plotter.add_vdi_clip_plane(soft_ball(), **plane, **looks, **LOOKS)
+            widget = plotter.add_vdi_clip_plane(
+                soft_ball(), **plane, **with_settings(**looks), **LOOKS
+            )
             assert widget.IsA("vtkImplicitPlaneWidget")
         else:
             actor = add(plotter, soft_ball())

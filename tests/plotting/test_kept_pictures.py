@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, add_judge, shown, soft_ball
+from settings import with_settings
 from skimage.metrics import structural_similarity
 
 import pyvista_vdi as pvdi
@@ -102,8 +103,8 @@ def test_who_says_when_vdis_are_made_says_it_off_screen(policy):
 def test_a_bound_that_was_given_is_what_does():
     angles = np.linspace(0, 3, 30)
     # Of the view itself the VDI is exact; it is not tried again
-    assert film(angles, regenerate_below=0.99999)[1].count("vdi") <= 3
-    assert "vdi" in film(angles, regenerate_below=0.5)[1]
+    assert film(angles, settings=pvdi.Settings(regenerate_below=0.99999))[1].count("vdi") <= 3
+    assert "vdi" in film(angles, settings=pvdi.Settings(regenerate_below=0.5))[1]
 
 
 def _added_late(plotter, add):
@@ -151,7 +152,7 @@ def test_every_view_is_as_with_vtks_mapper(pair, script, made):
     looks = {**LOOKS, "interpolation": "linear", "sample_distance": 0.02}
 
     def add():
-        actor = ours.add_vdi(soft_ball(), **looks)
+        actor = ours.add_vdi(soft_ball(), **with_settings(**looks))
         if made:
             ours.render()
             shown(ours)
@@ -211,7 +212,7 @@ def test_volumes_that_overlap_are_right_in_whatever_order_they_came(first, plott
 
 
 def test_a_volume_in_bricks_has_its_picture(plotter):
-    actor = plotter.add_vdi(soft_ball(80), memory_limit="12 MB", **LOOKS)
+    actor = plotter.add_vdi(soft_ball(80), settings=pvdi.Settings(memory_limit="12 MB"), **LOOKS)
     plotter.camera_position = VIEW
     picture = shown(plotter)
     assert actor.status.drawn == "volume"

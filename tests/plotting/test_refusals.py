@@ -10,6 +10,7 @@ import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball, vdi_of_one_list
 from pyvista.plotting.mapper import SmartVolumeMapper
+from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import errors
@@ -115,7 +116,7 @@ ROWS = {
 @pytest.mark.parametrize(("volume", "arguments", "error", "message"), ROWS.values(), ids=ROWS)
 def test_add_vdi_refuses(plotter, volume, arguments, error, message):
     with pytest.raises(error, match=re.compile(message, re.DOTALL)):
-        plotter.add_vdi(volume, **arguments)
+        plotter.add_vdi(volume, **with_settings(**arguments))
     assert not plotter.renderer.actors, "something was added although it was refused"
     assert not plotter.scalar_bars
 

@@ -7,7 +7,6 @@ import os
 import sys
 import threading
 import time
-import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.generation import generate
 from pyvista_vdi.quality import background
-from pyvista_vdi.quality.background import BackgroundGeneration
+from pyvista_vdi.quality.background import Worker, vdi_job
 from pyvista_vdi.raycasting import raycast
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.volume.upload import uploads_of
@@ -55,7 +54,27 @@ def make(runtime, camera=CAMERA, **options):
 
 def start(generator, camera=CAMERA, key=None, **options):
     asked = request(VOLUME, camera, WINDOW, TRANSFER, **IN_SLICES, **options)
-    generator.start(asked, key=key)
+    begin(generator, asked, key)
+
+
+def begin(generator, asked, key=None):
+    generator.put(vdi_job(asked.replace(device=generator.device), key=key))
+
+
+def key_of(generator):
+    return None if generator.job is None else generator.job.key
+
+
+def cancel(generator):
+    """Cancel, and wait for the thread."""
+    generator.clear()
+    generator.join()
+
+
+def new_generator(runtime):
+    generator = Worker(THREAD_NAME)
+    generator.device = runtime
+    return generator
 
 
 def finish(generator):
@@ -77,8 +96,10 @@ def threads():
 
 @pytest.fixture
 def generator(runtime):
-    with BackgroundGeneration(runtime) as made:
-        yield made
+    made = new_generator(runtime)
+    yield made
+    made.close()
+    made.join()
     assert not threads()
 
 
@@ -137,7 +158,7 @@ def test_the_same_bytes(runtime, generator, dtype, parallel):
     """As generate_vdi, which does not work in pieces; of a volume that is not there yet, too."""
     volume, camera = scene(dtype)
     camera = camera.replace(parallel_projection=parallel, parallel_scale=15.0)
-    generator.start(request(volume, camera, WINDOW, TRANSFER, **IN_SLICES, metadata={"a": 1}))
+    begin(generator, request(volume, camera, WINDOW, TRANSFER, **IN_SLICES, metadata={"a": 1}))
     made = taken(generator)
     expected = generate_vdi(
         scene(dtype)[0], camera, WINDOW, TRANSFER, device=runtime, **OPTIONS, metadata={"a": 1}
@@ -161,70 +182,34 @@ def test_pieces_of_any_size_give_the_same_bytes(runtime, generator, monkeypatch)
 
 def test_a_vdi_is_taken_once_and_is_on_the_device(runtime, generator, gate):
     assert generator.take() is None
-    assert (generator.running, generator.key, generator.progress) == (False, None, None)
+    assert (generator.running, key_of(generator), generator.progress) == (False, None, None)
     start(generator, key=("view", 1))
     gate.wait()
     assert generator.running
-    assert generator.key == ("view", 1)
+    assert key_of(generator) == ("view", 1)
     assert 0.4 <= generator.progress < 1
     assert generator.take() is None
     gate.open()
     finish(generator)
     assert generator.progress is None
-    assert generator.key == ("view", 1)  # until it is taken
+    assert key_of(generator) == ("view", 1)  # until it is taken
     vdi = generator.take()
     assert generator.take() is None
-    assert generator.key is None
+    assert key_of(generator) is None
     before = runtime.allocated
     prepared_vdi(runtime, vdi)
     assert runtime.allocated == before
     assert not threads()  # ends by itself
 
 
-def test_on_finished_is_called_when_there_is_something_to_take(runtime):
-    calls, called = [], threading.Event()
-
-    def finished():
-        calls.append((threading.current_thread().name, generator.running))
-        called.set()
-
-    with BackgroundGeneration(runtime, on_finished=finished) as generator:
-        for options in ({}, {"sample_distance": -1}):
-            start(generator, **options)
-            assert called.wait(PATIENCE)
-            called.clear()
-            assert calls.pop() == (THREAD_NAME, False)
-            assert not calls
-            if options:
-                with pytest.raises(InvalidArgumentError):
-                    generator.take()
-            else:
-                assert generator.take() is not None
-
-
-def test_the_worker_may_cancel_and_start_in_on_finished(runtime):
-    """What on_finished calls must not wait for the thread that it is called from."""
-    called = threading.Event()
-
-    def finished():
-        generator.cancel(wait=True)
-        if not called.is_set():
-            start(generator, key="second")
-        called.set()
-
-    with BackgroundGeneration(runtime, on_finished=finished) as generator:
-        start(generator, key="first")
-        assert called.wait(PATIENCE)
-
-
 def test_cancelling_in_the_middle(runtime, generator, before, gate):
     start(generator)
     gate.wait()
     assert runtime.allocated > before
-    generator.cancel()
-    assert (generator.running, generator.key, generator.progress) == (False, None, None)
+    generator.clear()
+    assert (generator.running, key_of(generator), generator.progress) == (False, None, None)
     gate.open()
-    generator.cancel(wait=True)
+    cancel(generator)
     assert not threads()
     assert memory_in_use(runtime) == before
     assert generator.take() is None
@@ -236,11 +221,26 @@ def test_cancelling_while_a_frame_is_drawn(runtime, generator):
     """The thread waits for the frame's end, and the frame waits for the thread's."""
     with runtime.foreground():
         start(generator)
-        generator.cancel(wait=True)
+        cancel(generator)
         assert not threads()
         start(generator)
         generator.close()
+        generator.join()
         assert not threads()
+
+
+def test_what_is_paused_leaves_the_device_to_frames_and_goes_on(runtime, generator, gate):
+    start(generator)
+    gate.wait()
+    generator.pause(PATIENCE)
+    gate.open()
+    for _ in range(3):  # which wait for no turn of it
+        with runtime.foreground():
+            pass
+    assert generator.running
+    assert generator.take() is None
+    generator.pause(0)
+    assert taken(generator).equals(make(runtime))
 
 
 def test_a_new_start_replaces_what_is_being_made(runtime, generator, gate):
@@ -249,16 +249,16 @@ def test_a_new_start_replaces_what_is_being_made(runtime, generator, gate):
     gate.wait()
     start(generator, views[1], key=1)
     start(generator, views[2], key=2)
-    assert (generator.key, generator.progress) == (2, 0)
+    assert (key_of(generator), generator.progress) == (2, 0)
     gate.open()
     vdi = taken(generator)
     assert vdi.equals(make(runtime, views[2]))
     assert generator.take() is None
 
 
-def test_what_is_finished_too_late_is_dropped(runtime, monkeypatch):
+def test_what_is_finished_too_late_is_dropped(runtime, generator, monkeypatch):
     """After its last piece of work nothing stops a generation: it may not pass for the next one."""
-    finished, replaced, calls = threading.Event(), threading.Event(), []
+    finished, replaced = threading.Event(), threading.Event()
 
     def render_and_wait(*arguments, **options):
         raycast.render_vdi(*arguments, **options)
@@ -267,35 +267,31 @@ def test_what_is_finished_too_late_is_dropped(runtime, monkeypatch):
             replaced.wait(PATIENCE)
 
     monkeypatch.setattr(background, "render_vdi", render_and_wait)
-    with BackgroundGeneration(runtime, on_finished=lambda: calls.append(1)) as generator:
-        start(generator, key="old")
-        assert finished.wait(PATIENCE)
-        start(generator, CAMERA.azimuth(10), key="new")
-        replaced.set()
-        vdi = taken(generator)
-        generator.cancel(wait=True)
-    assert vdi.equals(make(runtime, CAMERA.azimuth(10)))
-    assert calls == [1]
+    start(generator, key="old")
+    assert finished.wait(PATIENCE)
+    start(generator, CAMERA.azimuth(10), key="new")
+    replaced.set()
+    assert taken(generator).equals(make(runtime, CAMERA.azimuth(10)))
 
 
 def test_what_was_not_taken_is_replaced_or_dropped(runtime, generator, before):
     start(generator, key=1)
     finish(generator)
     start(generator, CAMERA.azimuth(10), key=2)
-    assert generator.key == 2
+    assert key_of(generator) == 2
     assert taken(generator).equals(make(runtime, CAMERA.azimuth(10)))
     start(generator)
     finish(generator)
-    generator.cancel(wait=True)
+    cancel(generator)
     assert generator.take() is None
     assert memory_in_use(runtime) == before
 
 
 def test_closing_in_the_middle(runtime, gate):
-    generator = BackgroundGeneration(runtime)
+    generator = new_generator(runtime)
     start(generator)
     gate.wait()
-    closing = threading.Thread(target=generator.close)
+    closing = threading.Thread(target=lambda: (generator.close(), generator.join()))
     closing.start()
     finish(generator)  # it is cancelled, and waited for
     assert closing.is_alive()
@@ -309,33 +305,19 @@ def test_closing_in_the_middle(runtime, gate):
     assert generator.take() is None
 
 
-def test_collected_in_the_middle(runtime, gate):
-    generator = BackgroundGeneration(runtime, on_finished=lambda: pytest.fail("nobody is there"))
-    start(generator)
-    gate.wait()
-    (thread,) = threads()
-    gone = weakref.ref(generator)
-    del generator
-    gc.collect()
-    assert gone() is None
-    gate.open()
-    thread.join(PATIENCE)
-    assert not thread.is_alive()
-    assert len(gate.cancelled) == 1
-
-
 def test_the_interpreter_ends_in_the_middle(runtime):
     code = f"""
 import numpy as np
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.options import GenerationRequest
-from pyvista_vdi.quality.background import BackgroundGeneration
-generator = BackgroundGeneration({runtime.info.selector!r}, on_finished=lambda: print("made"))
+from pyvista_vdi.quality.background import Worker, vdi_job
+generator = Worker("pyvista-vdi generation")
 volume = Volume(np.random.default_rng(0).random((100, 100, 100)).astype("f4"))
 transfer = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 1))
 camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))
-generator.start(GenerationRequest(volume, transfer, camera, (1280, 720)))
+request = GenerationRequest(volume, transfer, camera, (1280, 720), device={runtime.info.selector!r})
+generator.put(vdi_job(request))
 while generator.running and not generator.progress:
     pass
 assert generator.running
@@ -349,7 +331,7 @@ def test_an_error_is_raised_once(runtime, generator, before):
     with pytest.raises(InvalidArgumentError, match="sample_distance must be"):
         taken(generator)
     assert generator.take() is None
-    assert (generator.running, generator.key) == (False, None)
+    assert (generator.running, key_of(generator)) == (False, None)
     assert runtime.allocated == before
     start(generator)
     assert taken(generator).equals(make(runtime))
@@ -363,7 +345,7 @@ def test_a_lack_of_memory(runtime, generator, before, monkeypatch, where):
             patched.setattr(runtime, "info", replace(runtime.info, max_allocation=1000))
         else:
             let_lack(patched, runtime, where)
-        generator.start(request(VOLUME, CAMERA, WINDOW, TRANSFER, **OPTIONS))
+        begin(generator, request(VOLUME, CAMERA, WINDOW, TRANSFER, **OPTIONS))
         finish(generator)
         assert memory_in_use(runtime) == before
         with pytest.raises(DeviceMemoryError):
@@ -397,7 +379,7 @@ def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):
         volume = Volume(np.random.default_rng(seed).random((100, 100, 100)))
         transfer = TRANSFER.replace(scalar_range=(0, 1))
         camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))
-        generator.start(request(volume, camera, WINDOW, transfer))
+        begin(generator, request(volume, camera, WINDOW, transfer))
         while generator.running and not uploads_of(volume).lock.locked():
             pass  # the worker comes first, or not at all
         image = None
@@ -432,7 +414,7 @@ def test_many_regenerations_leave_nothing(runtime, generator):
 
     def regenerate(vdi, k):
         view = CAMERA.azimuth(k % 60)
-        generator.start(request(VOLUME, view, window, TRANSFER))
+        begin(generator, request(VOLUME, view, window, TRANSFER))
         frames = 0
         while generator.running or frames == 0:
             with runtime.foreground():
@@ -451,7 +433,7 @@ def test_many_regenerations_leave_nothing(runtime, generator):
     gc.collect()
     # Whether an array is used in place depends on where the allocator puts it
     assert abs(runtime.allocated - allocated) <= vdi.offsets.nbytes
-    generator.cancel(wait=True)
+    cancel(generator)
     assert threading.active_count() == others
     if resident is not None and sys.platform == "linux":
         assert resident_bytes() - resident < RAM_TOLERANCE

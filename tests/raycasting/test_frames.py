@@ -65,7 +65,9 @@ def test_no_channel_loses_more_than_the_cutoff(runtime):
         default = render_vdi(vdi, camera, device=runtime)
         same = render_vdi(vdi, camera, transmittance_cutoff=TRANSMITTANCE_CUTOFF, device=runtime)
         np.testing.assert_array_equal(default, same)
-        rough = pvdi.render(vdi, camera, transmittance_cutoff=0.9, device=runtime)
+        rough = pvdi.render(
+            vdi, camera, settings=pvdi.Settings(transmittance_cutoff=0.9), device=runtime
+        )
         changed += int((rough != default).any())
     assert changed >= 3
 

@@ -14,6 +14,9 @@ from ray_scenes import random_ends
 from reference import raycast as oracle
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.raycasting.picking import FirstHit
+from pyvista_vdi.raycasting.raycast import render_first_hits
 
 #: All but the view at half size, in which every ray runs along borders: which of two lists is met
 #: is then a matter of rounding.
@@ -120,11 +123,10 @@ def test_the_kernel_sees_the_same_depth(runtime, kind):
     different = total = hits = 0
     for vdi, camera, size, pixels in cases(kind):
         for options in THRESHOLDS:
-            depth, everywhere = (
-                pvdi.render_depth(vdi, camera, size, skip_empty=skip, device=runtime, **options)
-                for skip in (True, False)
-            )
-            assert np.array_equal(depth, everywhere)
+            depth = pvdi.render_depth(vdi, camera, size, device=runtime, **options)
+            request = FrameRequest(camera, size, RenderOptions(skip_empty=False), device=runtime)
+            hit = FirstHit.of(*options.values())
+            assert np.array_equal(depth, render_first_hits(vdi, request, hit))
             for x, y in pixels:
                 hit = pvdi.pick(vdi, camera, (x, y), size, **options)
                 expected = np.inf if hit is None else hit.depth

@@ -169,7 +169,7 @@ class Load:
             max_supersegments=int(self.rng.integers(2, 13)),
             draw="vdi",  # off-screen a volume would draw most of these views itself
             regenerate="auto",
-            regenerate_below=0.9,
+            settings=pvdi.Settings(regenerate_below=0.9),
             show_scalar_bar=bool(self.rng.random() < 0.5),
         )
         if self.outcome.volumes == 0:

@@ -30,8 +30,9 @@ from trame_server.protocol import CoreServer
 from trame_vtk.modules.vtk import get_helper
 from wslink.chunking import UnChunker, generate_chunks
 
+import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning
-from pyvista_vdi.quality.frame_rate import FrameRateController
+from pyvista_vdi.quality.rate import FrameRate
 
 LONG = 250.0
 WINDOW = (241, 203)
@@ -179,7 +180,7 @@ async def shows(plotter, volume, browser):
 
 async def follows_the_view():
     """A remote view: previews, a VDI of the view at rest, and changes, as on screen."""
-    plotter, actor, volume = scene(regenerate_below=0.9999)
+    plotter, actor, volume = scene(settings=pvdi.Settings(regenerate_below=0.9999))
     async with served(plotter, "server") as (server, _), browsing(plotter, server) as browser:
         await turned_by_hand(plotter, actor, volume, browser)
         await changed(plotter, actor, volume, browser)
@@ -223,7 +224,7 @@ def main():
     """Run all cases, or those that are named."""
     warnings.simplefilter("error", VDIWarning)
     # Every preview as coarse as it may be, whatever frames take
-    FrameRateController.choose = lambda controller, full: 1
+    FrameRate.chosen = lambda rate, full: 1
     failed = 0
     for case in CASES:
         if len(sys.argv) > 1 and case.__name__ not in sys.argv[1:]:

@@ -23,8 +23,8 @@ from skimage.io import imread
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.plotting import refinement
-from pyvista_vdi.quality.frame_rate import FrameRate
-from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor
+from pyvista_vdi.quality.rate import FrameRate
+from pyvista_vdi.vtk_pipeline.drawing.screen import Scissor
 from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtk_to_numpy, vtkUnsignedCharArray
 
 LONG = 250.0
@@ -149,7 +149,8 @@ def multisampling_goes_while_late_and_is_back_at_rest():
 
 def new_vdi_appears_by_itself():
     """At rest a VDI is made behind the frames, and shown without a frame being asked for."""
-    plotter, actor = scene(regenerate="auto", regenerate_below=0.9999, status=True)
+    plotter, actor = scene(regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9999))
+    actor.show_status(plotter)
     plotter.show(interactive_update=True, auto_close=False)
     old = actor.vdi
     hand = Hand(plotter)
@@ -214,7 +215,9 @@ def show_blocks_and_the_new_vdi_comes():
 
 def closing_in_the_middle():
     """Closing while a VDI is made leaves neither thread nor crash."""
-    plotter, actor = scene(sample_distance=0.002, regenerate=lambda status: status.angle > 5)
+    plotter, actor = scene(
+        settings=pvdi.Settings(sample_distance=0.002), regenerate=lambda status: status.angle > 5
+    )
     plotter.show(interactive_update=True, auto_close=False)
     plotter.camera.Azimuth(30)
     plotter.render()
@@ -229,7 +232,7 @@ def every_change_is_shown():
     plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
     volume = soft_ball()
     values = volume["v"].copy()
-    actor = plotter.add_vdi(volume, sample_distance=0.002, **LOOKS)
+    actor = plotter.add_vdi(volume, settings=pvdi.Settings(sample_distance=0.002), **LOOKS)
     plotter.show(interactive_update=True, auto_close=False)
     shown = []
     for step in range(20):
@@ -260,7 +263,7 @@ def a_movie_has_every_step():
     with tempfile.TemporaryDirectory() as folder:
         name = f"{folder}/steps.gif"
         plotter = pv.Plotter(off_screen=False, window_size=(241, 203))
-        plotter.add_vdi(volume, sample_distance=0.002, **LOOKS)
+        plotter.add_vdi(volume, settings=pvdi.Settings(sample_distance=0.002), **LOOKS)
         plotter.show(interactive_update=True, auto_close=False)
         plotter.open_gif(name)
         for step in range(10):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkWindowToImageFilter
@@ -63,7 +64,7 @@ def add_ours(plotter: pv.Plotter, volume: pv.ImageData, **more: Any) -> Any:
     """``add_vdi`` with the same looks."""
     how = {"interpolation": "linear", "sample_distance": 0.02, "max_supersegments": 64}
     how["draw"] = "vdi"  # what is tested here; tests/drop_in has both
-    return plotter.add_vdi(volume, **{**how, **LOOKS, **more})
+    return plotter.add_vdi(volume, **with_settings(**{**how, **LOOKS, **more}))
 
 
 def add_nothing(plotter: pv.Plotter, volume: pv.ImageData, **more: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 
@@ -12,16 +11,17 @@ from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.quality import background
-from pyvista_vdi.quality.frame_rate import FrameRate
+from pyvista_vdi.quality.rate import FrameRate
 from pyvista_vdi.quality.view_error import ViewError
+from pyvista_vdi.vtk_pipeline.drawing import background as making
 from pyvista_vdi.vtk_pipeline.drawing import images
-from pyvista_vdi.vtk_pipeline.interaction import behind, window
+from pyvista_vdi.vtk_pipeline.interaction import window
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 
 #: Odd, so that no smaller image divides it.
 WINDOW = (121, 103)
 #: Seconds after which something that should have happened has not.
-LONG = 600.0
+LONG = 20.0
 MOVING, STILL = 30.0, 0.0001
 
 
@@ -59,15 +59,14 @@ def coarsest(monkeypatch):
 
 @pytest.fixture
 def counted(monkeypatch):
-    """A clock that counts a microsecond per ray, half of that with half the lists.
+    """A clock that counts a microsecond per ray; ``dear`` is how many microseconds it is.
 
-    VDIs that are drawn together take none of it. It keeps the windows of the VDIs that were
-    raycast. ``dear`` is how many microseconds it is.
+    VDIs that are drawn together take none of it.
     """
 
     class Clock:
         def __init__(self):
-            self.now, self.windows, self.dear = 0.0, [], 1.0
+            self.now, self.dear = 0.0, 1.0
 
         def perf_counter(self):
             return self.now
@@ -76,9 +75,7 @@ def counted(monkeypatch):
     render_vdi = images.render_vdi
 
     def timed(vdi, request):
-        clock.windows.append(vdi.window_size)
-        lists = math.prod(vdi.window_size) / max(map(math.prod, clock.windows))
-        clock.now += clock.dear * 1e-6 * request.size[0] * request.size[1] * lists
+        clock.now += clock.dear * 1e-6 * request.size[0] * request.size[1]
         return render_vdi(vdi, request)
 
     monkeypatch.setattr(images, "render_vdi", timed)
@@ -105,7 +102,7 @@ def no_estimates(monkeypatch):
             answer.camera, answer.shown = camera, shown
             return ViewError(answer.ssim, 0.0, 0.0, 1.0, 1)
 
-    monkeypatch.setattr(behind, "ViewErrorEstimator", Estimator)
+    monkeypatch.setattr(making, "ViewErrorEstimator", Estimator)
     return answer
 
 

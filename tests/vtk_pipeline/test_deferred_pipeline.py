@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plugin_scenes import soft_ball
+from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, UnsupportedError
@@ -50,7 +51,7 @@ def test_a_source_keeps_values_and_a_property_classifies_them(default_runtime, m
     keeping, prop = source(), some_property()
     kept = keeping.GetVDI()
     direct = {"classification": "deferred", **KEPT, "device": default_runtime}
-    assert kept.equals(pvdi.generate(soft_ball(12), CAMERA, SIZE, **direct))
+    assert kept.equals(pvdi.generate(soft_ball(12), CAMERA, SIZE, **with_settings(**direct)))
     monkeypatch.setattr("pyvista_vdi.vtk_pipeline.filters.source.generate_deferred", None)
     picture = VDIToImage()
     picture.SetInputConnection(keeping.GetOutputPort())

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, add_judge, shown, soft_ball
 from skimage.metrics import structural_similarity
-from watched_windows import MOVING, WINDOW, finish, frame, frames_until, small_vdi, watched
+from watched_windows import MOVING, WINDOW, finish, frame, small_vdi, watched
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.quality import decide
-from pyvista_vdi.quality.frame_state import FrameTook
-from pyvista_vdi.quality.pace import HEADROOM
+from pyvista_vdi.quality.costs import Costs
+from pyvista_vdi.quality.rate import HEADROOM
 
 pytestmark = pytest.mark.gl
 
@@ -81,18 +78,18 @@ def chosen(monkeypatch):
         way = "volume"
         asked = ()
 
-    def choose(costs, angle, pixels, seconds, ssim=None, bound=0.0):
+    def better(costs, angle, pixels, seconds, ssim, bound):
         Chosen.asked = angle, pixels, seconds
-        return replace(costs, way=Chosen.way), Chosen.way
+        return Chosen.way
 
-    monkeypatch.setattr(decide, "choose", choose)
+    monkeypatch.setattr(Costs, "better", better)
     return Chosen
 
 
 def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, chosen):
     chosen.way = "vdi"
     actor = watched(plotter, draw="auto", interpolation="linear", max_supersegments=64)
-    frames_until(plotter, lambda: actor.mapper.GetVDI() is not None)  # made behind the frames
+    assert actor.vdi is not None  # asked for
     by_vdi = frame(plotter)
     assert actor.status.drawn == "vdi"
     chosen.way = "volume"
@@ -115,52 +112,16 @@ def test_auto_draws_what_was_chosen_and_brightness_does_not_jump(plotter, chosen
     assert seconds == pytest.approx(1 / 30 / HEADROOM)
 
 
-def test_in_motion_errors_are_estimated_of_vdis_that_are_drawn(
-    plotter, chosen, monkeypatch, no_estimates
-):
-    monkeypatch.setattr(decide, "ESTIMATE_PERIOD_IN_MOTION", 0.0)
-    no_estimates.ssim = 0.99
-    actor = watched(plotter, draw="auto", regenerate="auto")
-    frames_until(plotter, lambda: actor.mapper.GetVDI() is not None)
-    finish("estimate")
-
-    def asked():
-        for _ in range(3):
-            plotter.camera.azimuth += 40
-            frame(plotter, MOVING)
-            finish("estimate")
-        return no_estimates.asked
-
-    before = asked()
-    assert asked() == before, "frames of the volume have no error"
-    chosen.way = "vdi"
-    assert asked() > before
-
-
-def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_told(
-    plotter, chosen, monkeypatch
-):
-    actor = watched(plotter, draw="vdi")
-    finish("stand-in")
-    actor.mapper.SetDraw("auto")
-    actor.mapper.driver.tell(FrameTook("volume", 0.0, 1.0, 1e-3))  # a millisecond per ray
-    plotter.camera.azimuth = 40
-    frame(plotter, MOVING)
-    assert actor.status.drawn == "volume"
-    assert actor.status.samples == 30 * 26  # the floor: a sixteenth
-
-
 def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
-    """Clocks are set: a VDI's rays cost a thousand times a volume's, far from V_O."""
-    took = decide.took
+    """Clocks are set: a VDI's rays cost a thousand times a volume's, far from its view."""
+    took = Costs.took
 
-    def dear(costs, frame):
-        seconds = 1e-9 * frame.pixels * (1000 if frame.way == "vdi" else 1)
-        return took(costs, replace(frame, seconds=seconds))
+    def slow(costs, way, angle, pixels, _):
+        return took(costs, way, angle, pixels, 1e-9 * pixels * (1000 if way == "vdi" else 1))
 
-    monkeypatch.setattr(decide, "took", dear)
+    monkeypatch.setattr(Costs, "took", slow)
     actor = watched(plotter, draw="auto")
-    finish()  # the VDI is there from the next frame on, not from between the two
+    assert actor.vdi is not None
     finish("stand-in")  # pictures of the volume tell what its rays take
     plotter.camera.azimuth = 60
     frame(plotter)
@@ -169,6 +130,22 @@ def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
     actor.mapper.SetDraw("vdi")
     frame(plotter)
     assert actor.status.drawn == "vdi"
+
+
+def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_told(
+    plotter, chosen, monkeypatch
+):
+    took = Costs.took
+    monkeypatch.setattr(  # a millisecond per ray
+        Costs, "took", lambda costs, way, angle, *_: took(costs, way, angle, 1.0, 1e-3)
+    )
+    actor = watched(plotter, draw="vdi")
+    finish("stand-in")
+    actor.mapper.SetDraw("auto")
+    plotter.camera.azimuth = 40
+    frame(plotter, MOVING)
+    assert actor.status.drawn == "volume"
+    assert actor.status.samples == 30 * 26  # the floor: a sixteenth
 
 
 def test_volumes_that_overlap_are_drawn_by_their_vdis(plotter, chosen):

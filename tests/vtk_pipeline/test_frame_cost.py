@@ -10,7 +10,7 @@ from plugin_scenes import LOOKS, opaque_sphere, shown, soft_ball
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
 from pyvista_vdi.vtk_pipeline.drawing import images
-from pyvista_vdi.vtk_pipeline.drawing import texture as texture_module
+from pyvista_vdi.vtk_pipeline.drawing import screen as texture_module
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkTextureObject
 

@@ -8,7 +8,8 @@ import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
 from watched_windows import MOVING, frame, on_screen, turned, watched
 
-from pyvista_vdi.quality.pace import HEADROOM
+import pyvista_vdi as pvdi
+from pyvista_vdi.quality.rate import HEADROOM
 
 pytestmark = pytest.mark.gl
 
@@ -172,7 +173,7 @@ def test_only_vdis_that_are_shown_let_it_go(plotter, taken):
     second = plotter.add_vdi(
         soft_ball(8),
         target_fps=RATE,
-        adjust_multi_samples=False,
+        settings=pvdi.Settings(adjust_multi_samples=False),
         regenerate="never",
         draw="vdi",
         **LOOKS,

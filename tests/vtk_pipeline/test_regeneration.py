@@ -30,7 +30,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.interaction.behind import Estimators
+from pyvista_vdi.vtk_pipeline.drawing.background import Estimators
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -144,7 +144,7 @@ def test_what_goes_on_is_given_up_for_what_is_asked_for(plotter, gate):
 def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
     plotter, no_estimates
 ):
-    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    actor = coarse(plotter, regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9))
     old = actor.vdi
     frames(plotter, 3)
     assert no_estimates.asked == 0, "nothing has moved"
@@ -171,7 +171,7 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     plane.SetOrigin(0.1, 0.2, 0.3)
     plane.SetNormal(0.6, 0.0, 0.8)
     planes = (-0.4, 0.3, -0.2, 0.5, -0.4, 0.2)
-    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+    actor = coarse(plotter, regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9))
     old = actor.vdi
     actor.mapper.AddClippingPlane(plane)
     actor.mapper.SetCropping(1)
@@ -197,19 +197,18 @@ def test_the_estimate_is_of_the_picture_that_is_shown(plotter, no_estimates):
     assert actor.vdi is old
 
 
-def test_auto_bears_more_while_the_view_moves(plotter, no_estimates, gate):
-    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9)
+def test_nothing_is_estimated_or_made_while_a_hand_moves(plotter, no_estimates, gate):
+    actor = coarse(plotter, regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9))
     no_estimates.ssim = 0.85
-    plotter.camera.Azimuth(30)
-    frames_until(plotter, lambda: actor.status.ssim is not None, rate=MOVING)
-    frame(plotter, MOVING)
-    assert actor.status.progress is None
-    frame(plotter)
+    for _ in range(5):
+        turned(plotter, 10, MOVING)
+    assert (no_estimates.asked, actor.status.progress) == (0, None)
     frames_until(plotter, lambda: actor.status.progress is not None)
+    assert no_estimates.asked == 1
 
 
 def test_auto_with_the_real_estimate(plotter):
-    actor = coarse(plotter, regenerate="auto", regenerate_below=0.9999)
+    actor = coarse(plotter, regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9999))
     old = actor.vdi
     plotter.camera.Azimuth(60)
     frames_until(plotter, lambda: actor.vdi is not old)
@@ -290,7 +289,7 @@ def test_a_vdi_drawn_in_two_views_belongs_to_neither(no_estimates):
 
 
 def test_shallow_copies_share_a_source_and_keep_the_settings(plotter, no_estimates):
-    actor = watched(plotter, regenerate="auto", regenerate_below=0.8)
+    actor = watched(plotter, regenerate="auto", settings=pvdi.Settings(regenerate_below=0.8))
     copy = actor.copy(deep=False)
     assert copy.mapper.GetInteractiveOffScreen()
     assert copy.mapper.GetTargetFrameRate() == 30
@@ -343,7 +342,13 @@ def test_what_cannot_be_made_any_more_is_said_and_the_old_stays(plotter):
 def test_a_vdi_without_its_volume_says_once_for_each_cause_what_a_view_lacks(plotter):
     def vdi(view_cone, **changes):
         camera = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1), **changes)
-        return pvdi.generate(soft_ball(12), camera, WINDOW, view_cone=view_cone, **CLASSIFICATION)
+        return pvdi.generate(
+            soft_ball(12),
+            camera,
+            WINDOW,
+            settings=pvdi.Settings(view_cone=view_cone),
+            **CLASSIFICATION,
+        )
 
     actor = plotter.add_vdi(vdi(50.0))
     plotter.camera_position = ((5, 4, 3), (0, 0, 0), (0, 0, 1))
@@ -378,7 +383,8 @@ def test_a_vdi_without_its_volume_says_once_for_each_cause_what_a_view_lacks(plo
 def in_the_middle():
     """A plotter for which a VDI is being made."""
     plotter = pv.Plotter(window_size=WINDOW)
-    actor = watched(plotter, regenerate=beyond(10), status=True)
+    actor = watched(plotter, regenerate=beyond(10))
+    actor.show_status(plotter)
     turned(plotter, 30)
     assert actor.status.progress == 0.0
     assert len(threads()) == 1
@@ -407,7 +413,8 @@ def test_forgetting_a_scene_in_the_middle_leaves_no_thread(gate, no_leaks):
 
 def test_no_leaks_of_a_watched_scene(no_leaks):
     plotter = pv.Plotter(window_size=WINDOW)
-    actor = watched(plotter, regenerate=beyond(10), status=True)
+    actor = watched(plotter, regenerate=beyond(10))
+    actor.show_status(plotter)
     turned(plotter, 30, MOVING)
     frames_until(plotter, lambda: actor.status.generation == 2)
     plotter.screenshot()

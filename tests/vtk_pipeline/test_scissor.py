@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pyvista_vdi.vtk_pipeline.drawing.scissor import shown_box
+from pyvista_vdi.vtk_pipeline.drawing.screen import shown_box
 
 
 def interpolated(image, size):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
+from settings import with_settings
 from vtk_builds import vtk_or_skip
 from vtk_sources import SIZE, behind, camera_at, executions, ready_source, some_property
 
@@ -51,7 +52,11 @@ def test_it_makes_what_generate_makes():
     source = ready_source(**{names[name]: value for name, value in settings.items()})
     source.SetMemoryLimit("1 GiB")
     expected = pvdi.generate(
-        soft_ball(12), camera_at(5, 4, 3), SIZE, volume_property=some_property(), **settings
+        soft_ball(12),
+        camera_at(5, 4, 3),
+        SIZE,
+        volume_property=some_property(),
+        **with_settings(**settings),
     )
     assert source.GetVDI().equals(expected)
     assert source.GetVDI().metadata["ambient_occlusion"]["radius"] == 0.5
@@ -118,7 +123,7 @@ def test_options_are_set_one_by_one_or_all_at_once():
     source.SetOptions(GenerationOptions(tolerance=0.25, memory_limit="1 GiB"))
     assert source.GetMTime() > before
     assert (source.GetTolerance(), source.GetMemoryLimit()) == (0.25, 2**30)
-    source.SetViewCone(degrees=30)
+    source.SetViewCone(30)
     assert source.GetOptions() == GenerationOptions(
         tolerance=0.25, memory_limit=2**30, view_cone=30
     )
@@ -555,9 +560,9 @@ def test_an_abort_upstream_is_passed_on():
 
 def test_methods_from_a_table_say_what_they_do():
     for method, name, arguments, doc in (
-        (pvdi.VDISource.SetViewCone, "SetViewCone", ["self", "degrees"], "Set the half angle"),
+        (pvdi.VDISource.SetViewCone, "SetViewCone", ["self", "value"], "Set `view_cone`"),
         (pvdi.VDISource.GetCoverage, "GetCoverage", ["self"], "Return what the VDI's window"),
-        (pvdi.VDIMapper.SetRegenerateBelow, "SetRegenerateBelow", ["self", "ssim"], "Set the est"),
+        (pvdi.VDIMapper.SetRegenerateBelow, "SetRegenerateBelow", ["self", "value"], "Set the est"),
     ):
         assert method.__name__ == name
         assert list(inspect.signature(method).parameters) == arguments

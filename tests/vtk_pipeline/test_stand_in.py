@@ -11,7 +11,7 @@ from watched_windows import WINDOW, finish, frame, frames_until, picture_of, wat
 
 from pyvista_vdi.device import programs
 from pyvista_vdi.errors import DeviceMemoryError
-from pyvista_vdi.vtk_pipeline.drawing import volume_picture
+from pyvista_vdi.vtk_pipeline.drawing import images
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkPropPicker
 
 pytestmark = pytest.mark.gl
@@ -108,7 +108,7 @@ def test_where_the_volume_cannot_stand_in_the_old_vdi_is_drawn(plotter, gate, mo
     def refuse(*_, **__):
         raise DeviceMemoryError("no room")
 
-    monkeypatch.setattr(volume_picture, "DeviceVolume", refuse)
+    monkeypatch.setattr(images, "DeviceVolume", refuse)
     actor.mapper.lookup_table.cmap = "inferno"
     np.testing.assert_array_equal(frame(plotter), before)
     gate.set()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plugin_scenes import LOOKS, soft_ball
+from settings import with_settings
 from skimage.io import imread
 from watched_windows import MOVING, STILL, frame, small_vdi, turned, watched
 
@@ -35,7 +36,9 @@ pytestmark = pytest.mark.gl
 )
 def test_nonsense_is_refused_by_name(plotter, name, value, message):
     mapper = pvdi.VDIMapper()
-    give = getattr(mapper, name, lambda value: plotter.add_vdi(soft_ball(8), **{name: value}))
+    give = getattr(
+        mapper, name, lambda value: plotter.add_vdi(soft_ball(8), **with_settings(**{name: value}))
+    )
     with pytest.raises(InvalidArgumentError, match=message):
         give(value)
     assert not plotter.actors
@@ -55,6 +58,7 @@ def test_status_from_before_the_first_frame_on(plotter, gate, coarsest):
     assert (status.mode, status.generation, status.vdi) == ("full", 1, vdi)
     assert (status.coverage, status.magnification) == (1.0, pytest.approx(1.0))
     assert status.fps > 0
+    actor.mapper.SetDraw("vdi")  # else its own frames, which keep the rate, show changes
     actor.prop.interpolation_type = "linear"
     frame(plotter)
     text = str(actor.status)

@@ -7,13 +7,13 @@ from typing import Any
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.extensions.series.player import MEMORY, ON_DEVICE, Decoding, bring
+from pyvista_vdi.extensions.series.shown import MEMORY, ON_DEVICE, Decoding, bring
 from pyvista_vdi.extensions.sets.vdi_set import MOST_BLENDED, VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.worker import Worker
+from pyvista_vdi.quality.background import Worker
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 
 #: How many of the VDIs nearest to a view are read.

@@ -13,7 +13,7 @@ from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.playing import PlayingMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
-from pyvista_vdi.vtk_pipeline.drawing.shader import VDIShaderProperty, show_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import VDIShaderProperty, show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import vtkVolume

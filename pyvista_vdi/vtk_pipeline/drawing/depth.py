@@ -13,10 +13,10 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Frame,
     Image,
     Matrix,
-    Recent,
     consumers,
     depths_of,
 )
+from pyvista_vdi.vtk_pipeline.drawing.images import Recent
 from pyvista_vdi.vtk_pipeline.vtk import vtkActor2D, vtkMapper, vtkVolume
 
 #: Pixels around a rectangle that are read as well: a pixel is drawn where its centre is inside.

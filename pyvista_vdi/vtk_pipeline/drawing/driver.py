@@ -1,79 +1,137 @@
 """Draws the frames of a mapper, and answers whatever else VTK asks of it.
 
-A frame is: VTK's event, what is seen of the scene, the decision, one raycast, a texture.
+A frame is: VTK's event, what is seen of the scene, the plan, one raycast, a texture. What it shows
+and what is made for it says :func:`pyvista_vdi.quality.plan.plan`; here that is done.
 """
 
 from __future__ import annotations
 
+import itertools
+import logging
 import math
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal, TypeAlias
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
+from pyvista_vdi.device import Runtime, get_runtime
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidVolumeError, VDIError
 from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.decide import placeholder_share, ssim_of
-from pyvista_vdi.quality.frame_state import FrameTook, PlaceholderTook, VDIAsked, ViewPicked
-from pyvista_vdi.quality.pace import reduced
-from pyvista_vdi.quality.records import replace
-from pyvista_vdi.quality.render_mode import seconds_per_pixel
+from pyvista_vdi.quality.costs import Costs
+from pyvista_vdi.quality.pictures import Estimate, Made, Pictures
+from pyvista_vdi.quality.plan import SETTLED, Making, Plan, Seen, lacking, plan, ssim_of
+from pyvista_vdi.quality.rate import reduced
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick
 from pyvista_vdi.raycasting.prepared import release_from_devices
+from pyvista_vdi.vtk_pipeline.drawing.background import Background, Estimators
 from pyvista_vdi.vtk_pipeline.drawing.box import Box
-from pyvista_vdi.vtk_pipeline.drawing.deciding import Deciding, number_of
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
-from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Matrix, consumers, viewport
-from pyvista_vdi.vtk_pipeline.drawing.grabbing import Grabbing
-from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Images
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, consumers, viewport
+from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, Images, VolumePicture
 from pyvista_vdi.vtk_pipeline.drawing.overlap import Overlaps, overlapped
 from pyvista_vdi.vtk_pipeline.drawing.refused import effects_without
-from pyvista_vdi.vtk_pipeline.drawing.scissor import Scissor, shown_box
+from pyvista_vdi.vtk_pipeline.drawing.screen import (
+    ImageTexture,
+    NoDepth,
+    Scissor,
+    place_image,
+    shown_box,
+)
 from pyvista_vdi.vtk_pipeline.drawing.selection import Selection
-from pyvista_vdi.vtk_pipeline.drawing.shader import place_image
-from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture, NoDepth
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
+from pyvista_vdi.vtk_pipeline.filters.inputs import ROUNDING, Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
+from pyvista_vdi.vtk_pipeline.interaction import browser
 from pyvista_vdi.vtk_pipeline.interaction.browser import SceneAtHand
-from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
+from pyvista_vdi.vtk_pipeline.interaction.status import CornerTexts, VDIStatus, Warnings
+from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
 from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window, now
 from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference, weakly
+
+_log = logging.getLogger(__name__)
 
 #: What is said where another volume has the mapper.
 _BEHIND_ANOTHER = (
     "VDIMapper draws only behind its own VDIActor, and is behind another volume: use VDIActor in "
     "place of vtkVolume, also for copies (VDIActor().ShallowCopy(actor))"
 )
+#: Views that a VDI is made to serve, degrees from its own, where its metadata do not say.
+_VIEW_CONE = 60.0
+
+#: By which VDIs are known: no other one has had the number.
+_numbers: weakref.WeakKeyDictionary[VDI, int] = weakref.WeakKeyDictionary()
+_next_number = itertools.count(1)
+
+#: What a frame can show.
+Shown: TypeAlias = VDI | VolumePicture | None
 
 
-class Driver(Deciding):
+def number_of(vdi: VDI) -> int:
+    """Return the number that a VDI is known by."""
+    return _numbers.get(vdi) or _numbers.setdefault(vdi, next(_next_number))
+
+
+class Driver:
     """What happens behind a :class:`VDIMapper`; its observers call :meth:`begin` and :meth:`end`.
 
     It holds its actor and its windows weakly, so that nothing here keeps a scene alive.
     """
 
     def __init__(self) -> None:
-        super().__init__()
-        self.box = Box()
+        self.settings = MapperSettings()
+        self.device: Any = None
+        self.input: Input | None = None
+        self.box, self.texts = Box(), CornerTexts()
+        self.level: tuple[int, int] | None = None  # of a store, and of how many
         self._actor: Callable[[], Any] = lambda: None
+        self._window: Callable[[], Window | None] = lambda: None  # of the last frame
         self._active = vtkWeakReference()  # which renderer is between its start and its end
         self._watched = Met()
-        self._view: View | None = None  # of the last frame
-        self._texture, self._no_depth = ImageTexture(), NoDepth()
-        self._scissor = Scissor()
-        self._selection = Selection()
-        self._images, self._last = Images(), NOTHING
-        self._counted = self._generation = 0  # the VDI that was shown last, and how many were
-        self.level: tuple[int, int] | None = None  # of a store, and of how many
-        self._scene_at_hand = SceneAtHand(self._say_not_exported)
-        self._trouble: BaseException | None = None
+        self._warnings = Warnings()
+        self._trouble: BaseException | None = None  # for raise_trouble
         self._astray = False  # whether something else than the actor draws
+        # What the last frame showed, and by what
+        self._images, self._last = Images(), NOTHING
+        self._texture, self._no_depth, self._scissor = ImageTexture(), NoDepth(), Scissor()
+        self._selection, self._scene_at_hand = Selection(), SceneAtHand(self._say_not_exported)
+        self._counted = self._generation = 0  # the VDI that was shown last, and how many were
+        # What plans go by
+        self._background, self._timer = Background(), Timer(self._tick)
+        self._costs = Costs()
+        self._forget()
+
+    def _forget(self, *, failures: bool = True) -> None:
+        """Forget all that was seen, and what is being made."""
+        self._background.drop_vdi()
+        self._background.drop_estimate()
+        self._background.forget_volume()
+        self._estimators = Estimators()
+        self._volume: VolumePicture | None = None
+        self._wanted: tuple[Any, Request | None, Exception | None] | None = None  # and the stamp
+        self._refused: tuple[Any, str] | None = None  # a content that the device cannot draw
+        self._making: Making | None = None
+        self._estimate: Estimate | None = None
+        self._pictures, self._costs = Pictures(), Costs()
+        self._seen: Seen | None = None  # the last frame that somebody watched
+        self._stamp: Any = None  # of all that it depended on
+        self._view: View | None = None  # of the last frame
+        self._moved_at, self._number = -math.inf, None
+        self._pixels = 0.0  # of the last frame, in which the volume may be seen
+        if failures:
+            self._failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
 
     # What is drawn, and how
+
+    def set(self, **settings: Any) -> bool:
+        """Keep what a user sets; whether it is another value."""
+        before, self.settings = self.settings, replace(self.settings, **settings)
+        return self.settings != before
 
     def set_actor(self, actor: Any) -> None:
         """Remember whose matrix and renderers count."""
@@ -95,6 +153,22 @@ class Driver(Deciding):
         """The actor that this draws for, whose matrix and renderers count; ``None`` without one."""
         return self._actor()
 
+    @property
+    def window(self) -> Window:
+        """That of the last frame."""
+        window = self._window()
+        assert window is not None
+        return window
+
+    @property
+    def proxy(self) -> Any:
+        """The image whose box VTK draws in place of the VDI."""
+        return self.box.image
+
+    def runtime(self) -> Runtime:
+        """Return the device that raycasts."""
+        return get_runtime(self.device)
+
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
         weak = weakref.ref(self)
@@ -104,16 +178,20 @@ class Driver(Deciding):
             if driver is not None:
                 driver.box.connect()
 
-        super().set_input(source)
+        if self.input is not None:
+            self.input.watch(None)
+            self.input.rest()
+        self.input, self._last = source, NOTHING
+        self._forget()
         if source is not None:
             source.watch(changed)
         self.box.show(source)
-        self._last = NOTHING
 
-    @property
-    def proxy(self) -> Any:
-        """The image whose box VTK draws in place of the VDI."""
-        return self.box.image
+    def retry(self) -> None:
+        """Try again what failed before, and give up what is being made in the background."""
+        self._drop()
+        self._failed = ()
+        self._warnings.forget()
 
     def release(self) -> None:
         """Free textures, images and what devices hold, and end what goes on; a frame begins anew.
@@ -123,7 +201,11 @@ class Driver(Deciding):
         held = [] if self.input is None else self.input.on_devices()
         if isinstance(self.input, SourceInput):
             self.input.keep_lights(self.renderers())
-        super().release()
+        self._timer.stop()
+        if self.input is not None:
+            self.input.rest()
+        self._forget(failures=False)
+        self._background.close()
         release_from_devices(held)
         self._texture.release()
         self._no_depth.release()
@@ -169,9 +251,9 @@ class Driver(Deciding):
         with suppress(VDIError):  # which what is drawn says
             self.box.Update()
         drawn = self._last = self._guarded(self._paint, mapper, renderer) or self._last
-        of_window.pace = of_window.pace.showed(drawn.preview)
+        of_window.pace.frame.preview |= drawn.preview
         if window.GetInteractor() is not None:
-            of_window.listen(window.GetInteractor(), Grabbing)
+            of_window.listen(window.GetInteractor())
         unit = self._texture.show(window, drawn.image, drawn.number, smooth=drawn.smooth)
         place_image(actor, unit, origin, size)
         if drawn.smooth:
@@ -188,105 +270,482 @@ class Driver(Deciding):
         self._texture.let_go()
         self._no_depth.let_go()
         self._selection.texture.let_go()
+        if self._seen is not None and self._seen.hand:
+            self._background.pause(SETTLED)  # from now on
 
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
-        """Return the frame's image."""
+        """Return the frame's image: one that is kept, or a new one."""
         frame = self._showing(Frame.current(renderer, self._actor(), mapper))
         if frame is None:
             return self._last
+        window, settings = self.window, self.settings
         if frame.volume is None:  # which has no lists to be merged by
-            part = self.window.shared(Overlaps).part(frame)
+            part = window.shared(Overlaps).part(frame)
             if part is not None:
                 return part
-        window = self.window
         depth = window.shared(OpaqueDepths).read([frame])
         frame = frame if depth is None else replace(frame, depth=depth)
-        at_rest = reduced(frame.full_size, 1 / self.state.settings.image_distance**2)
-        frame = frame.coarser(at_rest)
-        drawn = self._images.get(frame)
+        drawn = self._images.get(
+            frame.coarser(reduced(frame.full_size, 1 / settings.image_distance**2))
+        )
         if drawn is not None:
             return drawn  # however the frame is to be: where it is there, full costs nothing
-        few = frame
-        many = window.pace.few_lists and window.single and window.previews(self.state.settings)
-        if many and frame.vdi is not None and frame.view is not None:
-            of = (frame.number, frame.vdi, frame.view.camera, self.device)
-            few = replace(frame, few_lists=self._behind.fewer_lists(*of))
-        size = self.preview_size(few)
-        frame = (frame if size == frame.full_size else few).coarser(size)
-        return (self._images.get(frame) if frame.preview else None) or self._raycast(frame)
-
-    def _showing(self, frame: Frame) -> Frame | None:
-        """Return the frame of what is to be seen, ``None`` if that is nothing."""
-        window = Window.of(frame.renderer.GetRenderWindow())
-        self._window, self._view = weakref.ref(window), frame.view
-        if any(
-            v.mapper is frame.mapper and v.driver is None for v in window.shown_in(frame.renderer)
-        ):
-            self._warnings.warn(_BEHIND_ANOTHER)
-        seen = self.decided(frame, joint=overlapped(frame))
-        if seen is not None:
-            self.box.place(seen.bounds)
-            if seen.volume is None and seen.number != self._counted:
-                self._counted = seen.number
-                self._generation += 1
-            seen = self._lit_and_blended(seen)
-        return seen
-
-    def _lit_and_blended(self, frame: Frame) -> Frame:
-        """Return the frame with the view whose light falls on it, and what it is blended of."""
-        volume, settings = frame.volume, self.state.settings
-        if volume is not None:
-            # In a window the VDI's light, so that nothing jumps
-            by_vdi = settings.draw != "volume" and self.window.watched_behind(settings)
-            if volume.placeholder or by_vdi or not volume.shaded or frame.view is None:
-                return frame
-            return replace(frame, lit_from=frame.view.camera)
-        parts = [] if self.input is None else self.input.parts()
-        if len(parts) < 2 or parts[0][0] is not frame.vdi:
-            return frame
-        blend = tuple((number_of(vdi), weight) for vdi, weight in parts)
-        return replace(frame, parts=tuple(parts), blend=blend)
+        frame = frame.coarser(self.preview_size(frame))
+        drawn = self._images.get(frame) if frame.preview else None
+        if drawn is not None:
+            return drawn
+        # Raycast, and note what that took
+        began = now()
+        drawn = self._images.raycast(frame, self.device)
+        seconds = now() - began
+        window.pace.drawn(frame.size, frame.full_size, seconds, frame.way, frame.effort)
+        # A volume's first picture has kernels compiled and voxels sent to the device
+        if frame.volume is None or frame.volume.pictures > 1:
+            took = (frame.way, frame.angle, frame.covered, seconds)
+            self._costs = self._costs.took(*took)
+        return drawn
 
     def preview_size(self, frame: Frame) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
-        settings, window, renderer = self.state.settings, self.window, frame.renderer
-        pixels = math.prod(frame.full_size)
-        floor = min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2)
-        share = 1.0
-        if frame.volume is not None and frame.volume.placeholder:
-            if settings.previews and not window.takes_picture(renderer):
-                self.state, share = placeholder_share(self.state, pixels)
-                share = max(share, floor)
-        elif not window.previews(settings):
+        settings, window, renderer, share = self.settings, self.window, frame.renderer, 1.0
+        if frame.full or not settings.previews:
             window.knows(renderer.GetActiveCamera())
         elif not window.takes_picture(renderer):
-            each = seconds_per_pixel(self.state.costs, "volume", 0.0)
+            each = self._costs.volume
             known = frame.volume is not None and each is not None
-            window.pace, share = window.pace.share(
+            share = window.pace.share(
                 window.rate(settings),
-                pixels,
-                floor,
-                frame.cost,
+                math.prod(frame.full_size),
+                min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2),
+                frame.way,
                 effort=frame.effort,
                 expected=each * frame.covered if known else None,  # type: ignore[operator]
             )
         return reduced(frame.full_size, min(share, 1 / settings.image_distance**2))
 
-    def _raycast(self, frame: Frame) -> Drawn:
-        """Return the image, and tell what it took."""
-        volume, window = frame.volume, self.window
-        before = now()
-        drawn = self._images.raycast(frame, self.device)
-        seconds = now() - before
-        if volume is not None and volume.placeholder:
-            self.tell(PlaceholderTook(math.prod(frame.size), seconds))
+    # What a frame shows
+
+    def _showing(self, frame: Frame) -> Frame | None:
+        """Return the frame of what is to be seen, brought up to date; ``None`` for nothing."""
+        source, settings = self.input, self.settings
+        window = Window.of(frame.renderer.GetRenderWindow())
+        self._window = weakref.ref(window)
+        if any(
+            v.mapper is frame.mapper and v.driver is None for v in window.shown_in(frame.renderer)
+        ):
+            self._warnings.warn(_BEHIND_ANOTHER)
+        if source is None:
+            return None
+        source.note_scene(self.renderers(), frame.model_transform)
+        if settings.automatic_view:
+            source.set_view_if_missing(*_seen_from(frame))
+        if isinstance(source, SourceInput):
+            shown = self._planned(source, frame, joint=overlapped(frame))
         else:
-            took = (frame.size, frame.full_size, seconds, frame.cost, frame.effort)
-            window.pace = window.pace.drawn(*took)
-        # A volume's first picture has kernels compiled and voxels sent to the device
-        if frame.few_lists is None and (volume is None or volume.pictures > 1):
-            self.tell(FrameTook(frame.way, frame.angle, frame.covered, seconds))
-        return drawn
+            shown = self._stored(source, frame)
+        if shown is None:
+            return None
+        self.box.place(shown.bounds)
+        if shown.volume is None and shown.number != self._counted:
+            self._counted = shown.number
+            self._generation += 1
+        # A volume has the light of its VDI in a window, so that nothing jumps
+        volume, view = shown.volume, frame.view
+        if volume is not None:
+            watched = settings.draw != "volume" and window.watched_behind(settings)
+            by_vdi = watched and source.last() is not None
+            if volume.shaded and view is not None and not by_vdi:
+                shown = replace(shown, lit_from=view.camera)
+            return shown
+        parts = source.parts()
+        if len(parts) < 2 or parts[0][0] is not shown.vdi:
+            return shown
+        blend = tuple((number_of(vdi), weight) for vdi, weight in parts)
+        return replace(shown, parts=tuple(parts), blend=blend)
+
+    def _stored(self, source: Input, frame: Frame) -> Frame | None:
+        """Return the frame of a VDI that has no volume, and say what it lacks."""
+        view, stamp = frame.view, source.stamp()
+        assert view is not None
+        self._view = view
+        source.look(view.camera, self.device)
+        if stamp is None or stamp not in self._failed:
+            self._update(source)
+        vdi = source.last()
+        if vdi is None:
+            return None
+        if self.settings.regenerate == "auto":
+            seen = self._as_made(vdi, frame.showing(vdi, number_of(vdi)))
+            cone = vdi.metadata.get("view_cone")
+            cone = cone if isinstance(cone, int | float) else _VIEW_CONE
+            for cause, message in lacking(seen, cone, source.remedy):
+                # Once for all VDIs of one view, such as the steps of a series
+                self._warnings.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
+        full = not self.window.previews(self.settings)
+        return replace(frame.showing(vdi, number_of(vdi)), full=full)
+
+    def _planned(self, source: SourceInput, frame: Frame, *, joint: bool) -> Frame | None:
+        """Plan a frame of what comes from a volume, do that, and return what the frame shows."""
+        settings = self.settings
+        try:
+            seen, sighted = self._look(source, frame, joint=joint)
+            while True:
+                planned = plan(seen)
+                self._costs, self._pictures = planned.costs, planned.pictures
+                if planned.estimate == "now":
+                    judged = self._judged(source, frame, sighted)
+                    seen = replace(seen, judged=judged, pictures=planned.pictures)
+                    continue
+                self._do(planned, seen, source, frame)
+                try:
+                    shown = self._shown(planned, source, frame)
+                    break
+                except VDIError as unable:
+                    if planned.show != "volume":
+                        raise
+                    _log.debug("the volume cannot be drawn itself", exc_info=unable)
+                    kind: Any = "none" if planned.in_bricks or seen.volume != "whole" else "bricks"
+                    self._refused = (planned.content, kind)
+                    known: dict[str, Any] = {"volume": kind, "making": self._making}
+                    known["estimating"] = self._background.estimating
+                    seen = replace(seen, first_look=False, **known)
+        except Cancelled as error:
+            if self._volume is None and source.last() is None:
+                source.forget_view()
+                raise
+            self._complain(error)
+            planned, sighted, shown = Plan("vdi"), None, self._volume or source.last()
+        if shown is None:
+            return None
+        if isinstance(shown, VolumePicture):
+            found = frame.showing(shown, shown.number)
+        elif sighted is not None and sighted.vdi is shown and settings is self.settings:
+            found = sighted
+        else:
+            found = frame.showing(shown, number_of(shown))
+        return replace(found, full=planned.full, stand_in=planned.stand_in)
+
+    def _look(self, source: SourceInput, frame: Frame, *, joint: bool) -> tuple[Seen, Frame | None]:
+        """Look at all that decides what the frame shows; also return the VDI as it shows it."""
+        window, settings, view = self.window, self.settings, frame.view
+        assert view is not None
+        # What is drawn in several views is out of date in none of them by itself
+        one_view = len(self.renderers()) == 1 and source.alone
+        watched = one_view and window.watched_behind(settings)
+        stamp = source.stamp()
+        if self._wanted is None or self._wanted[0] != stamp or self._wanted[1] is None:
+            self._wanted = (stamp, *_request_of(source, None if watched else view))
+        wanted, trouble = self._wanted[1:]
+        number = (window.number, id(window))
+        first = (window.whole_picture and number != self._number) or (
+            watched and stamp != self._stamp
+        )
+        if window.whole_picture:
+            self._number = number
+        # A view is at rest in its second frame, and when nothing has moved for a moment
+        time, moving = now(), window.moving(settings)
+        if view != self._view:
+            self._moved_at = time
+        elif not moving and first:
+            self._moved_at = min(self._moved_at, time - SETTLED)
+        self._view = view
+        if watched and trouble is not None and stamp != self._stamp and source.last() is not None:
+            self._complain(trouble)
+        self._stamp = stamp
+        # The VDI made last, as this view shows it
+        vdi, request = source.last(), source.source.GetCurrentRequest()
+        made, sighted = None, None
+        if vdi is not None and request is not None:
+            sighted = frame.showing(vdi, number_of(vdi))
+            made = self._as_made(vdi, sighted, request)
+        by_policy, failed = callable(settings.regenerate), stamp in self._failed
+        asks = by_policy and first and one_view and made is not None
+        asks = asks and not (watched and (self._making is not None or failed))
+        previews, rate = window.previews(settings), window.rate(settings)
+        content, volume = None if wanted is None else wanted.content, "whole"
+        bounds = () if wanted is None else wanted.volume.bounds
+        self._pixels = replace(frame, bounds=bounds).covered if watched and bounds else 0.0
+        if self._refused is not None and content is not None and content == self._refused[0]:
+            volume = self._refused[1]
+        seen = Seen(
+            view=view,
+            content=content,
+            bounds=bounds,
+            screen=None if wanted is None else wanted.screen,
+            chosen=source.view_is_chosen(wanted, request),
+            draw=settings.draw,
+            regenerate="ask" if by_policy else settings.regenerate,  # type: ignore[arg-type]
+            wish=asks and self._policy_says(),
+            bound=settings.regenerate_below,
+            watched=watched,
+            moving=previews,
+            hand=moving and time - self._moved_at < SETTLED,
+            settled=not moving and time - self._moved_at >= SETTLED,
+            one_view=one_view,
+            joint=joint,
+            first_look=first,
+            own_pixels=frame.full_size == view.size,
+            made=made,
+            making=self._making,
+            estimating=self._background.estimating,
+            estimate=self._estimate,
+            failed=failed,
+            volume=volume,  # type: ignore[arg-type]
+            late=self._late,
+            seconds=1 / (window.pace.headroom * rate) if previews else None,
+            costs=self._costs,
+            pictures=self._pictures,
+        )
+        self._seen = seen if watched else None
+        if watched:
+            # A hand that moves has the machine
+            self._background.pause(SETTLED if seen.hand else 0)
+            if made is None and wanted is not None and settings.draw != "volume":
+                self._background.prepare(wanted)
+        return seen, sighted
+
+    def _as_made(self, vdi: VDI, shown: Frame, request: Request | None = None) -> Made:
+        """Return a VDI as a frame's view shows it, with what it was made of."""
+        detail = covered = 1.0
+        view = shown.view
+        assert view is not None
+        if request is None or self.settings.draw != "vdi":  # else nobody asks
+            detail = magnification(vdi, shown.camera, shown.full_size)
+            covered = coverage(vdi, view.camera, view.size)
+        content, screen = (None, None) if request is None else (request.content, request.screen)
+        known = (number_of(vdi), vdi.bounds, content, screen, shown.angle, detail, covered)
+        return Made(*known, shown.covered, shown.world_options())
+
+    @property
+    def _late(self) -> bool:
+        """Whether the volume's own full frames of the last view miss the rate."""
+        each, settings, window = self._costs.volume, self.settings, self.window
+        if each is None or settings.target == 0:
+            return False
+        return window.pace.late(each * self._pixels, window.rate(settings))
+
+    # What is planned is done
+
+    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame | None) -> None:
+        """Begin, or give up, what goes on in the background, and make what a frame waits for."""
+        if planned.give_up:
+            self._drop()
+        if planned.view is not None and frame is not None:
+            camera, size, matrix = _seen_from(frame)
+            if planned.view == "take":
+                source.take_camera(camera, matrix)
+                source.take_size(size)
+            else:
+                source.follow_if_changed(camera, size, matrix)
+        if planned.make is not None:
+            self._background.drop_estimate()
+            try:
+                request = source.source.MakeRequest(planned.make)
+            except Exception as error:  # what is shown can still be drawn
+                self._fail(error)
+            else:
+                for_view = not (seen.stale or seen.chosen)
+                self._making = Making(request.content, planned.make, for_view)
+                self._background.generate(request)
+        vdi, request = source.last(), source.source.GetCurrentRequest()
+        if planned.estimate == "background" and vdi is not None and request is not None:
+            made = seen.made
+            assert made is not None
+            self._background.estimate(made.number, vdi, request, seen.view, made.options)
+        if planned.update:
+            self._update(source)
+
+    def _shown(self, planned: Plan, source: SourceInput, frame: Frame) -> Shown:
+        """Return what a plan shows, made where it has to be; VDIError is raised if it cannot be."""
+        assert self._wanted is not None
+        wanted, trouble = self._wanted[1:]
+        if planned.show == "vdi":
+            return source.last()
+        if planned.show == "trouble":
+            assert trouble is not None
+            raise trouble
+        if planned.show == "exact":
+            return self._of_this_view(source, frame)
+        if self._volume is None or self._volume.request.content != planned.content:
+            self._volume = None  # its buffers go before others are taken
+            request = source.source.GetCurrentRequest()
+            if request is None or request.content != planned.content:
+                request = wanted
+            if planned.in_bricks:  # for pictures of that size
+                request = source.source.MakeRequest(frame.view)
+            assert request is not None
+            self._volume = VolumePicture(request, in_bricks=planned.in_bricks)
+        return self._volume
+
+    def _of_this_view(self, source: SourceInput, frame: Frame) -> VDI:
+        """Make and return a VDI of exactly the frame's view, kept unless the frame is a tile."""
+        assert frame.view is not None
+        whole = frame.full_size == frame.view.size
+        tile = None if whole else (frame.camera, frame.size)
+        wanted = source.exact_request(frame.view, tile)
+        vdi = source.source.MakeVDI(wanted)
+        if whole:
+            source.source.TakeVDI(vdi, wanted)
+        return vdi
+
+    def _update(self, source: Input) -> None:
+        """Make the VDI of the source now; what fails is not repeated until something changes."""
+        try:
+            source.vdi()
+        except Cancelled:  # of one execution
+            raise
+        except InvalidVolumeError:  # soon found again
+            if not source.has_what_it_had():
+                raise  # else as VTK's mappers, which draw the data that are there
+        except BaseException:
+            self._failed = (*self._failed[-1:], source.stamp())
+            raise
+
+    def _drop(self) -> None:
+        """Cancel what is being made in the background."""
+        self._background.drop_vdi()
+        self._background.drop_estimate()
+        self._making = None
+
+    def _fail(self, error: BaseException) -> None:
+        """Note that a VDI cannot be made of what there is now, and say it once."""
+        self._making, self._failed = None, (*self._failed[-1:], self._stamp)
+        self._background.drop_estimate()
+        self._complain(error)
+
+    def _complain(self, error: BaseException) -> None:
+        said = None if self.input is None else self.input.complaint(error)
+        usual = (
+            f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
+            "and actor.regenerate() tries again"
+        )
+        self._warnings.warn(said or usual, error)
+
+    def _policy_says(self) -> bool:
+        """Return what the user's function says of the frame's view."""
+        policy = self.settings.regenerate
+        try:
+            return callable(policy) and bool(policy(self.status()))
+        except Exception as error:
+            self._complain(error)
+            return False
+
+    def _judged(
+        self, source: SourceInput, frame: Frame, sighted: Frame | None
+    ) -> Estimate | Literal[False]:
+        """Estimate the error of the VDI in the frame's view now; False if it cannot be."""
+        made = source.source.GetCurrentRequest()
+        assert sighted is not None and sighted.vdi is not None and frame.view is not None  # noqa: PT018
+        assert made is not None
+        vdi, options = sighted.vdi, sighted.world_options()
+        of = (number_of(vdi), frame.view)
+        detail = magnification(vdi, frame.camera, frame.full_size)
+        if made.screen == frame.view and detail <= 1 + ROUNDING:
+            return Estimate(*of, ssim=1.0, options=options)
+        runtime, background = get_runtime(made.device), frame.renderer.GetBackground()
+        try:
+            error = self._estimators.estimate(
+                made, runtime, vdi, frame.view, options, background=background
+            )
+        except VDIError:  # no memory for it, say: the volume's picture is right
+            _log.debug("the error of a view cannot be estimated", exc_info=True)
+            return False
+        return Estimate(*of, ssim=error.ssim, contrast=error.contrast, options=options)
+
+    # Between frames
+
+    def between_frames(self) -> bool:
+        """Take what was made in the background; whether there is another VDI to be drawn."""
+        try:
+            another = None if self.input is None else self.input.advance()
+        except Exception as error:
+            self._complain(error)
+            return False
+        if another is None:
+            another = self._take_finished()
+        if another:
+            # Gone before the frame begins: freeing hundreds of megabytes takes its time
+            self._images.clear()
+        return another
+
+    def _take_finished(self) -> bool:
+        swapped = False
+        for kind, made in self._background.finished():
+            if isinstance(made, BaseException):
+                if kind != "took":
+                    self._fail(made)
+            elif kind == "took":
+                self._costs = self._costs.took("volume", 0.0, *made)
+            elif kind == "estimate":
+                self._estimate = made
+            elif self._making is not None and isinstance(self.input, SourceInput):
+                request = self._background.request
+                assert request is not None
+                self.input.source.TakeVDI(made, request)
+                self._making = self._estimate = self._background.request = None
+                if self.settings.draw == "vdi":
+                    self._volume = None
+                swapped = True
+        return swapped
+
+    def _begin_at_rest(self) -> None:
+        """Begin what a view at rest is missing, though no frame asks."""
+        source, seen = self.input, self._seen
+        if not isinstance(source, SourceInput) or seen is None or source.stamp() != self._stamp:
+            return  # what has changed is for a frame to look at
+        still, moving = now() - self._moved_at >= SETTLED, self.window.moving(self.settings)
+        self._seen = seen = replace(
+            seen,
+            hand=moving and not still,
+            settled=still and not moving,
+            first_look=False,
+            wish=False,
+            late=self._late,
+            making=self._making,
+            estimating=self._background.estimating,
+            estimate=self._estimate,
+            failed=self._stamp in self._failed,
+            costs=self._costs,
+        )
+        planned = plan(seen)
+        self._do(replace(planned, view=None, update=False), seen, source, None)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Whether something goes on that the event loop has to look at."""
+        seen, background = self._seen, self._background
+        if self._making is not None or background.estimating:
+            return True
+        if seen is not None and (background.preparing or now() - self._moved_at < SETTLED):
+            return True
+        return self.input is not None and self.input.busy
+
+    @property
+    def following(self) -> bool:
+        """Whether the event loop looks at it."""
+        return self._timer.running
+
+    def follow(self, window: Any) -> None:
+        """Start the event loop's timer, if something goes on and no hand moves."""
+        if self._goes_on and not Window.of(window).moving(self.settings):
+            period = PERIOD if self.input is None else self.input.period or PERIOD
+            in_loop = browser.watches(window)
+            self._timer.start(window.GetInteractor(), period, in_loop=in_loop)
+
+    def _tick(self) -> None:
+        """Look, from the event loop, at what goes on, and have shown what is new."""
+        window = self._window()
+        if window is None or window.drawing:
+            return
+        swapped = self.between_frames()
+        if not swapped:
+            self._begin_at_rest()
+        if not self._goes_on:
+            self._timer.stop()
+        if swapped or self.texts.are_behind(self._background.progress):
+            window.render()
+
+    # Errors in a frame
 
     def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
         """Return what a part of drawing returns, or ``None`` and say what went wrong."""
@@ -348,29 +807,21 @@ class Driver(Deciding):
         number = None if vdi is None else number_of(vdi)
         return VDIStatus(
             mode="none" if last.full_size is None else "preview" if last.preview else "full",
-            samples=last.samples,
+            samples=0 if last.full_size is None else last.image.size // 4,
             full_samples=wide * high,
             fps=None if window is None else window.pace.fps,
             angle=None if shown is None else angle_from_generating_view(*shown[:2]),
             magnification=None if shown is None else magnification(*shown),
             coverage=None if shown is None else coverage(*shown),
-            ssim=ssim_of(self.state, number, view),
-            progress=self._behind.progress,
+            ssim=ssim_of(self._pictures, self._estimate, number, view),
+            progress=self._background.progress,
             generation=self._generation,
             vdi=vdi,
-            stand_in=last.placeholder,
+            stand_in=last.stand_in,
             drawn=last.way,
             time=None if player is None else player.time,
             level=self.level,
         )
-
-    def between_frames(self) -> bool:
-        """Take what was made behind the frames; whether there is another VDI to be drawn."""
-        swapped = super().between_frames()
-        if swapped:
-            # Gone before the frame begins: freeing hundreds of megabytes takes its time
-            self._images.clear()
-        return swapped
 
     def vdi_asked_for(self) -> VDI | None:
         """Return the VDI, made now where there is none, or of what is no longer so.
@@ -384,8 +835,13 @@ class Driver(Deciding):
                 return None if source is None else source.last()
             return source.vdi()  # in the colours that its property has by now
         if source.has_view:
-            self.tell(VDIAsked(source.last() is not None, source.stamp()))
-        elif seen is not None and self.state.settings.automatic_view:
+            # Unless frames keep it up to date, or will
+            kept = self.settings.draw == "vdi" or self._making is not None
+            if source.last() is None or not kept:
+                self._drop()
+                if source.stamp() not in self._failed:
+                    self._update(source)
+        elif seen is not None and self.settings.automatic_view:
             return source.of_view(source.view_for(*seen))
         return source.last()
 
@@ -396,7 +852,7 @@ class Driver(Deciding):
         ``actor.regenerate()`` may make another, it is that one.
         """
         source = self.input
-        if not isinstance(source, SourceInput) or self.state.settings.regenerate == "never":
+        if not isinstance(source, SourceInput) or self.settings.regenerate == "never":
             return self.vdi_asked_for()
         source.note_scene(self.renderers(), matrix)
         wanted = source.exact_request(renderer_view(renderer, matrix))
@@ -437,10 +893,10 @@ class Driver(Deciding):
         ``None`` where no picture was drawn yet.
         """
         vdi, view = self.vdi_asked_for(), frame.view
-        if vdi is not None and view is not None and isinstance(self.input, SourceInput):
-            shown = self.tell(ViewPicked(coverage(vdi, view.camera, view.size)), frame)
-            return shown if isinstance(shown, VDI) else vdi
-        return vdi
+        if vdi is None or view is None or not isinstance(self.input, SourceInput):
+            return vdi
+        whole = coverage(vdi, view.camera, view.size) == 1
+        return vdi if whole else self._of_this_view(self.input, frame)
 
     def pick(self, actor: Any, renderer: Any, x: float, y: float) -> Pick | None:
         """Return what of an actor's VDI a renderer shows at a place of the window, in pixels."""
@@ -449,8 +905,7 @@ class Driver(Deciding):
 
     @property
     def _first_hit(self) -> FirstHit:
-        settings = self.state.settings
-        return FirstHit.of(settings.picking_opacity, settings.picking_accumulated)
+        return FirstHit.of(self.settings.picking_opacity, self.settings.picking_accumulated)
 
     def _select(self, mapper: Any, renderer: Any) -> None:
         """Draw what can be picked of what the last frame showed, or the first would show."""
@@ -515,6 +970,24 @@ class Driver(Deciding):
         active = self._active  # a VTK weak reference: no cycle through the observer
         renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
         renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+
+
+def _request_of(source: SourceInput, view: View | None) -> tuple[Request | None, Exception | None]:
+    """Return what the next VDI would be made of, or why none can be.
+
+    ``view`` is for a source that has none.
+    """
+    try:
+        return source.source.MakeRequest(None if source.has_view else view), None
+    except (Cancelled, InvalidVolumeError):
+        raise
+    except Exception as error:  # what is shown can still be drawn
+        return None, error
+
+
+def _seen_from(frame: Frame) -> tuple[Any, tuple[int, int], Any]:
+    """Return what a renderer sees an actor by: its camera, its size and the actor's matrix."""
+    return frame.renderer.GetActiveCamera(), size_of(frame.renderer), frame.model_transform
 
 
 def _is_drawing(renderer: Any) -> bool:

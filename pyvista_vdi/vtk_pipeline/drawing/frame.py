@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.frame_state import RenderMode
-from pyvista_vdi.quality.pace import Cost
-from pyvista_vdi.quality.records import replace
-from pyvista_vdi.quality.render_mode import rise
+from pyvista_vdi.quality.costs import RenderMode, rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view
 from pyvista_vdi.vtk_pipeline.interaction.window import Window
@@ -31,8 +28,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkPixelBufferObject,
     vtkTextureObject,
 )
-
-T = TypeVar("T")
 
 Matrix = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -78,10 +73,11 @@ class Frame:
     number: int = 0  # by which what is seen is known: a VDI is not held for it
     angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
     effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
-    few_lists: VDI | None = None  # raycast in place of the VDI in a preview: every second list
     parts: tuple[tuple[VDI, float], ...] = ()  # what the picture is blended of, with weights
     blend: tuple[tuple[int, float], ...] = ()  # the same by numbers
     lit_from: Camera | None = None  # whose light falls on a shaded volume, in place of the VDI's
+    full: bool = True  # whether every pixel gets a ray
+    stand_in: bool = False  # whether the volume stands in for a VDI to come
     bounds: tuple[float, ...] = ()  # of what is seen, model frame
     options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
     depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
@@ -125,7 +121,7 @@ class Frame:
 
     def showing(self, seen: Any, number: int) -> Frame:
         """Return the frame of this VDI, or volume, with all that its mapper says of its looks."""
-        settings = self.mapper.driver.state.settings
+        settings = self.mapper.driver.settings
         options = RenderOptions(
             clipping_planes=self._clipping_planes(seen.bounds),
             cropping=self.mapper,
@@ -143,7 +139,7 @@ class Frame:
     def key(self) -> Any:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
         of = (self.camera, self.size, self.full_size, self.options)
-        return (*of, self.lit_from, self.blend, self.few_lists is None)
+        return (*of, self.lit_from, self.blend)
 
     @property
     def preview(self) -> bool:
@@ -154,11 +150,6 @@ class Frame:
     def way(self) -> RenderMode:
         """What is raycast."""
         return "vdi" if self.volume is None else "volume"
-
-    @property
-    def cost(self) -> Cost:
-        """What tells how much a ray takes."""
-        return self.way if self.few_lists is None else "few lists"
 
     def coarser(self, size: tuple[int, int]) -> Frame:
         """Return the same view with fewer pixels, which fill the viewport just as exactly.
@@ -290,51 +281,6 @@ class Frame:
         return depth
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """An image that was raycast, kept without what VTK has.
-
-    ``pixels`` is the memory that it begins, 1D: another image may be raycast into it when this one
-    is kept no longer.
-    """
-
-    image: Image  # premultiplied RGBA, (H, W, 4), top row first
-    full_size: tuple[int, int] | None = None  # the viewport's; None before the first image
-    depth: Image | None = None  # where its rays ended
-    number: int | None = None  # by which an upload is known
-    joint: bool = False  # a part of a picture that other actors show the rest of
-    placeholder: bool = False  # of the volume, until there is a VDI
-    way: RenderMode = "vdi"  # what was raycast
-    pixels: Image | None = None
-
-    @property
-    def samples(self) -> int:
-        """Rays that were cast."""
-        return 0 if self.full_size is None else self.image.size // 4
-
-    @property
-    def preview(self) -> bool:
-        """Whether it has fewer pixels than the viewport."""
-        return self.full_size not in (None, self.image.shape[1::-1])
-
-    @property
-    def smooth(self) -> bool:
-        """Whether its pixels are interpolated: not where the neighbours are another actor's."""
-        return self.preview and not self.joint
-
-
-class Recent(dict[Any, T]):
-    """What was kept last, by what it is known by."""
-
-    def keep(self, key: Any, value: T) -> T | None:
-        """Keep something as the newest, and return what is kept no longer in its place."""
-        gone = self.pop(key, None)
-        self[key] = value
-        if len(self) > KEPT:
-            gone = self.pop(next(iter(self)))
-        return gone
-
-
 def _window_depth(window: Any, corner: tuple[int, int], size: tuple[int, int]) -> Image:
     (x, y), (width, height) = corner, size
     values = vtkFloatArray()
@@ -391,13 +337,6 @@ def sampled(depth: Image, size: tuple[int, int]) -> Image:
         for n, full in zip(size[::-1], depth.shape, strict=True)
     )
     return np.ascontiguousarray(depth[np.ix_(rows, columns)])
-
-
-def same_depth(a: Image | None, b: Image | None) -> bool:
-    """Whether rays end at the same depths; ``None`` where none end early."""
-    if a is b or a is None or b is None:
-        return a is b
-    return np.array_equal(a, b)
 
 
 def depths_of(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:

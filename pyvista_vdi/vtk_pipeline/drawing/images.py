@@ -1,14 +1,124 @@
-"""The images of a mapper's last frames, and the raycast of another one."""
+"""The images of a mapper's last frames, and the raycast of another one: of a VDI or its volume."""
 
 from __future__ import annotations
 
-import numpy as np
+import itertools
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
-from pyvista_vdi.device import aligned_empty
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.device import aligned_empty, get_runtime
+from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
-from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Image, Recent, same_depth
+from pyvista_vdi.volume.classified_volume import DeviceVolume
+from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volume
+from pyvista_vdi.vtk_pipeline.drawing.frame import KEPT, Frame, Image
+from pyvista_vdi.vtk_pipeline.filters.source import Request
+
+T = TypeVar("T")
+
+_numbers = itertools.count()
+
+
+class VolumePicture:
+    """Volume and look of a request, raycast as generation samples them.
+
+    It is right from every view. The voxels go to the device once, for it and for the generation,
+    and stay there when only the look changes.
+
+    Parameters
+    ----------
+    request : Request
+        What a VDI of it would be made of.
+    in_bricks : bool
+        Whether it may be brick by brick, where the device cannot hold it in one piece: a person
+        would wait too long for such a picture.
+
+    Attributes
+    ----------
+    number : int
+        By which it is known.
+    bounds : tuple of float
+        The volume's, model frame.
+    shaded : bool
+        Whether it is lit.
+    pictures : int
+        How many were drawn.
+
+    Raises
+    ------
+    VDIError
+        If the device cannot hold the volume so.
+    """
+
+    def __init__(self, request: Request, *, in_bricks: bool = False) -> None:
+        self.request = request
+        self.number = next(_numbers)
+        self.bounds = request.volume.bounds
+        self.shaded = request.transfer_function.shading is not None
+        self.pictures = 0
+        volume, sampling = request.volume, request.options
+        room = picture_room(
+            request.screen.size, sampling.memory_limit, sampling.occlusion_bytes(volume)
+        )
+        runtime = get_runtime(request.device)
+        look = request.transfer_function
+        medium = DeviceVolume(runtime, volume, look, sampling, room=room)
+        self._medium: DeviceVolume | None = medium
+        if medium.bricks is not None:
+            with medium.giving_bricks_back():  # to be taken by each picture, for its own size
+                self._medium = None
+                if not in_bricks:
+                    raise DeviceMemoryError(f"the volume {volume.name!r} is held brick by brick")
+
+    def picture(self, frame: FrameRequest, lit_from: Camera | None = None) -> NDArray[np.float32]:
+        """Return the picture, premultiplied RGBA, float32 (H, W, 4), top row first.
+
+        ``lit_from`` is the view whose light falls on it, in place of the VDI's; brick by brick it
+        is the picture's own.
+        """
+        self.pictures += 1
+        if self._medium is None:
+            made = self.request
+            return raycast_volume(
+                made.volume, made.transfer_function, frame.replace(device=made.device), made.options
+            )
+        return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.generating[0])
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """An image that was raycast, kept without what VTK has.
+
+    ``pixels`` is the memory that it begins, 1D: another image may be raycast into it when this one
+    is kept no longer.
+    """
+
+    image: Image  # premultiplied RGBA, (H, W, 4), top row first
+    full_size: tuple[int, int] | None = None  # the viewport's; None before the first image
+    depth: Image | None = None  # where its rays ended
+    number: int | None = None  # by which an upload is known
+    joint: bool = False  # a part of a picture that other actors show the rest of
+    stand_in: bool = False  # of the volume, until there is a VDI
+    way: RenderMode = "vdi"  # what was raycast
+    pixels: Image | None = None
+
+    @property
+    def preview(self) -> bool:
+        """Whether it has fewer pixels than the viewport."""
+        return self.full_size not in (None, self.image.shape[1::-1])
+
+    @property
+    def smooth(self) -> bool:
+        """Whether its pixels are interpolated: not where the neighbours are another actor's."""
+        return self.preview and not self.joint
+
 
 #: What a frame shows of which nothing can be drawn.
 NOTHING = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
@@ -40,24 +150,16 @@ class Images:
             pixels = aligned_empty(width * height * 4, np.float32)
         out = pixels[: height * width * 4].reshape(height, width, 4)
         request = FrameRequest(frame.camera, frame.size, frame.options, frame.depth, device, out)
-        seen = frame.few_lists or frame.vdi
         if frame.volume is not None:
             image = frame.volume.picture(request, frame.lit_from)
-        elif frame.parts and frame.few_lists is None:
+        elif frame.parts:
             image = blended(frame.parts, request)
         else:
-            assert seen is not None
-            image = render_vdi(seen, request)
+            assert frame.vdi is not None
+            image = render_vdi(frame.vdi, request)
         self._raycasts += 1
-        drawn = Drawn(
-            image,
-            frame.full_size,
-            frame.depth,
-            self._raycasts,
-            placeholder=frame.volume is not None and frame.volume.placeholder,
-            way=frame.way,
-            pixels=pixels,
-        )
+        known: dict[str, Any] = {"stand_in": frame.stand_in, "way": frame.way, "pixels": pixels}
+        drawn = Drawn(image, frame.full_size, frame.depth, self._raycasts, **known)
         gone = self._kept.keep(frame.key, drawn)
         if gone is not None:
             self._free = gone.pixels
@@ -72,3 +174,22 @@ class Images:
         """Drop all."""
         self._kept.clear()
         self._free = None
+
+
+class Recent(dict[Any, T]):
+    """What was kept last, by what it is known by."""
+
+    def keep(self, key: Any, value: T) -> T | None:
+        """Keep something as the newest, and return what is kept no longer in its place."""
+        gone = self.pop(key, None)
+        self[key] = value
+        if len(self) > KEPT:
+            gone = self.pop(next(iter(self)))
+        return gone
+
+
+def same_depth(a: Image | None, b: Image | None) -> bool:
+    """Whether rays end at the same depths; ``None`` where none end early."""
+    if a is b or a is None or b is None:
+        return a is b
+    return np.array_equal(a, b)

@@ -12,20 +12,11 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.cropping import checked_opacity_multiplier
-from pyvista_vdi.model.render_options import (
-    checked_bound,
-    checked_draw,
-    checked_policy,
-    checked_rate,
-    checked_transmittance_cutoff,
-)
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.frame_state import checked_image_distance
-from pyvista_vdi.raycasting.picking import checked_opacity
 from pyvista_vdi.vtk_pipeline.drawing.array_choice import ArrayChoiceMethods
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
+from pyvista_vdi.vtk_pipeline.drawing.settings import with_settings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
@@ -46,6 +37,7 @@ def _on_end(mapper: Any, event: str) -> None:
     driver.box.end()
 
 
+@with_settings
 @refusing(OF_MAPPERS)
 class VDIMapperMethods(ArrayChoiceMethods):
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
@@ -174,100 +166,8 @@ class VDIMapperMethods(ArrayChoiceMethods):
         """Return the device as it was set."""
         return self.driver.device
 
-    def SetAutomaticView(self, automatic: bool) -> None:
-        """Take the view of the first frame for a source without camera (on by default)."""
-        self.driver.set(automatic_view=bool(automatic))
-
-    def GetAutomaticView(self) -> bool:
-        """Whether a source without camera gets the view of the first frame."""
-        return self.driver.state.settings.automatic_view
-
-    def SetOpacityMultiplier(self: Any, multiplier: float) -> None:
-        """Multiply the extinction of everything that is drawn; 1 by default.
-
-        It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent. For
-        what is not opaque it is the same as dividing the volume property's scalar opacity unit
-        distance by it; changing that itself makes the VDI anew. ``InvalidArgumentError`` is raised
-        if it is no finite number, or below 0.
-        """
-        if self.driver.set(opacity_multiplier=checked_opacity_multiplier(multiplier)):
-            self.Modified()
-
-    def GetOpacityMultiplier(self) -> float:
-        """Return the factor of the extinction."""
-        return self.driver.state.settings.opacity_multiplier
-
-    def SetTransmittanceCutoff(self: Any, cutoff: float) -> None:
-        """End rays where less light than this is left; 10^-6 by default.
-
-        No channel of the picture loses more than that. VTK's own volume mappers stop at about
-        1/255. VDIs that overlap are merged to the default, whatever is set here.
-        ``InvalidArgumentError`` is raised if it is not from 0 to below 1.
-        """
-        if self.driver.set(transmittance_cutoff=checked_transmittance_cutoff(cutoff)):
-            self.Modified()
-
-    def GetTransmittanceCutoff(self) -> float:
-        """Return the light below which rays end."""
-        return self.driver.state.settings.transmittance_cutoff
-
-    def SetDraw(self: Any, draw: str) -> None:
-        """Choose what is raycast where the volume is at hand.
-
-        Parameters
-        ----------
-        draw : {"auto", "vdi", "volume"}
-            ``"auto"`` (the default): in windows that somebody watches, each frame by what is
-            expected to give the better picture within the frame rate, and at rest by what is there
-            sooner. Elsewhere the volume, until so many pictures of nearly the same view were taken
-            that a VDI of it costs less, and then that as long as its picture is like the volume's
-            (``SetRegenerateBelow``): pictures depend on scene, view and the pictures before, never
-            on time. ``"vdi"``: always the VDI. ``"volume"``: always the volume, by our volume
-            raycaster; a VDI is made only when one is asked for. Volumes that overlap in the picture
-            are drawn by VDIs, off-screen by such as are of that view. In windows, a volume that
-            the device holds brick by brick is drawn by its VDI.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is something else.
-        """
-        if self.driver.set(draw=checked_draw(draw)):
-            self.Modified()
-
-    def GetDraw(self) -> str:
-        """Return what is raycast where the volume is at hand."""
-        return self.driver.state.settings.draw
-
-    def SetImageSampleDistance(self: Any, distance: float) -> None:
-        """Cast a ray for every so many pixels along each edge; 1 by default.
-
-        The picture is interpolated linearly, as by VTK's mappers. Previews have fewer rays where
-        the frame rate asks for it. ``InvalidArgumentError`` is raised if it is not from 1 to 100.
-        """
-        if self.driver.set(image_distance=checked_image_distance(distance)):
-            self.Modified()
-
-    def GetImageSampleDistance(self) -> float:
-        """Return for how many pixels along each edge a ray is cast."""
-        return self.driver.state.settings.image_distance
-
-    # In VTK's GPU mapper the following would draw VTK's own volume into a smaller framebuffer, so
-    # its own switch stays off and these methods, called from Python, keep ours.
-
-    def SetAutoAdjustSampleDistances(self, on: bool) -> None:
-        """Draw previews of fewer pixels while the view moves (on by default).
-
-        Frames in a window whose desired update rate is at least ``GetInteractiveUpdateRate()``
-        are interactive: the window's interactor sets that rate while its style turns, pans or
-        zooms. Frames at rest, screenshots, exports and off-screen windows are always full.
-        """
-        if self._driver is not None:  # PyVista's constructor turns VTK's own switch off
-            self._driver.set(adjust=bool(on))
-
-    def GetAutoAdjustSampleDistances(self) -> bool:
-        """Whether previews are drawn."""
-        return self.driver.state.settings.adjust
+    # In VTK's GPU mapper SetAutoAdjustSampleDistances would draw VTK's own volume into a smaller
+    # framebuffer, so its own switch stays off, and what is called from Python keeps ours.
 
     def AutoAdjustSampleDistancesOn(self) -> None:
         """Draw previews."""
@@ -276,114 +176,6 @@ class VDIMapperMethods(ArrayChoiceMethods):
     def AutoAdjustSampleDistancesOff(self) -> None:
         """Draw every frame in full."""
         self.SetAutoAdjustSampleDistances(False)
-
-    def SetAutoAdjustMultiSamples(self, on: bool) -> None:
-        """Draw previews without multisampling where that makes them late (on by default).
-
-        Where OpenGL is software, multisampling takes most of a frame, and a VDI has no edges that
-        it would smooth: so it is given up before rays are. Frames at rest, screenshots, exports and
-        off-screen windows have the window's ``GetMultiSamples()``, which is left as it was set.
-        With several VDIs in a window all of them must allow it.
-        """
-        self.driver.set(adjust_multi_samples=bool(on))
-
-    def GetAutoAdjustMultiSamples(self) -> bool:
-        """Whether previews may be drawn without multisampling."""
-        return self.driver.state.settings.adjust_multi_samples
-
-    def SetInteractiveUpdateRate(self, rate: float) -> None:
-        """Set the window's desired update rate from which on a frame is interactive, 1/s.
-
-        1 by default, as in ``vtkSmartVolumeMapper``.
-        """
-        self.driver.set(update_rate=checked_rate("the interactive update rate", rate))
-
-    def GetInteractiveUpdateRate(self) -> float:
-        """Return the desired update rate from which on a frame is interactive, 1/s."""
-        return self.driver.state.settings.update_rate
-
-    def SetTargetFrameRate(self, rate: float | None) -> None:
-        """Set the frames per second that previews keep.
-
-        ``None``, the default, means the window's desired update rate, which the interactor gives
-        (``SetDesiredUpdateRate``: 15 in VTK, 30 in PyVista); 0 means that no rate is to be kept,
-        so that every frame is full. Several VDIs in a window keep the highest of their targets.
-        """
-        target = None if rate is None else checked_rate("the target frame rate", rate)
-        self.driver.set(target=target)
-
-    def GetTargetFrameRate(self) -> float | None:
-        """Return the frames per second that previews keep, as it was set."""
-        return self.driver.state.settings.target
-
-    def SetRegenerate(self, policy: Any) -> None:
-        """Choose what decides that a view needs a VDI of its own.
-
-        Parameters
-        ----------
-        policy : {"auto", "never"} or callable
-            ``"auto"`` (the default): an estimate of the view's error, where somebody watches the
-            window. ``"never"``: only ``actor.regenerate()``. A callable gets a
-            :class:`~pyvista_vdi.vtk_pipeline.VDIStatus` once per frame and says whether to
-            regenerate; its ``ssim`` is ``None``, because it is asked in place of the estimate.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is something else.
-        """
-        self.driver.set(regenerate=checked_policy(policy))
-
-    def GetRegenerate(self) -> Any:
-        """Return what decides that a view needs a VDI of its own."""
-        return self.driver.state.settings.regenerate
-
-    def SetRegenerateBelow(self, ssim: float | None) -> None:
-        """Set the estimated SSIM below which a VDI does not do for a view.
-
-        ``SetRegenerate("auto")`` makes another of a view at rest in a watched window; while the
-        view moves, twice the error (1 - SSIM) is borne. ``SetDraw("auto")`` draws the volume in its
-        place, where that is at hand. ``None``, the default, is 0.95 for the former; for the latter
-        it is 0.98, contrast within 4 x 4 pixels that differs by a tenth at most, and lists no wider
-        than 1.25 pixels.
-        """
-        self.driver.set(regenerate_below=None if ssim is None else checked_bound(ssim))
-
-    def GetRegenerateBelow(self) -> float | None:
-        """Return the estimated SSIM below which a VDI does not do for a view, as it was set."""
-        return self.driver.state.settings.regenerate_below
-
-    def SetInteractiveOffScreen(self, on: bool | None) -> None:
-        """Treat off-screen windows as if somebody watched them, or not.
-
-        By default, ``None``, those are that a browser shows through a remote view of trame, as in
-        notebooks: previews are drawn, and VDIs are made in the background.
-        """
-        self.driver.set(off_screen=None if on is None else bool(on))
-
-    def GetInteractiveOffScreen(self) -> bool | None:
-        """Whether off-screen windows are treated as watched; ``None`` where trame tells."""
-        return self.driver.state.settings.off_screen
-
-    def SetPickingOpacity(self, opacity: float) -> None:
-        """Set the opacity that a ray must reach in the VDI to pick it.
-
-        At least 0 and less than 1; 0.05 by default, as in VTK's pickers for volumes. What is
-        compared says ``SetPickingAccumulated``; see :func:`pyvista_vdi.pick`.
-        """
-        self.driver.set(picking_opacity=checked_opacity(opacity))
-
-    def GetPickingOpacity(self) -> float:
-        """Return the opacity that a ray must reach in the VDI to pick it."""
-        return self.driver.state.settings.picking_opacity
-
-    def SetPickingAccumulated(self, accumulated: bool) -> None:
-        """Compare the opacity from the ray's beginning (the default), or each supersegment's."""
-        self.driver.set(picking_accumulated=bool(accumulated))
-
-    def GetPickingAccumulated(self) -> bool:
-        """Whether the opacity from the ray's beginning is compared."""
-        return self.driver.state.settings.picking_accumulated
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
@@ -403,7 +195,7 @@ class VDIMapperMethods(ArrayChoiceMethods):
         self.driver.set_input(None if shown is None else shown.shared())
         self.take_array_choice(theirs)
         self.SetDevice(theirs.GetDevice())
-        self.driver.set(**vars(other.driver.state.settings))
+        self.driver.set(**vars(other.driver.settings))
         self.SetMaximumImageSampleDistance(theirs.GetMaximumImageSampleDistance())
         self.SetCropping(theirs.GetCropping())
         self.SetCroppingRegionPlanes(theirs.GetCroppingRegionPlanes())

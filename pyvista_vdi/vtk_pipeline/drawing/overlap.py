@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.records import replace
 from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
 from pyvista_vdi.vtk_pipeline.drawing.depth import OpaqueDepths
-from pyvista_vdi.vtk_pipeline.drawing.frame import Drawn, Frame, Image, Matrix, Recent, same_depth
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image, Matrix
+from pyvista_vdi.vtk_pipeline.drawing.images import Drawn, Recent, same_depth
 from pyvista_vdi.vtk_pipeline.interaction.window import now
 
 #: An actor's box must reach so far around a pixel's centre, in pixels along each axis, for the
@@ -168,7 +168,7 @@ def _raycast(frames: Sequence[Frame], levels: Sequence[_Levels]) -> OwnedImage:
     seconds = now() - before
     for frame in frames:  # as if each had drawn its own
         took = (frame.size, frame.full_size, seconds / len(frames))
-        frame.window.pace = frame.window.pace.drawn(*took, effort=frame.effort)
+        frame.window.pace.drawn(*took, effort=frame.effort)
     return OwnedImage(all_levels.done(joint.image), joint.owner)
 
 

@@ -17,8 +17,12 @@ from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.raycasting.picking import FirstHit, Pick, pick_vdi
 from pyvista_vdi.raycasting.raycast import render_first_hits
 from pyvista_vdi.vtk_pipeline.drawing.frame import Area, Frame, Image
-from pyvista_vdi.vtk_pipeline.drawing.shader import place_texture, show_first_hits, show_image
-from pyvista_vdi.vtk_pipeline.drawing.texture import ImageTexture
+from pyvista_vdi.vtk_pipeline.drawing.screen import (
+    ImageTexture,
+    place_texture,
+    show_first_hits,
+    show_image,
+)
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkInformation, vtkOpenGLActor
 
 

@@ -39,7 +39,7 @@ class Input:
 
     #: The series or the set whose VDIs are shown.
     collection: VDICollection | None = None
-    #: What chooses among the steps of a series and plays them: see ``extensions.series.player``.
+    #: What chooses among the steps of a series and plays them: see ``extensions.series.shown``.
     player: Any = None
     #: The values that the VDI is classified from; ``None`` where none are kept.
     deferred: DeferredVDI | None = None
@@ -233,6 +233,12 @@ class SourceInput(Input):
     def has_view(self) -> bool:
         """Whether somebody, or a frame, has given a view to make the VDI of."""
         return self.source.GetCamera() is not None and self.source.GetWindowSize() is not None
+
+    def view_is_chosen(self, wanted: Request | None, made: Request | None) -> bool:
+        """Whether somebody has chosen the view: since the last VDI, or for the first one."""
+        if made is None or wanted is None:
+            return made is None and self.source.GetCamera() is not self._camera
+        return bool(wanted.key != made.key and wanted.screen != made.screen)
 
     def set_view_if_missing(
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]

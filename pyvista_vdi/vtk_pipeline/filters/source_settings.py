@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+from pyvista_vdi.model.arguments import takes
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats, as_range, not_taken
 from pyvista_vdi.model.lighting import Lights
@@ -18,14 +18,12 @@ from pyvista_vdi.model.types import (
     CameraLike,
     DeviceLike,
     LightsLike,
-    MemoryLike,
-    OcclusionLike,
     Progress,
-    RangeLike,
 )
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
 from pyvista_vdi.vtk_pipeline.filters.classifying import Classifying
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, require_image_port
+from pyvista_vdi.vtk_pipeline.filters.option_methods import OptionMethods
 from pyvista_vdi.vtk_pipeline.filters.view import TrackedCamera, camera_of
 from pyvista_vdi.vtk_pipeline.vtk import (
     require_this_build,
@@ -53,7 +51,7 @@ _PLAIN = (
 )
 
 
-class SourceSettings(Classifying):
+class SourceSettings(OptionMethods, Classifying):
     """What can be set of a source; each setting is checked when it is set."""
 
     def __init__(self) -> None:
@@ -294,123 +292,20 @@ class SourceSettings(Classifying):
         """Return how the VDI is made."""
         return self._options
 
-    def _set(self, **option: Any) -> None:
-        self.SetOptions(replace(self._options, **option))
-
-    def SetMaxSupersegments(self, limit: int) -> None:
-        """Set the longest list, 1 to 4096; ``max_supersegments`` of ``generate``."""
-        self._set(max_supersegments=limit)
-
-    def GetMaxSupersegments(self) -> int:
-        """Return the longest list, 1 to 4096."""
-        return self._options.max_supersegments
-
-    def SetCriterion(self, criterion: str) -> None:
-        """Set what decides where a list that must be shortened is cut.
-
-        As ``criterion`` of :func:`pyvista_vdi.generate`.
-        """
-        self._set(criterion=criterion)
-
-    def GetCriterion(self) -> str:
-        """Return what decides where a list that must be shortened is cut."""
-        return self._options.criterion
-
-    def SetSampleDistance(self, distance: float | None) -> None:
-        """Set the length of a step, model units; ``None`` is half the smallest spacing.
-
-        As ``sample_distance`` of :func:`pyvista_vdi.generate`.
-        """
-        self._set(sample_distance=distance)
-
-    def GetSampleDistance(self) -> float | None:
-        """Return the length of a step, model units; ``None`` is half the smallest spacing."""
-        return self._options.sample_distance
-
-    def SetTolerance(self, tolerance: float) -> None:
-        """Set the error that may be traded for shorter lists; ``tolerance`` of ``generate``."""
-        self._set(tolerance=tolerance)
-
-    def GetTolerance(self) -> float:
-        """Return the error that may be traded for shorter lists."""
-        return self._options.tolerance
-
-    def SetViewCone(self, degrees: float) -> None:
-        """Set the half angle of the cone of views that must be served, 0 to 90 degrees.
-
-        As ``view_cone`` of :func:`pyvista_vdi.generate`.
-        """
-        self._set(view_cone=degrees)
-
-    def GetViewCone(self) -> float:
-        """Return the half angle of the cone of views that must be served, 0 to 90 degrees."""
-        return self._options.view_cone
-
-    def SetPrecision(self, precision: str) -> None:
-        """Set what a supersegment takes, where no target chooses it.
-
-        As ``precision`` of :func:`pyvista_vdi.generate`.
-        """
-        self._set(precision=precision)
-
-    def GetPrecision(self) -> str:
-        """Return what a supersegment takes, where no target chooses it."""
-        return self._options.precision
-
-    def SetAmbientOcclusion(self, occlusion: OcclusionLike | None) -> None:
-        """Set ambient occlusion: whether, and up to which radius.
-
-        ``None`` or ``False``: no, which is the default; ``True``: with the default radius; a
-        number: with this radius, model units; or an ``AmbientOcclusion``.
-        As ``ambient_occlusion`` of :func:`pyvista_vdi.generate`.
-        """
-        self._set(ambient_occlusion=occlusion)
-
-    def GetAmbientOcclusion(self) -> AmbientOcclusion | None:
-        """Return the ambient occlusion; ``None`` if there is none."""
-        return self._options.ambient_occlusion
-
-    def SetMemoryLimit(self, limit: MemoryLike | None) -> None:
-        """Set the most bytes that generating may take on the device, if they are limited.
-
-        Bytes, or a text such as ``"2 GiB"``; ``None``, the default, is what the device has. The
-        estimate whether a view needs a VDI of its own keeps to the limit by itself.
-        As ``memory_limit`` of :func:`pyvista_vdi.generate`.
-        """
-        self._set(memory_limit=limit)
-
-    def GetMemoryLimit(self) -> int | None:
-        """Return the most bytes that generating may take on the device, if they are limited."""
-        return self._options.memory_limit
-
-    def SetDial(
-        self,
-        quality: str | None = None,
-        *,
-        target_ssim: float | None = None,
-        target_fps: float | None = None,
-        max_bytes: float | None = None,
-        target_angle: float = 30.0,
-    ) -> None:
+    @takes(target=QualityTarget, order=("quality",), flat=True)
+    def SetDial(self, target: QualityTarget) -> None:
         """Choose settings by what the VDI is to reach; without arguments, no longer.
 
         It chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to
         have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata["dial"]`` says what it
         chose.
 
-        Parameters
-        ----------
-        quality, target_ssim, target_fps, max_bytes, target_angle
-            As for :func:`pyvista_vdi.generate`.
-
         Raises
         ------
         InvalidArgumentError
             If one is out of range, or they contradict each other.
         """
-        self.SetTarget(
-            QualityTarget.checked(quality, target_ssim, target_fps, max_bytes, target_angle)
-        )
+        self.SetTarget(target)
 
     def SetTarget(self, target: QualityTarget) -> None:
         """Choose settings by what the VDI is to reach, as by :meth:`SetDial`."""
@@ -420,32 +315,24 @@ class SourceSettings(Classifying):
         """Return what the VDI is to reach; ``None`` where nothing is to be chosen."""
         return self._target
 
-    def SetDeferral(
-        self,
-        classification: str = "baked",
-        value_range: RangeLike | None = None,
-        importance: ArrayLike | None = None,
-    ) -> None:
+    @takes(deferral=Deferral, order=Deferral.declared, flat=True)
+    def SetDeferral(self, deferral: Deferral) -> None:
         """Choose when scalars are classified; without arguments, as the VDI is made.
 
         ``"deferred"`` makes a :class:`~pyvista_vdi.DeferredVDI`: of the volume property, which may
         be left out, only the interpolation counts then.
-
-        Parameters
-        ----------
-        classification, value_range, importance
-            As for :func:`pyvista_vdi.generate`.
 
         Raises
         ------
         InvalidArgumentError
             If one is out of range, or they contradict each other.
         """
-        if importance is not None:  # a list, which tells whether another is the same
-            importance = as_floats(importance).tolist()
-        if value_range is not None:
-            value_range = as_range(value_range)
-        self._change("_deferral", Deferral.checked(classification, value_range, importance))
+        given: dict[str, Any] = {}  # lists, which tell whether others are the same
+        if deferral.importance is not None:
+            given["importance"] = as_floats(deferral.importance).tolist()
+        if deferral.value_range is not None:
+            given["value_range"] = as_range(deferral.value_range)
+        self._change("_deferral", replace(deferral, **given))
 
     def GetDeferral(self) -> Deferral:
         """Return when scalars are classified."""

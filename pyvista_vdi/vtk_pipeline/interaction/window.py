@@ -15,11 +15,16 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.quality.frame_state import Settings
-from pyvista_vdi.quality.pace import Pace
+from pyvista_vdi.quality.rate import Pace
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction import browser
-from pyvista_vdi.vtk_pipeline.vtk import vtkMatrix4x4, vtkOpenGLGL2PSHelper, vtkVolume, weakly
+from pyvista_vdi.vtk_pipeline.vtk import (
+    numpy_to_vtk,
+    vtkMatrix4x4,
+    vtkOpenGLGL2PSHelper,
+    vtkVolume,
+    weakly,
+)
 
 T = TypeVar("T")
 
@@ -27,8 +32,13 @@ T = TypeVar("T")
 _KNOWN_CAMERAS = 16
 
 _BUTTONS = ("LeftButtonPressEvent", "MiddleButtonPressEvent", "RightButtonPressEvent")
+#: Styles that move actors.
+_ACTOR_STYLES = ("vtkInteractorStyleTrackballActor", "vtkInteractorStyleJoystickActor")
 #: Priorities of observers before and after the style's, which is 0.
 _BEFORE, _AFTER = 1.0, -1.0
+
+#: Frames per second to be kept in a window that nobody's hand moves.
+_RATE = 30.0
 
 #: By the windows' addresses.
 _windows: dict[str, weakref.ref[Window]] = {}
@@ -169,6 +179,7 @@ class Window:
         self._started: float | None = None
         self._previewed = False
         self._picture_wanted = False
+        self._transparent: list[tuple[Any, Any]] = []  # point data and scalars of solid proxies
         self._foreground = contextlib.ExitStack()  # from the frame's start to its end
         window.AddObserver("StartEvent", lambda *_: self._start())
         window.AddObserver("EndEvent", lambda *_: self._end())
@@ -215,8 +226,13 @@ class Window:
         shown = [each.driver for volumes in self._shown for each in volumes()]
         return list(dict.fromkeys(driver for driver in shown if driver is not None))
 
-    def listen(self, interactor: Any, kind: type[Any]) -> None:
-        """Begin and end what is shared of a kind around what a style does at a press."""
+    def listen(self, interactor: Any) -> None:
+        """Make VDIs movable by the interactor styles that move actors.
+
+        They ask a cell picker of their own, which classifies the proxy's scalars: all transparent,
+        and so a VDI is looked through. While a button goes down where a pick hits a VDI, what is in
+        front of it considered, its proxy has a scalar that is opaque.
+        """
         if not self._watched.is_new(interactor):
             return
         weak = weakref.ref(self)
@@ -224,21 +240,41 @@ class Window:
         def pressed(caller: Any, _: str) -> None:
             window = weak()
             if window is not None:
-                window.shared(kind).begin(window.drivers, caller)
+                window._grab(caller)
 
         def taken(*_: Any) -> None:
             window = weak()
             if window is not None:
-                window.shared(kind).end()
+                window._let_go()
 
         for event in _BUTTONS:
             interactor.AddObserver(event, pressed, _BEFORE)
             interactor.AddObserver(event, taken, _AFTER)
 
-    @property
-    def single(self) -> bool:
-        """Whether no other VDI is drawn in this window."""
-        return sum(bool(driver.actor.GetVisibility()) for driver in self.drivers) <= 1
+    def _grab(self, interactor: Any) -> None:
+        """Make the proxies of VDIs under the pointer opaque."""
+        self._let_go()  # another observer may have ended the last event before it came here
+        style = interactor.GetInteractorStyle()
+        if style is not None and style.IsA("vtkInteractorStyleSwitch"):
+            style = style.GetCurrentStyle()
+        if style is None or not any(style.IsA(name) for name in _ACTOR_STYLES):
+            return
+        x, y = interactor.GetEventPosition()
+        renderer = interactor.FindPokedRenderer(x, y)
+        there = [each for each in self.drivers if renderer in each.renderers()]
+        hit = [each for each in there if each.actor.pick(x, y, renderer=renderer) is not None]
+        for driver in hit:  # after the picks, which draw
+            data = driver.proxy.GetPointData()
+            opaque = _opaque_scalar(driver.actor)
+            solid = np.full((8, data.GetScalars().GetNumberOfComponents()), opaque)
+            self._transparent.append((data, data.GetScalars()))
+            data.SetScalars(numpy_to_vtk(solid, deep=True))
+
+    def _let_go(self) -> None:
+        """Make all transparent again."""
+        for data, scalars in self._transparent:
+            data.SetScalars(scalars)
+        self._transparent.clear()
 
     @property
     def drawing(self) -> bool:
@@ -256,25 +292,28 @@ class Window:
 
     # What is seen of it
 
-    def watched_behind(self, settings: Settings) -> bool:
+    def watched_behind(self, settings: Any) -> bool:
         """Whether work may go on behind the frames: somebody watches, and can move."""
         window = self._window()
         here = bool(window.GetShowWindow()) and window.GetInteractor() is not None
         return here or self._from_afar(settings)
 
-    def _from_afar(self, settings: Settings) -> bool:
+    def _from_afar(self, settings: Any) -> bool:
         on = settings.off_screen
         return browser.watches(self._window()) if on is None else on
 
-    def rate(self, settings: Settings) -> float:
-        """Return the frames per second to be kept while a hand moves."""
-        return float(settings.target or self._window().GetDesiredUpdateRate())
+    def rate(self, settings: Any) -> float:
+        """Return the frames per second to be kept while a hand moves, also before it does."""
+        if settings.target or self.moving(settings):
+            return float(settings.target or self._window().GetDesiredUpdateRate())
+        interactor = self._window().GetInteractor()
+        return _RATE if interactor is None else max(1.0, interactor.GetDesiredUpdateRate())
 
-    def moving(self, settings: Settings) -> bool:
+    def moving(self, settings: Any) -> bool:
         """Whether a hand moves, by VTK's convention."""
         return bool(self._window().GetDesiredUpdateRate() >= settings.update_rate)
 
-    def previews(self, settings: Settings) -> bool:
+    def previews(self, settings: Any) -> bool:
         """Whether frames may have fewer rays now: a hand moves, and somebody watches."""
         if not (settings.previews and self.moving(settings)):
             return False
@@ -329,7 +368,7 @@ class Window:
         for runtime in {driver.runtime() for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
         samples = window.GetMultiSamples()
-        if samples and self.pace.dear_samples and self._may_go_without():
+        if samples and self.pace.slow_samples and self._may_go_without():
             self._given_up, samples = samples, 0
             window.SetMultiSamples(0)
         # From 9.7 on VTK draws the whole window once more to give the screen a depth buffer, which
@@ -337,12 +376,12 @@ class Window:
         if self._blit is None and _draws_depth_to_screen(window):
             self._blit = window.GetFrameBlitMode()
             window.SetFrameBlitModeToBlitToCurrent()
-        self.pace = self.pace.began(samples)
+        self.pace.began(samples)
 
     def _may_go_without(self) -> bool:
         """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
         shown = [
-            (each.driver.state.settings, volumes.renderer())
+            (each.driver.settings, volumes.renderer())
             for volumes in self._shown
             for each in volumes()
             if each.driver is not None and each.visible
@@ -369,8 +408,8 @@ class Window:
         started, self._started = self._started, None
         self._previewed = self.pace.frame.preview or given_up is not None
         seconds = None if started is None else now() - started
-        moving = any(self.moving(driver.state.settings) for driver in self.drivers)
-        self.pace = self.pace.ended(seconds, moving)
+        moving = any(self.moving(driver.settings) for driver in self.drivers)
+        self.pace.ended(seconds, moving)
 
     def _camera_changed(self) -> None:
         """Replace a preview on the screen by the full frame before a screenshot reads it.
@@ -400,3 +439,13 @@ def _draws_depth_to_screen(window: Any) -> bool:
         and window.GetFrameBlitMode() == window.BlitToHardware
         and not window.GetStereoRender()  # whose two buffers that copy alone fills
     )
+
+
+def _opaque_scalar(actor: Any) -> float:
+    """Return the scalar that an actor's property makes most opaque."""
+    function, node = actor.GetProperty().GetScalarOpacity(), [0.0] * 4
+    best = (-1.0, 0.0)
+    for i in range(function.GetSize()):
+        function.GetNodeValue(i, node)
+        best = max(best, (node[1], node[0]))
+    return best[1]

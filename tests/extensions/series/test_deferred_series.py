@@ -22,7 +22,11 @@ pytestmark = pytest.mark.filterwarnings("ignore:the transfer function shows valu
 
 SIZE, RANGE = (24, 16), (20, 180)
 TIMES = (0.0, 0.5, 2.0, 4.0)
-KEPT = {"classification": "deferred", "value_range": RANGE, "importance": [1, 2]}
+KEPT = {
+    "classification": "deferred",
+    "value_range": RANGE,
+    "settings": pvdi.Settings(importance=[1, 2]),
+}
 LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.8], "clim": (40, 170)}
 
 
@@ -140,9 +144,12 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
 @pytest.mark.parametrize(
     ("kept", "says"),
     [
-        ({"importance": [1, -1]}, "importance must be"),
-        ({"value_range": RANGE, "importance": [(0, 0), (300, 0)]}, "importance is 0 over all"),
-        ({"importance": "much"}, "importance must be.*much"),
+        ({"settings": pvdi.Settings(importance=[1, -1])}, "importance must be"),
+        (
+            {"value_range": RANGE, "settings": pvdi.Settings(importance=[(0, 0), (300, 0)])},
+            "importance is 0 over all",
+        ),
+        ({"settings": pvdi.Settings(importance="much")}, "importance must be.*much"),
         ({"ambient_occlusion": pvdi.AmbientOcclusion()}, "ambient occlusion follows"),
     ],
 )
@@ -161,7 +168,7 @@ def test_what_cannot_be_kept_is_refused_before_a_step_is_written(kept, says, tmp
 def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
     path = shutil.copytree(saved, tmp_path / "run.vdis")
     with (
-        pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT | {"importance": None}) as out,
+        pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT | {"settings": None}) as out,
         pytest.raises(InvalidArgumentError, match=r"importance is \(\(20\.0, 1\.0\), .*None"),
     ):
         out.append(next(volumes()), 9.0)

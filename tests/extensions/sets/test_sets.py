@@ -181,7 +181,7 @@ def test_a_vdi_of_a_set_is_what_generate_makes(made, volume):
         vdi.window_size,
         transfer_function=_table(),
         max_supersegments=8,
-        view_cone=30,
+        settings=pvdi.Settings(view_cone=30),
         precision="8-byte",
     )
     assert vdi.precision == "8-byte"

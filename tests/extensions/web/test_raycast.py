@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import strategies
 from browsers import COUNTING, array_of, file_of, in_base64
+from fewer_lists import lists_crossed, subsampled_lists
 from oracle import explain
 from real_data import require_data
 
@@ -18,7 +19,6 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.vtk_pipeline.interaction.fewer_lists import lists_crossed, subsampled_lists
 
 #: See above.
 TOLERANCE = 2e-4
@@ -56,7 +56,7 @@ window.picture = (camera, width, height, clippingPlanes, depth, few) => {
   const framebuffer = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
   gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
-  raycaster.draw({ camera, width, height, clippingPlanes, depthTexture, few });
+  raycaster.draw({ camera, width, height, clippingPlanes, depthTexture });
   const seen = new Float32Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, seen);
   gl.deleteFramebuffer(framebuffer);

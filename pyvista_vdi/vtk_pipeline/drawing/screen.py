@@ -1,14 +1,164 @@
-"""What takes the place of VTK's ray caster in the shaders of a VDI's actor."""
+"""How an image comes to the screen: texture, shader, and the pixels that OpenGL fills.
+
+The fragment shader of VTK's ray caster is replaced by a lookup in the image of the viewport.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_SHADERS, refusing
 from pyvista_vdi.vtk_pipeline.vtk import (
+    VTK_FLOAT,
     vtkHardwareSelector,
     vtkOpenGLShaderProperty,
+    vtkTextureObject,
 )
+
+_GL_SCISSOR_BOX = 0x0C10
+
+#: Left, bottom, width and height in pixels of the framebuffer.
+Box = tuple[int, int, int, int]
+
+
+class _Texture:
+    """A texture that is made when it is first shown, and filled again in another window."""
+
+    def __init__(self) -> None:
+        self._texture: Any = None
+
+    def _in_context(self, window: Any) -> bool:
+        """Bind the texture to a window's current context; return whether it is filled there."""
+        if self._texture is None:
+            self._texture = vtkTextureObject()
+            self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
+            self._texture.SetWrapT(vtkTextureObject.ClampToEdge)
+        if self._texture.GetContext() is not window:
+            self._texture.SetContext(window)
+            return False
+        return bool(self._texture.GetHandle() != 0)
+
+    @property
+    def there(self) -> bool:
+        """Whether it was made, and not freed."""
+        return self._texture is not None
+
+    def let_go(self) -> None:
+        """Release the texture unit."""
+        if self._texture is not None:
+            self._texture.Deactivate()
+
+    def release(self) -> None:
+        """Free it, for the next frame to fill it anew; a mapper may keep the object."""
+        window = None if self._texture is None else self._texture.GetContext()
+        if window is not None:
+            self._texture.ReleaseGraphicsResources(window)
+
+
+class ImageTexture(_Texture):
+    """The image that the shader of an actor looks up."""
+
+    _uploaded: int | None = None
+
+    def show(
+        self, window: Any, image: NDArray[np.float32], number: int | None, *, smooth: bool
+    ) -> int:
+        """Bind an image for the shader, in the window's context; return its texture unit.
+
+        ``image`` is RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
+        Where ``number`` is that of last time it is not uploaded again. With ``smooth`` texels are
+        interpolated linearly: a full frame's texels are the pixels.
+        """
+        filled = self._in_context(window)
+        texture = self._texture
+        kind = vtkTextureObject.Linear if smooth else vtkTextureObject.Nearest
+        texture.SetMinificationFilter(kind)
+        texture.SetMagnificationFilter(kind)
+        if not filled or number is None or number != self._uploaded:
+            height, width = image.shape[:2]
+            texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
+            self._uploaded = number
+        texture.Activate()
+        return int(texture.GetTextureUnit())
+
+    def release(self) -> None:
+        """Free the texture and its object."""
+        super().release()
+        self._texture = self._uploaded = None
+
+
+class NoDepth(_Texture):
+    """A depth texture of one texel, in place of the copy of the depth buffer that VTK would make.
+
+    VTK's volume mapper copies the whole depth buffer in each frame, for the ray caster that our
+    shader replaces: under MSAA that takes longer than to draw the image.
+    """
+
+    def show(self, window: Any, mapper: Any) -> None:
+        """Bind it for a mapper in the frame that begins; the image's texture is active already."""
+        if not self._in_context(window):
+            far = np.ones(1, dtype=np.float32)  # window depth of nothing
+            self._texture.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, far)
+        mapper.SetSharedDepthTexture(self._texture)
+        self._texture.Activate()
+
+
+def shown_box(image: NDArray[np.float32], origin: tuple[int, int], size: tuple[int, int]) -> Box:
+    """Return the pixels of a viewport that a smaller image may show something in.
+
+    Parameters
+    ----------
+    image : ndarray of float32, shape (h, w, 4)
+        Premultiplied RGBA, top row first, interpolated linearly to the viewport.
+    origin, size : (int, int)
+        The viewport's lower left corner and size, framebuffer pixels.
+
+    Returns
+    -------
+    (int, int, int, int)
+        Left, bottom, width and height in framebuffer pixels; zeros where nothing is shown.
+    """
+    there: NDArray[Any] = np.asarray(image.any(axis=2))
+    box = []
+    edges = np.any(there, axis=0), np.any(there[::-1], axis=1)
+    for at_pixels, pixels, start in zip(edges, size, origin, strict=True):
+        (at,) = np.nonzero(at_pixels)
+        if len(at) == 0:
+            return 0, 0, 0, 0
+        # A texel reaches to the centres of its neighbours: half a texel beyond its edges
+        n = len(at_pixels)
+        low = max(0, int((at[0] - 0.5) * pixels / n) - 1)
+        high = min(pixels, int((at[-1] + 1.5) * pixels / n) + 2)
+        box += [(start + low, high - low)]
+    (left, width), (bottom, height) = box
+    return left, bottom, width, height
+
+
+class Scissor:
+    """The window's scissor box, narrowed while a mapper draws; VTK's renderer has it tested."""
+
+    def __init__(self) -> None:
+        self._before: tuple[Any, list[int]] | None = None  # OpenGL's state, and its scissor box
+
+    def narrow(self, window: Any, box: Box) -> None:
+        """Draw in this box alone, and within what was set, until :meth:`end`."""
+        # What a frame that VTK broke off has left is not set again: each renderer sets its own box
+        state, before = window.GetState(), [0, 0, 0, 0]
+        state.vtkglGetIntegerv(_GL_SCISSOR_BOX, before)
+        low = [max(a, b) for a, b in zip(before[:2], box[:2], strict=True)]
+        high = [min(before[i] + before[i + 2], box[i] + box[i + 2]) for i in (0, 1)]
+        state.vtkglScissor(*low, *(max(0, h - b) for b, h in zip(low, high, strict=True)))
+        self._before = state, before
+
+    def end(self) -> None:
+        """Set what was set before."""
+        before, self._before = self._before, None
+        if before is not None:
+            before[0].vtkglScissor(*before[1])
+
 
 _DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
 

@@ -1,0 +1,245 @@
+"""What a frame shows and what is made for it: each row of docs/window_events.md."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import pytest
+
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.view import View
+from pyvista_vdi.quality.costs import Costs
+from pyvista_vdi.quality.pictures import Estimate, Made, Pictures
+from pyvista_vdi.quality.plan import Making, Plan, Seen, lacking, plan
+
+BOUNDS = (-1.0, 1.0) * 3
+HOME = View(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), (320, 180))
+
+
+def turned(degrees):
+    return View(HOME.camera.azimuth(degrees), HOME.size)
+
+
+MADE = Made(1, BOUNDS, "a", HOME, pixels=1e4)
+#: A frame that somebody watches, at rest, of a volume whose VDI is that of this view.
+SEEN = Seen(HOME, "a", BOUNDS, HOME, watched=True, made=MADE, seconds=0.03)
+AWAY = replace(SEEN, view=turned(40), made=replace(MADE, angle=40.0))
+POOR = replace(AWAY, estimate=Estimate(1, turned(40), 0.5))
+
+
+def of(seen=SEEN, **changes):
+    return plan(replace(seen, **changes))
+
+
+@pytest.mark.parametrize("asked", [{}, {"late": True}, {"volume": "bricks"}, {"draw": "vdi"}])
+def test_the_first_vdi_is_made_where_frames_are_late_or_somebody_asks(asked):
+    found = of(made=None, **asked)
+    if asked.keys() & {"draw", "volume"}:
+        assert (found.show, found.update) == ("vdi", True)
+        return
+    assert found.make == (HOME if asked else None)
+    assert (found.show, found.full) == ("volume", True)
+    moves = of(made=None, hand=True, moving=True, **asked)
+    assert moves.make is None
+
+
+def test_the_first_vdi_is_of_the_view_at_hand_or_of_the_one_that_was_chosen():
+    assert of(made=None, late=True, view=turned(9)).make == turned(9)
+    assert of(made=None, late=True, view=turned(9), chosen=True).make == HOME
+    assert of(made=None, late=True, view=turned(9), regenerate="never").make == HOME
+
+
+@pytest.mark.parametrize("draw", ["auto", "vdi"])
+def test_a_change_is_shown_by_the_volume_and_its_vdi_made_at_rest(draw):
+    changed = replace(SEEN, content="b", draw=draw, late=True, view=turned(9))
+    found = plan(changed)
+    assert (found.show, found.content, found.stand_in) == ("volume", "b", True)
+    assert (found.full, found.make) == (False, turned(9))
+    assert of(changed, regenerate="never").make == HOME
+    making = Making("b", turned(9), for_view=False)
+    goes_on = of(changed, making=making)
+    assert (goes_on.make, goes_on.give_up) == (None, False)
+    again = of(changed, making=making, content="c")
+    assert (again.give_up, again.content, again.make) == (True, "c", turned(9))
+    back = of(changed, making=making, content="a")
+    assert (back.give_up, back.make) == (True, None)
+    assert of(changed, failed=True).make is None
+    assert of(changed, volume="none").show == "vdi"
+
+
+def test_a_moving_hand_has_the_machine():
+    """Whatever is seen, nothing is begun, and what serves waits."""
+    for seen, regenerate, late, draw in product(
+        (SEEN, AWAY, POOR, replace(SEEN, content="b"), replace(SEEN, made=None)),
+        ("auto", "never", "ask"),
+        (True, False),
+        ("auto", "vdi", "volume"),
+    ):
+        known = {"regenerate": regenerate, "late": late, "draw": draw, "wish": True}
+        found = of(seen, hand=True, moving=True, settled=False, **known)
+        assert (found.make, found.estimate) == (None, None)
+    waits = of(POOR, hand=True, moving=True, making=Making("a", HOME, for_view=True), draw="vdi")
+    assert not waits.give_up
+
+
+def test_a_view_at_rest_is_estimated_and_gets_a_vdi_if_it_is_poor():
+    assert of(SEEN).estimate is None, "at home there is nothing to tell"
+    assert of(AWAY, settled=False).estimate is None
+    assert of(AWAY, draw="vdi").estimate == "background"
+    assert of(AWAY, regenerate="never").estimate is None
+    assert of(POOR, draw="vdi").make == turned(40)
+    assert of(POOR).make is None, "the volume's own frames keep the rate"
+    assert of(POOR, late=True).make == turned(40)
+    assert of(POOR, draw="vdi", bound=0.4).make is None
+    good = replace(POOR, estimate=Estimate(1, turned(40), 0.97), draw="vdi")
+    assert (plan(good).make, plan(good).estimate) == (None, None)
+    assert of(good, view=turned(43)).estimate == "background", "it was of another view"
+    assert of(AWAY, regenerate="ask", wish=True).make == turned(40)
+
+
+def test_what_is_made_for_a_view_that_was_left_is_given_up_at_rest():
+    making = Making("a", turned(60), for_view=True)
+    on_the_way = replace(AWAY, making=making, draw="vdi")
+    assert not of(on_the_way, view=turned(55)).give_up
+    assert of(on_the_way, view=turned(5)).give_up
+    assert not of(on_the_way, view=turned(5), hand=True).give_up
+    assert not of(on_the_way, view=turned(5), making=replace(making, for_view=False)).give_up
+
+
+def test_somebody_who_sets_another_view_gets_its_vdi():
+    asked = of(screen=turned(90), chosen=True)
+    assert (asked.make, asked.show) == (turned(90), "vdi")
+
+
+def test_vdi_or_volume_whichever_is_better_in_time():
+    assert of(costs=Costs(volume=1e-9)).show == "vdi", "until both have told"
+    costs = Costs(volume=1e-7, vdi=1e-6)
+    assert of(costs=costs).show == "volume"
+    assert of(costs=Costs(volume=1e-7, vdi=0.9e-7)).show == "vdi"
+    # What was drawn last stays where it makes no difference
+    assert of(costs=Costs(volume=1e-7, vdi=0.9e-7, way="volume")).show == "volume"
+    # In a motion both may have fewer pixels, and the VDI's own error counts
+    slow = Costs(volume=1e-3, vdi=1e-6)
+    assert of(moving=True, costs=slow).show == "vdi"
+    assert of(moving=True, costs=replace(slow, volume=1e-6)).show == "vdi"
+    assert of(POOR, moving=True, costs=replace(slow, volume=1e-6)).show == "volume"
+    assert of(POOR, costs=slow).show == "volume", "it does not do at rest"
+    assert of(made=replace(MADE, coverage=0.9), costs=slow).show == "volume"
+    assert of(made=replace(MADE, magnification=1.5), costs=slow).show == "volume"
+    assert of(joint=True, costs=costs).show == "vdi", "merged by lists"
+    assert of(volume="bricks", costs=costs).show == "vdi"
+
+
+def test_what_cannot_be_made_is_said_and_what_was_shown_stays():
+    assert of(content=None).show == "vdi"
+    assert of(content=None, made=None).show == "trouble"
+    assert of(content=None, watched=False).show == "trouble"
+    assert of(content=None, draw="volume").show == "trouble"
+
+
+def test_draw_volume_makes_nothing():
+    found = of(draw="volume", late=True, making=Making("a", HOME, for_view=True))
+    assert (found.show, found.make, found.give_up) == ("volume", None, True)
+    assert of(draw="volume", joint=True, made=None).update
+    assert of(draw="volume", volume="bricks").show == "vdi"
+    assert of(draw="volume", volume="bricks", watched=False, content="b").in_bricks
+
+
+# Pictures that are kept
+
+KEPT = replace(SEEN, watched=False)
+
+
+def test_one_picture_is_the_volumes_and_no_vdi_is_made():
+    found = of(KEPT, made=None)
+    assert (found.show, found.update, found.in_bricks, found.full) == ("volume", False, True, True)
+    assert of(KEPT, made=None, volume="none").update
+    assert of(KEPT, made=None, draw="vdi").update
+    assert of(KEPT, made=None, regenerate="ask").update
+    assert not of(KEPT, made=None, draw="vdi", failed=True).update
+
+
+def test_many_pictures_of_nearly_one_view_make_a_vdi():
+    pictures, drawn = Pictures(), []
+    for k in range(14):
+        found = of(KEPT, made=None, view=turned(0.2 * k), pictures=pictures)
+        pictures = found.pictures
+        drawn.append((found.show, found.view))
+    assert drawn == [("volume", None)] * 12 + [("vdi", "take")] * 2
+    for again in range(3):  # the same picture once more costs nothing
+        pictures = of(KEPT, made=None, view=turned(90), pictures=pictures).pictures
+        assert len(pictures.by_volume) == 13, again
+    apart = [turned(15 * k) for k in range(24)]
+    assert not Pictures("a", by_volume=tuple(apart)).deserve_vdi(turned(7), BOUNDS)
+
+
+def test_a_vdi_draws_pictures_that_are_like_the_volumes():
+    near = replace(KEPT, view=turned(3), made=replace(MADE, angle=3.0))
+    assert plan(near).estimate == "now"
+    for ssim, contrast, show in ((0.99, 1.0, "vdi"), (0.9, 1.0, "volume"), (0.99, 0.8, "volume")):
+        judged = Estimate(1, turned(3), ssim, contrast)
+        found = of(near, judged=judged)
+        assert (found.show, found.estimate) == (show, None)
+        # It holds for views that are as near; what fails fails farther away
+        beyond = replace(near, pictures=found.pictures, view=turned(3.3))
+        assert plan(beyond).show == show
+        if show == "volume":
+            far = of(near, pictures=found.pictures, made=replace(MADE, angle=5.0), view=turned(5))
+            assert (far.show, far.estimate) == ("volume", None)
+    assert of(near, judged=False).show == "volume"
+    assert of(near, judged=Estimate(1, turned(3), 0.9), bound=0.8).show == "vdi"
+    assert of(near, made=replace(MADE, angle=12.0)).show == "volume"
+    assert of(near, made=replace(MADE, angle=3.0, magnification=2.0)).show == "volume"
+    assert of(near, made=replace(MADE, angle=3.0, coverage=0.9)).show == "volume"
+
+
+def test_pictures_in_which_volumes_overlap_are_drawn_by_vdis():
+    assert of(KEPT, joint=True, made=None).show == "exact"
+    never = of(KEPT, joint=True, made=None, regenerate="never")
+    assert (never.show, never.update) == ("vdi", True)
+
+
+def test_a_vdi_of_what_has_changed_takes_the_view_of_a_whole_picture():
+    changed = replace(KEPT, content="b", draw="vdi")
+    assert (plan(changed).view, plan(changed).update) == ("follow", True)
+    for stays in ({"regenerate": "never"}, {"one_view": False}, {"first_look": False}):
+        assert of(changed, **stays).view is None
+    wish = of(KEPT, regenerate="ask", wish=True)
+    assert (wish.show, wish.view, wish.update) == ("vdi", "take", True)
+
+
+def test_whatever_is_seen_is_planned_without_fail():
+    """All combinations; who is watched waits for nothing but a first VDI."""
+    kinds = {
+        "draw": ("auto", "vdi", "volume"),
+        "regenerate": ("auto", "never", "ask"),
+        "watched": (False, True),
+        "moving": (False, True),
+        "joint": (False, True),
+        "made": (None, MADE, replace(MADE, content="b", angle=30.0)),
+        "making": (None, Making("a", turned(9), for_view=True)),
+        "failed": (False, True),
+        "volume": ("whole", "bricks", "none"),
+        "late": (False, True),
+        "content": ("a", None),
+    }
+    for values in product(*kinds.values()):
+        seen = replace(SEEN, **dict(zip(kinds, values, strict=True)))
+        found = plan(seen)
+        assert isinstance(found, Plan)
+        assert (found.content is not None) or found.show != "volume"
+        assert found.make is None or not (seen.failed or found.update)
+        if seen.watched and seen.made is not None:
+            assert not found.update
+
+
+def test_what_a_vdi_without_its_volume_lacks_is_said():
+    fine = Made(1, BOUNDS, angle=50.0, coverage=0.95, magnification=1.5)
+    assert lacking(fine, 60.0, "x") == []
+    poor = Made(1, BOUNDS, angle=70.0, coverage=0.5, magnification=2.5)
+    assert [cause for cause, _ in lacking(poor, 60.0, "x")] == [
+        "angle",
+        "coverage",
+        "magnification",
+    ]
