@@ -15,15 +15,7 @@ from pyvista_vdi.device.launches import Runtime
 from pyvista_vdi.device.programs import KernelDeclaration
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
-PROBE = KernelDeclaration(
-    "lib/probe.cl",
-    "probe",
-    x="float*",
-    values="float4*",
-    group_sum="uint*",
-    total="uint*",
-    shared="local uint*",
-)
+PROBE = KernelDeclaration("lib/probe.cl", "probe")
 PROBE_COUNT, PROBE_GROUP = 256, 32
 # OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
 # value; the fourth is for the reference, which is rounded to single precision nowhere.

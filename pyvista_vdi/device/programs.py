@@ -15,7 +15,7 @@ import re
 import sqlite3
 import threading
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, cached_property
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
@@ -121,18 +121,29 @@ class Parameter:
 class KernelDeclaration:
     """A kernel function, with the types of its arguments by name and in order.
 
-    ``path`` is a file of ``pyvista_vdi.opencl``, any other one as a Path. An argument is a number
-    (``"int"``), a vector (``"float4"``), a pointer to a buffer (``"float4*"``), to memory of each
-    work-group (``"local ulong*"``), or a structure. A type may be named by a ``-D`` option
-    (``"VOXEL_T*"``). What only programs with an option have ends in ``" if OPTION"`` or ``" if
-    OPTION=value"``, what only those without it have, in ``" if not OPTION"``; there may be several.
+    ``path`` is a file of ``pyvista_vdi.opencl``, any other one as a Path. The file says what the
+    arguments are, but for the ``structures`` among them, which are known by their names; or they
+    are given: a number (``"int"``), a vector (``"float4"``), a pointer to a buffer (``"float4*"``),
+    to memory of each work-group (``"local ulong*"``), or a structure. A type may be named by a
+    ``-D`` option (``"VOXEL_T*"``).
     """
 
-    def __init__(self, path: str | Path, name: str, /, **arguments: str | Struct) -> None:
-        self.path, self.name, self.arguments = path, name, arguments
+    def __init__(
+        self, path: str | Path, name: str, /, *structures: Struct, **arguments: str | Struct
+    ) -> None:
+        self.path, self.name = path, name
+        self._structures, self._given = {each.name: each for each in structures}, arguments
 
     def __repr__(self) -> str:
         return f"<KernelDeclaration {self.name!r} of {self.path}>"
+
+    @cached_property
+    def arguments(self) -> Mapping[str, str | Struct]:
+        """Their types by name, in order."""
+        return self._given or {
+            name: self._structures.get(kind, kind)
+            for name, kind in written_arguments(expand(self.path), self.name).items()
+        }
 
     def parameters(self, defines: Mapping[str, Define]) -> dict[str, Parameter]:
         """Return the arguments in a program with these ``-D`` options, by name and in order."""
@@ -141,18 +152,36 @@ class KernelDeclaration:
             if isinstance(declared, Struct):
                 found[name] = Parameter(len(found), declared.name, declared.dtype)
                 continue
-            kind, *conditions = declared.split(" if ")
-            if all(_holds(condition, defines) for condition in conditions):
-                element = kind.removeprefix("local ").removesuffix("*")
-                found[name] = Parameter(len(found), kind, _kind(element, defines))
+            element = declared.removeprefix("local ").removesuffix("*")
+            found[name] = Parameter(len(found), declared, _kind(element, defines))
         return found
 
 
-def _holds(condition: str, defines: Mapping[str, Define]) -> bool:
-    """Return whether a program has, or has not, ``NAME``, ``NAME=value`` or ``not NAME``."""
-    option, _, value = condition.removeprefix("not ").partition("=")
-    there = option in defines and value in ("", str(defines[option]))
-    return there != condition.startswith("not ")
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_PARAMETERS = re.compile(r"#define (\w+_PARAMETERS)((?:[^\n]*\\\n)*[^\n]*)")
+
+
+def written_arguments(source: str, name: str) -> dict[str, str]:
+    """Return a kernel's arguments as OpenCL C has them: types by name, ``"local ulong*"``, say.
+
+    What is the same in several kernels is a macro whose name ends in ``_PARAMETERS``.
+    """
+    text = _COMMENT.sub("", source)
+    found = re.search(rf"(?:__kernel|KERNEL_OF_LANES)\s+void\s+{name}\s*\(([^)]*)\)", text)
+    if found is None:
+        return {}  # the compiler will say so
+    written = found[1]
+    for macro, expanded in _PARAMETERS.findall(text):
+        written = re.sub(rf"\b{macro}\b", lambda _, to=expanded: to.replace("\\", " "), written)
+    arguments = {}
+    for each in written.replace("*", " * ").split(","):
+        words = each.split()
+        kind = next(word for word in words if word not in _QUALIFIERS)
+        arguments[words[-1]] = "local " * ("__local" in words) + kind + "*" * ("*" in words)
+    return arguments
+
+
+_QUALIFIERS = {"__global", "__local", "__constant", "const", "volatile", "restrict"}
 
 
 def _kind(kind: str, defines: Mapping[str, Define]) -> np.dtype[Any] | None:
