@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -37,7 +38,7 @@ class LateArrays(Protocol):
         """Return the arrays, valid."""
 
 
-class Lists:
+class Lists(ABC):
     """A view, and sorted lists of disjoint supersegments along its rays."""
 
     #: The generating view V_O.
@@ -52,9 +53,18 @@ class Lists:
     metadata: dict[str, Any]
 
     @property
+    @abstractmethod
+    def lists(self) -> VDI:
+        """The lists in the form of a VDI, for storage; not public."""
+
+    @abstractmethod
+    def with_precision(self, precision: str) -> Any:
+        """Return it with supersegments of fewer bytes."""
+
+    @property
     def arrays(self) -> Arrays:
         """All arrays, not public."""
-        raise NotImplementedError
+        return self.lists.arrays
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
@@ -143,6 +153,8 @@ class VDI(Lists):
 
     #: What makes the arrays when they are asked for, if they were not given; not public.
     late: LateArrays | None = None
+    #: What is known of values that the lists keep in the place of colours; not public.
+    kept: Mapping[str, Any] | None = None
     _arrays: Arrays | None
 
     def __init__(
@@ -190,6 +202,11 @@ class VDI(Lists):
             assert self.late is not None
             self._arrays = _read_only(self.late.arrays())
         return self._arrays
+
+    @property
+    def lists(self) -> VDI:
+        """Itself: what is stored; not public."""
+        return self
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
@@ -446,6 +463,26 @@ def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: 
     starts = offsets[:-1].view(np.int64)
     ordered[starts[: np.searchsorted(starts, n)]] = True
     require(ordered, "sorted within its list and not overlapping")
+
+
+def lengths_of(lists: Lists) -> NDArray[np.float64]:
+    """Return the model length of each supersegment along its list's centre ray, float64 (n,)."""
+    across, along = ((2 * np.arange(n) + 1) / n - 1 for n in lists.window_size)
+    per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
+    thickness = lists.back.astype(np.float64) - lists.front
+    return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
+
+
+def length_per_depth(
+    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
+    constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
+        np.linalg.inv(camera.model_to_view)[:3, :3].T
+    )
+    return np.linalg.norm(
+        constant + u[:, np.newaxis] * along_u + v[:, np.newaxis, np.newaxis] * along_v, axis=-1
+    )
 
 
 def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> tuple[int, int]:
