@@ -55,7 +55,7 @@ class Lists(ABC):
     @property
     @abstractmethod
     def lists(self) -> VDI:
-        """The lists in the form of a VDI, for storage; not public."""
+        """The lists in the form of a VDI, for storage."""
 
     @abstractmethod
     def with_precision(self, precision: str) -> Any:
@@ -63,7 +63,7 @@ class Lists(ABC):
 
     @property
     def arrays(self) -> Arrays:
-        """All arrays, not public."""
+        """All arrays, in the order of :class:`VDI`'s arguments."""
         return self.lists.arrays
 
     @property
@@ -152,9 +152,11 @@ class VDI(Lists):
     """
 
     #: What makes the arrays when they are asked for, if they were not given; not public.
-    late: LateArrays | None = None
+    late: LateArrays | None
+    #: The same where that is their 8-byte form, not public; ``None`` where they are exact.
+    packing: Packed8 | None
     #: What is known of values that the lists keep in the place of colours; not public.
-    kept: Mapping[str, Any] | None = None
+    kept: Mapping[str, Any] | None
     _arrays: Arrays | None
 
     def __init__(
@@ -192,12 +194,12 @@ class VDI(Lists):
             _array("color", color, np.float32, (3,)),
             _array("optical_depth", optical_depth, np.float32, ()),
         )
-        _check(arrays, self.window_size, self.nearest, origin)
-        self._arrays = _read_only(arrays)
+        _check(arrays, self.window_size, _nearest(self), origin)
+        self._arrays, self.late, self.packing, self.kept = _read_only(arrays), None, None, None
 
     @property
     def arrays(self) -> Arrays:
-        """All arrays, made now if they are wanted late; not public."""
+        """All arrays, in the order of the constructor's arguments; made now if they are not yet."""
         if self._arrays is None:
             assert self.late is not None
             self._arrays = _read_only(self.late.arrays())
@@ -205,7 +207,7 @@ class VDI(Lists):
 
     @property
     def lists(self) -> VDI:
-        """Itself: what is stored; not public."""
+        """Itself: what is stored of it."""
         return self
 
     @property
@@ -223,16 +225,6 @@ class VDI(Lists):
     def optical_depth(self) -> NDArray[np.float32]:
         """From front to back along the list's centre ray, float32 (n,)."""
         return self.arrays.optical_depth
-
-    @property
-    def nearest(self) -> float:
-        """Least front that is before the eye, not public."""
-        return -math.inf if self.camera.parallel_projection else -self.depth_origin
-
-    @property
-    def packing(self) -> Packed8 | None:
-        """The 8-byte form of the arrays, not public; ``None`` where they are exact."""
-        return self.late if isinstance(self.late, Packed8) else None
 
     @property
     def nbytes(self) -> int:
@@ -298,7 +290,7 @@ class VDI(Lists):
         if check_precision(precision) == self.precision:
             return self
         exact = precision == "exact"
-        return with_arrays(self, self.arrays if exact else packing_of(self.arrays, self.nearest))
+        return with_arrays(self, self.arrays if exact else packing_of(self.arrays, _nearest(self)))
 
     def __repr__(self) -> str:
         width, height = self.window_size
@@ -356,11 +348,13 @@ def made_vdi(
     """Return a VDI of arrays that this package made, or of what makes them; nothing is checked."""
     vdi = VDI.__new__(VDI)
     vdi.camera, vdi.window_size, vdi.bounds = camera, window_size, bounds
-    vdi.depth_origin, vdi.metadata, vdi._arrays = depth_origin, dict(metadata or {}), None
+    vdi.depth_origin, vdi.metadata, vdi.kept = depth_origin, dict(metadata or {}), None
+    vdi._arrays, vdi.late = None, None
     if isinstance(arrays, Arrays):
         vdi._arrays = _read_only(arrays)
     else:
         vdi.late = arrays
+    vdi.packing = arrays if isinstance(arrays, Packed8) else None
     return vdi
 
 
@@ -368,6 +362,11 @@ def with_arrays(vdi: Lists, arrays: Arrays | LateArrays, **changes: Any) -> VDI:
     """Return a VDI that is like another but for its arrays, and changes of :func:`made_vdi`."""
     names = ("camera", "window_size", "bounds", "depth_origin", "metadata")
     return made_vdi(arrays=arrays, **{name: getattr(vdi, name) for name in names} | changes)
+
+
+def _nearest(vdi: VDI) -> float:
+    """Return the least front that is before the eye."""
+    return -math.inf if vdi.camera.parallel_projection else -vdi.depth_origin
 
 
 def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
