@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
+from pyvista_vdi.model.checks import as_bounds, as_number, as_whole, not_taken
 from pyvista_vdi.model.packing import Arrays, Packed8, check_precision, lengths_of_lists, packing_of
 
 if TYPE_CHECKING:
@@ -175,17 +175,12 @@ class VDI(Lists):
     ) -> None:
         self.camera = Camera.from_any(camera)
         self.window_size = check_window_size(window_size)
-        origin, box = as_number(depth_origin), as_floats(bounds)
+        origin = as_number(depth_origin)
         if not math.isfinite(origin):
             raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
         if not isinstance(metadata, Mapping | None):
             raise InvalidVDIError(f"metadata must be a dictionary; got {type(metadata).__name__}")
-        if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
-            raise InvalidVDIError(
-                f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
-            )
-        x0, x1, y0, y1, z0, z1 = box.tolist()
-        self.bounds, self.depth_origin = (x0, x1, y0, y1, z0, z1), origin
+        self.bounds, self.depth_origin = as_bounds(bounds, InvalidVDIError), origin
         self.metadata = dict(metadata or {})
         arrays = Arrays(
             _array("offsets", offsets, np.uint64, ()),
