@@ -53,7 +53,7 @@ class Verb:
     name: str
     summary: str
     example: str
-    options: str  # place of a function that declares options to an argparse.ArgumentParser
+    options: str  # place of its options, as cli.declare.add takes them
     run: str  # place of a function that takes the parsed options and returns the exit status
 
 

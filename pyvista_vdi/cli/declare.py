@@ -1,7 +1,9 @@
 """The options of subcommands: what each is called, how its value is read, and what help says.
 
-Those of the public functions are made of the records that declare them. One that is not given is
-``None``, unless a default stands here: what it means is then up to the function.
+They are written as help shows them, a line each: name, value and text with two spaces or more
+between them. What the value is called says how it is read; a name may have a default, ``size=8x6``,
+and one that has not been given is ``None``. Options of the public functions need no line: they are
+made of the records that declare them.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ import argparse
 import math
 import re
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
@@ -41,6 +43,7 @@ def number(
 NUMBER = number("a number, like 0.5")
 WHOLE = number("a whole number", whole=True)
 COUNT = number("a whole number above 0", 1, whole=True)
+PORT = number("a port's number, up to 65535", 0, 65535, whole=True)
 RATE = number("frames per second, 0 or above", 0)
 #: Of what moves: more than any screen shows is no rate.
 FPS = number("frames per second, above 0 and up to 1000", math.ulp(0.0), 1000)
@@ -108,216 +111,195 @@ def color(text: str) -> tuple[float, ...]:
         ) from error
 
 
-class Option(NamedTuple):
-    """An option: its text in help, what its value is called there, and what reads it.
-
-    ``value``: a name for each of several values; none for a switch, which has no value.
-    ``default``: what it has where it is not given; ``usual``: what that means, if that is ``None``.
-    """
-
-    text: str
-    value: str | tuple[str, ...] = ""
-    read: Callable[[str], Any] | None = None
-    choices: tuple[str, ...] = ()
-    default: Any = None
-    usual: Any = None
-
-
-_XYZ, _RANGE = ("X", "Y", "Z"), ("LOW", "HIGH")
-#: How values are given, by the types of options in the records.
-_BY_KIND: dict[str, tuple[Any, ...]] = {
-    "bool": ("", None),
-    "OcclusionLike": ("", None),
-    "int": ("N", WHOLE),
-    "float": ("X", NUMBER),
-    "MemoryLike": ("SIZE", _bytes),
-    "RangeLike": (_RANGE, NUMBER),
-    "ArrayLike": ("A,B,...", numbers),
-    "OpacityLike": ("NAME|A,B,...", _opacity),
+#: What reads a value, by what it is called: a text, where that is not here.
+_READERS: dict[str, Callable[[str], Any]] = {
+    **dict.fromkeys(("X", "X Y Z", "LOW HIGH", "DEGREES", "LENGTH", "S", "T"), NUMBER),
+    "N": WHOLE,
+    "COUNT": COUNT,
+    "RATE": RATE,
+    "FPS": FPS,
+    "PORT": PORT,
+    "WxH": parse_size,
+    "SIZE": _bytes,
+    "A,B,...": numbers,
+    "COLOR": color,
+    "auto|N": _level,
+    "N|NAME": _number_or_name,
+    "NAME|A,B,...": _opacity,
 }
-
-
-def _of_records() -> dict[str, Option]:
-    """Return the options that the records declare."""
-    found = {}
-    records = (RenderOptions, DrawingOptions, Classification, Deferral)
-    for name, told in declared(*records, GenerationOptions, QualityTarget).items():
-        value, read = _BY_KIND.get(told.kind.removesuffix(" | None"), ("NAME", None))
-        value = "DEGREES" if "degrees" in told.what else value
-        number = isinstance(told.default, int | float) and not isinstance(told.default, bool)
-        text, choices = told.what.replace("``", ""), told.choices
-        usual = told.default if number or choices else None
-        found[name] = Option(text, "" if choices else value, read, choices, usual=usual)
-    return found
-
-
-#: What is said of options of the records for people at a command line.
-_SAID = {
-    "opacity": "name, one opacity, or opacities, 0 to 1",
-    "memory_limit": "most memory to take on the device, like 2GiB; what does not fit goes there in "
-    "bricks (default: all)",
-    "max_bytes": "most bytes of the VDI on the device, like 20MB",
-    "transmittance_cutoff": "a ray ends where less light than this is left, 0 to below 1; for a "
-    "single file (default: 0.000001)",
+#: What values are called, by the types of options in the records; of others ``NAME``.
+_CALLED = {
+    "bool": "-",
+    "OcclusionLike": "-",
+    "int": "N",
+    "float": "X",
+    "MemoryLike": "SIZE",
+    "RangeLike": "LOW HIGH",
+    "ArrayLike": "A,B,...",
+    "OpacityLike": "NAME|A,B,...",
 }
+_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral)
 
-OPTIONS = _of_records()
-OPTIONS |= {name: OPTIONS[name]._replace(text=text) for name, text in _SAID.items()}
-OPTIONS["max_bytes"] = OPTIONS["max_bytes"]._replace(value="SIZE", read=_bytes)
-OPTIONS |= {
-    "output": Option(".vdi, .exr or .html to write", "FILE"),
-    "size": Option("window size in pixels", "WxH", parse_size),
-    "spacing": Option("between voxels, in place of what the file says", _XYZ, NUMBER),
-    "origin": Option("of its first voxel, in the same way", _XYZ, NUMBER),
-    "level": Option(
-        "of a multi-scale store: 0 is the finest; auto (default): what the view requires",
-        *("auto|N", _level),
-    ),
-    "channel": Option("of a file that holds several", "N|NAME", _number_or_name),
-    "series": Option("of a DICOM folder or a TIFF file of several", "N|NAME", _number_or_name),
-    "time_index": Option("which step of several", "N", WHOLE),
-    "position": Option("eye, world coordinates", _XYZ, NUMBER),
-    "focal_point": Option("point looked at, world coordinates", _XYZ, NUMBER),
-    "view_up": Option("direction that is up", _XYZ, NUMBER),
-    "view_angle": Option("vertical, full", "DEGREES", NUMBER),
-    "parallel_scale": Option(
-        "half the viewport's height in world units; makes the projection parallel",
-        *("LENGTH", NUMBER),
-    ),
-    "camera_json": Option("Camera.to_dict() as JSON", "FILE"),
-    "azimuth": Option("turn by", "DEGREES", NUMBER, default=0.0),
-    "elevation": Option("lift by", "DEGREES", NUMBER, default=0.0),
-    "tf": Option(
-        "a standard transfer function; --cmap and --opacity change parts of it",
-        choices=tuple(TRANSFER_FUNCTIONS),
-    ),
-    "transfer_function": Option("TransferFunction.to_dict() as JSON; needs no PyVista", "FILE"),
-    "occlusion_radius": Option(
-        "how far something hides, model units", "LENGTH", NUMBER, usual="0.05 of the diagonal"
-    ),
-    "occlusion_strength": Option("0 to 1, which is darkest", "S", NUMBER, usual=0.1),
-    "compression": Option(
-        "of .vdi: lz4 (default), zstd, deflate or none; of .html: deflate",
-        choices=("lz4", "zstd", "deflate", "none"),
-    ),
-    "compression_level": Option("1 (fast) to 9 (small)", "N", WHOLE),
-    "time": Option("of a series, the step nearest in time", "T", NUMBER, usual="the first"),
-    "background": Option("a name, #rrggbb or R,G,B from 0 to 1", "COLOR", color),
-    "scheduler": Option("of stores: Dask's scheduler, whose workers make the VDIs", "ADDRESS"),
-    "device": Option("OpenCL device, see pyvista-vdi devices", "NAME"),
-    "json": Option("print JSON"),
-    "out": Option("where the files go", "FOLDER", default="."),
-    "no_vtk": Option("leave out VTK's mappers"),
-}
+_OPTIONS = """
+output              FILE      .vdi, .exr or .html to write
+size                WxH       window size in pixels
+spacing             X Y Z     between voxels, in place of what the file says
+origin              X Y Z     of its first voxel, in the same way
+level               auto|N    of a multi-scale store: 0 is the finest; by default by the view
+channel             N|NAME    of a file that holds several
+series              N|NAME    of a DICOM folder or a TIFF file that holds several
+time_index          N         which step of several
+position            X Y Z     eye, world coordinates
+focal_point         X Y Z     point looked at, world coordinates
+view_up             X Y Z     direction that is up
+view_angle          DEGREES   vertical, full
+parallel_scale      LENGTH    half the viewport's height; makes the projection parallel
+camera_json         FILE      Camera.to_dict() as JSON
+azimuth=0           DEGREES   turn by
+elevation=0         DEGREES   lift by
+tf                  {tf}      a standard transfer function; --cmap and --opacity change its parts
+transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
+occlusion_radius    LENGTH    how far something hides (default: 0.05 of the bounds' diagonal)
+occlusion_strength  S         0 to 1, which is darkest (default: 0.1)
+memory_limit        SIZE      of the device, like 2GiB; what does not fit goes there in bricks
+criterion           NAME      where a list is cut: least-error (default) or homogeneity
+max_bytes           SIZE      most bytes of the VDI on the device, like 20MB
+compression         {lz4,zstd,deflate,none}  of .vdi, by default lz4; .html has deflate
+compression_level   N         1 (fast) to 9 (small)
+time                T         of a series, the step nearest in time (default: the first)
+background          COLOR     a name, #rrggbb or R,G,B from 0 to 1
+scheduler           ADDRESS   of stores: that of Dask, whose workers make the VDIs
+device              NAME      OpenCL device, see pyvista-vdi devices
+json                -         print JSON
+out=.               FOLDER    where the files go
+angles              A,B,...   degrees from the generating view
+no_vtk              -         leave out VTK's mappers
+""".replace("{tf}", f"{{{','.join(TRANSFER_FUNCTIONS)}}}")
 
-_LOOK = "tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale"
-_OF_VOLUMES = "shade scalars preference interpolation ambient diffuse specular specular_power"
-#: Options that stand together in help: title, what is said of them, and their names.
+#: Options that stand together in help, after their title and what is said of them.
 _GROUPS = {
-    "camera": (
-        *("camera", "By default {}."),
-        "position focal_point view_up view_angle parallel_scale camera_json azimuth elevation",
-    ),
-    "look": (
-        *("classification", "Names, defaults and meaning are those of PyVista's add_volume."),
-        f"{_LOOK} {_OF_VOLUMES} transfer_function",
-    ),
-    "values": ("classification", "Of VDIs that keep values.", f"{_LOOK} transfer_function"),
-    "deferral": (
-        "classified afterwards",
-        "Values are kept: convert, render and view then take the look.",
-        "classification value_range importance",
-    ),
-    "occlusion": (
-        *("ambient occlusion", "Either option below turns it on, too."),
-        "ambient_occlusion occlusion_radius occlusion_strength",
-    ),
-    "limits": (
-        *("limits", ""),
-        "max_supersegments criterion sample_distance tolerance view_cone memory_limit",
-    ),
-    "quality": (
-        "quality",
-        "Lists and precision are chosen by a short measurement; --size is that of pictures.",
-        "quality target_ssim full_fps max_bytes target_angle",
-    ),
-    "file": ("file", "", "compression compression_level precision"),
+    "camera": """[camera] By default {}.
+        position focal_point view_up view_angle parallel_scale camera_json azimuth elevation""",
+    "look": """[classification] Names, defaults and meaning are those of PyVista's add_volume.
+        tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale shade
+        scalars preference interpolation ambient diffuse specular specular_power""",
+    "values": """[classification] Of VDIs that keep values.
+        tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale
+        transfer_function""",
+    "deferral": """[classified afterwards] Values are kept; convert, render and view take the look.
+        classification value_range importance""",
+    "occlusion": """[ambient occlusion] Either option below turns it on, too.
+        ambient_occlusion occlusion_radius occlusion_strength""",
 }
+_GROUPS["table"] = f"{_GROUPS['look']} transfer_function"
 
-#: The arguments without a name: in help, and what they are; a volume may be one that is shipped.
 _VDI = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
-_VOLUME = "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices "
-_VOLUME += "(DICOM, TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+_VOLUME = (
+    "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
+    "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+)
 _STEPS = "; several are time steps, step_2 before step_10, and so are those of a store or a .pvd"
-_SOURCES = {
-    "volume": ("VOLUME", _VOLUME),
-    "volumes": ("VOLUME", _VOLUME + _STEPS),
-    "vdi": ("FILE", _VDI),
-    "vdis": ("FILE", _VDI),
-    "vdi_or_volume": ("FILE", f"{_VDI}; or a volume: {_VOLUME}"),
-    "vdis_or_volumes": ("FILE", f"VDIs; or volumes, each {_VOLUME}{_STEPS}"),
+#: What is read, by names for it: of which some may be a volume that is known by its name.
+_FILES = {
+    "VDI": _VDI,
+    "VDIS": _VDI,
+    "VOLUME": _VOLUME,
+    "VOLUMES": _VOLUME + _STEPS,
+    "VDI|VOLUME": f"{_VDI}; or a volume: {_VOLUME}",
+    "VDIS|VOLUMES": f"VDIs; or volumes, each {_VOLUME}{_STEPS}",
 }
 
 
-def add(parser: argparse._ActionsContainer, names: str, **changes: Any) -> None:
-    """Add options, arguments, and groups of options, which end in a colon, in this order.
+def add(parser: Any, lines: str) -> None:
+    """Add options that are written as help shows them.
 
-    ``changes``: of an option its text, its default or all of it, in place of what stands above, or
-    ``False`` where it is left out; of a group what is put into its text.
+    A line is an option; or the names of some that are known, of files (in capitals) and of groups,
+    which end in a colon, behind which the rest of the line is put into their text; or the title of
+    a group in brackets, to which those belong that follow.
     """
-    for name in names.split():
-        if name in _SOURCES:
-            _add_source(parser, name)
-        elif name.endswith(":"):
-            title, text, inside = _GROUPS[name[:-1]]
-            group = parser.add_argument_group(title, text.format(changes.get(name[:-1])) or None)
-            add(group, inside, **changes)
+    into = parser
+    for line in map(str.strip, lines.splitlines()):
+        group, _, said = line.partition(": ")
+        if line.startswith("["):
+            title, _, said = line[1:].partition("]")
+            into = parser.add_argument_group(title, said.strip() or None)
+        elif said and "{}" in _GROUPS.get(group, ""):
+            add(parser, _GROUPS[group].format(said))
+        elif "  " in line:
+            _add_option(into, *re.split(" {2,}", line, maxsplit=2))
         else:
-            _add_option(parser, name, changes.get(name))
+            for name in line.split():
+                if name in _FILES:
+                    _add_files(parser, name)
+                elif name.endswith(":"):
+                    add(parser, _GROUPS[name[:-1]])
+                else:
+                    known, value, text = _KNOWN[name.partition("=")[0]]
+                    _add_option(into, name if "=" in name else known, value, text)
 
 
-def _add_source(parser: argparse._ActionsContainer, name: str) -> None:
-    """Add what a subcommand reads: files, or a volume that is known by its name."""
-    called, text = _SOURCES[name]
-    many = name in ("volumes", "vdis", "vdis_or_volumes")
-    if "volume" not in name or name == "vdis_or_volumes":
-        if many:
-            parser.add_argument("files", help=text, metavar=called, nargs="+")
-        else:
-            parser.add_argument("file", help=text, metavar=called)
+def _add_files(parser: Any, what: str) -> None:
+    """Add what a subcommand reads, which may be a volume that is known by its name."""
+    several, called = "S" in what, "VOLUME" if what.startswith("VOLUME") else "FILE"
+    how: dict[str, Any] = {"help": _FILES[what], "metavar": called}
+    if "VOLUME" not in what or what == "VDIS|VOLUMES":
+        parser.add_argument(
+            *(["files"] if several else ["file"]), **how, nargs="+" * several or None
+        )
         return
-    source = parser.add_mutually_exclusive_group(required=True)
-    if many:
-        source.add_argument("files", help=text, metavar=called, nargs="*", default=[])
+    into = parser.add_mutually_exclusive_group(required=True)
+    if several:
+        into.add_argument("files", nargs="*", default=[], **how)
     else:
-        source.add_argument("file", help=text, metavar=called, nargs="?")
-    example = "a volume known by name: brain, ct and rayleigh_taylor are shipped, others are read "
-    example += "from the folder that PYVISTA_VDI_DATA names"
-    source.add_argument("--example", help=example, metavar="NAME")
+        into.add_argument("file", nargs="?", **how)
+    text = (
+        "a volume known by name: brain, ct and rayleigh_taylor are shipped, others are read from "
+    )
+    text += "the folder that PYVISTA_VDI_DATA names"
+    into.add_argument("--example", help=text, metavar="NAME")
     add(parser, "spacing origin level channel series time_index")
 
 
-def _add_option(parser: argparse._ActionsContainer, name: str, change: Any) -> None:
-    if change is False:
-        return
-    option: Option = change if isinstance(change, Option) else OPTIONS[name]
-    if isinstance(change, str):
-        option = option._replace(text=change)
-    elif change is not None and not isinstance(change, Option):
-        option = option._replace(default=change)
-    text, value, read, choices, default, usual = option
-    usual = default if usual is None or default is not None else usual
-    if usual is not None and "default" not in text:
-        joined = "x" if name in ("size", "lists") else ","
-        shown = usual if isinstance(usual, tuple) else (usual,)
-        said = joined.join(n if isinstance(n, str) else f"{n:g}" for n in shown)
-        text += f" (default: {said})"
-    how: dict[str, Any] = {"help": text, "default": default}
-    if not value and not choices:
-        how["action"] = "store_true"
+def _add_option(into: Any, name: str, value: str, text: str) -> None:
+    """Add an option; a value in brackets need not be given, one with ``+`` may be repeated."""
+    name, _, default = name.partition("=")
+    how: dict[str, Any] = {"help": f"{text} (default: {default})" if default else text}
+    names, read = value.split(), _READERS.get(value, str)
+    if value == "-":
+        how |= {"action": "store_true", "default": None}
+    elif value.startswith("{"):
+        how |= {"choices": value[1:-1].split(","), "default": default or None}
+    elif value.startswith("["):
+        how |= {"nargs": "?", "const": default, "metavar": value[1:-1]}
+    elif value.endswith((" ...", " +")):
+        how |= {"metavar": names[0]}
+        how |= {"nargs": "+"} if names[1] == "..." else {"action": "append"}
     else:
-        how |= {"metavar": value or None, "type": read, "choices": choices or None}
-        how |= {"nargs": len(value)} if isinstance(value, tuple) else {}
-        how |= {"required": True} if name == "output" else {}
-    flags = ["-o"] if name == "output" else []
-    parser.add_argument(*flags, f"--{name.replace('_', '-')}", **how)
+        how |= {"type": read, "metavar": tuple(names) if names[1:] else value}
+        how |= {"nargs": len(names)} if names[1:] else {}
+        how |= {"default": read(default)} if default else {}
+    if name == "output":
+        how["required"] = True
+    flags = [f"--{each.replace('_', '-')}" for each in name.split("|")]
+    into.add_argument(*(["-o"] if name == "output" else []), *flags, **how)
+
+
+def _known() -> dict[str, tuple[str, str, str]]:
+    """Return the options that are known by their names: name and default, value, and text."""
+    found = {}
+    for name, told in declared(*_RECORDS, GenerationOptions, QualityTarget).items():
+        value = _CALLED.get(told.kind.removesuffix(" | None"), "NAME")
+        value = "DEGREES" if "degrees" in told.what else value
+        value = "{" + ",".join(told.choices) + "}" if told.choices else value
+        text, usual = told.what.replace("``", ""), told.default
+        plain = isinstance(usual, int | float) and not isinstance(usual, bool)
+        text += f" (default: {usual:g})" if plain else ""
+        text += f" (default: {usual})" if told.choices and usual else ""
+        found[name] = name, value, text
+    for line in _OPTIONS.strip().splitlines():
+        name, value, text = re.split(" {2,}", line, maxsplit=2)
+        found[name.partition("=")[0]] = name, value, text
+    return found
+
+
+_KNOWN = _known()

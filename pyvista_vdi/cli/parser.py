@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 from pyvista_vdi import registry
 from pyvista_vdi._version import __version__
+from pyvista_vdi.cli.declare import add
 from pyvista_vdi.cli.verbs import VERBS
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
@@ -86,8 +87,8 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
             allow_abbrev=False,
         )
         own = VERBS.get(name)
-        (own.options if own is not None else registry.load(added[name].options))(parser)
-        place = f"{__package__}.{own.module}:{name}" if own is not None else added[name].run
+        add(parser, registry.load(added[name].options) if own is None else own.options)
+        place = added[name].run if own is None else f"{__package__}.{own.module}:{name}"
         parser.set_defaults(run=_run, place=place)
         return _parsed(parser, rest)
     return None

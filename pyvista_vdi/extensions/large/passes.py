@@ -308,7 +308,7 @@ class Task:
         lit: bool = True,
         ambient: NDArray[np.float32] | None = None,
     ) -> Iterator[DeviceVolume]:
-        """Have a block on a device: with its neighbours' points, if it is ``lit``."""
+        """Bring a block to a device: with its neighbours' points, if it is ``lit``."""
         grid, runtime, limit = self.blocks.grid, get_runtime(self.device), self.options.memory_limit
         window = self.window(block)
         if limit is not None and window.pixels:

@@ -9,7 +9,6 @@ import subprocess
 import sysconfig
 from pathlib import Path
 
-from pyvista_vdi.cli import declare
 from pyvista_vdi.errors import MissingDependencyError, NoDeviceError, UnsupportedError
 
 #: The package, and the plugin in it.
@@ -30,13 +29,10 @@ os._exit(0 if any(device.usable for device in list_devices()) else 3)
 _NO_DEVICE = 3
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of the verb ``paraview``."""
-    text = "print, for a shell's eval, the variables by which ParaView finds plugin and package"
-    declare.add(parser, "environment", environment=declare.Option(text))
-    text = "start ParaView's Python (PVPYTHON, if not on the PATH), see that it loads the plugin, "
-    text += "and list the devices that it finds"
-    parser.add_argument("--check", help=text, metavar="PVPYTHON", nargs="?", const="pvpython")
+OPTIONS = """
+environment    -         print the variables by which ParaView finds plugin and package
+check=pvpython  [PVPYTHON]  start ParaView's Python, see that it loads the plugin and finds devices
+"""
 
 
 def paraview(options: argparse.Namespace) -> int:

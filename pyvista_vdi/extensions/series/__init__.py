@@ -28,7 +28,7 @@ EXTENSION = Extension(
             "series",
             "write VDIs, or those of volumes, that are time steps",
             "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
-            "pyvista_vdi.extensions.series.cli:add_options",
+            "pyvista_vdi.extensions.series.cli:OPTIONS",
             "pyvista_vdi.extensions.series.cli:series",
         ),
     ),

@@ -30,15 +30,6 @@ from pyvista_vdi.registry import FileFormat
 VERSION = 1
 #: VDIs that are kept of those that were read: the last ones.
 _KEPT = 6
-#: What the files of an earlier format begin with: steps by differences, and sets of them.
-_EARLIER = (b"\x89VDIS\r\n\x1a", b"\x89VDIV\r\n\x1a")
-#: What is said of them.
-_REMEDY = (
-    "is of an earlier format, which is not read any more: make it anew, or have the version that "
-    "wrote it write .vdi files (pyvista-vdi convert), and join these by 'pyvista-vdi series'"
-)
-
-
 SERIES = EXTENSION.formats[0]
 
 
@@ -96,11 +87,11 @@ class Archive(Sequence[Any]):
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
-        if begin in _EARLIER:
-            raise VDIFileError(f"{self.path} {_REMEDY}")
         if not begin.startswith(b"PK"):
-            name = self._kind.holds
-            raise VDIFileError(f"{self.path} is not a {name} of VDIs: it begins with {begin!r}")
+            raise VDIFileError(
+                f"{self.path} is not a {self._kind.holds} of VDIs, or of an earlier format, which is "
+                f"not read any more: it begins with {begin!r}; make it anew"
+            )
         try:
             archive = zipfile.ZipFile(stream)
         except reader.ARCHIVE_ERRORS as error:
@@ -153,10 +144,8 @@ def save(
     if found is not None and found.page:
         return found.load().write(vdis, path, **options)  # type: ignore[no-any-return]
     target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.holds}"))
-    if target.exists():
-        with target.open("rb") as stream:
-            if stream.read(8) in _EARLIER:
-                raise VDIFileError(f"{target} {_REMEDY}; choose another name for this one")
+    if target.exists() and not zipfile.is_zipfile(target):
+        raise VDIFileError(f"{target} holds something else: choose another name, or remove it")
     if options.get("precision") is None:
         options["precision"] = vdis[0].precision if kind == SERIES else "8-byte"
     with whole_file(target) as out:

@@ -10,7 +10,6 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from pyvista_vdi.cli import declare
 from pyvista_vdi.cli.generate import as_seen, generating_view
 from pyvista_vdi.cli.inputs import (
     LOOK,
@@ -32,7 +31,6 @@ from pyvista_vdi.io import is_vdi_file, read, read_info
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
-from pyvista_vdi.model.standard_cases import WINDOW_SIZE
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
@@ -101,15 +99,17 @@ def _times(steps: Sequence[Step], asked: Sequence[float] | None) -> Sequence[flo
     return range(len(steps))
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of the subcommand."""
-    text = "of the steps, ascending (default: those in the files, else 0,1,2,...)"
-    times = declare.Option(text, "A,B,...", declare.numbers)
-    changes = {"output": ".vdis to write", "precision": "of the supersegments (default: 8-byte)"}
-    changes["compression"] = "zstd (default), lz4, deflate or none"
-    declare.add(parser, "vdis_or_volumes output times file:", times=times, **changes)
-    group = parser.add_argument_group("volumes", "What VDIs are made of them; not for VDIs.")
-    names = "spacing origin level channel series time_index size max_supersegments sample_distance"
-    declare.add(group, f"{names} memory_limit scheduler", size=WINDOW_SIZE)
-    view = "the view that the first volume fills"
-    declare.add(parser, "camera: look: deferral: device", camera=view)
+OPTIONS = """
+VDIS|VOLUMES
+output  FILE     .vdis to write
+times   A,B,...  of the steps, ascending (default: those in the files, else 0,1,2,...)
+[file]
+compression  {zstd,lz4,deflate,none}  by default zstd
+compression_level
+precision    {8-byte,exact}  of the supersegments (default: 8-byte)
+[volumes] What VDIs are made of them; not for VDIs.
+spacing origin level channel series time_index size=1280x720 max_supersegments sample_distance
+memory_limit scheduler
+camera: the view that the first volume fills
+table: deferral: device
+"""

@@ -25,7 +25,7 @@ EXTENSION = Extension(
             "set",
             "write VDIs of a volume from several sides",
             "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
-            "pyvista_vdi.extensions.sets.cli:add_options",
+            "pyvista_vdi.extensions.sets.cli:OPTIONS",
             "pyvista_vdi.extensions.sets.cli:generate",
         ),
     ),

@@ -6,7 +6,6 @@ import argparse
 import time
 from pathlib import Path
 
-from pyvista_vdi.cli import declare
 from pyvista_vdi.cli.generate import generating_view
 from pyvista_vdi.cli.inputs import classification, given, measuring, part, read_volume
 from pyvista_vdi.cli.text import mebibytes, printable
@@ -34,16 +33,16 @@ def generate(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of the subcommand."""
-    declare.add(parser, "volume output size", output=".vdiset to write", size=(640, 360))
-    text = "degrees from the camera's direction within which they are"
-    half_angle = declare.Option(text, "DEGREES", declare.NUMBER, usual=180)
-    views = declare.Option("how many", "N", declare.COUNT, usual=32)
-    group = parser.add_argument_group("views")
-    declare.add(group, "views half_angle", views=views, half_angle=half_angle)
-    lists = declare.Option("lists per pixel along an edge", "N", declare.NUMBER, usual=1)
-    group = parser.add_argument_group("lists")
-    declare.add(group, "lists max_supersegments sample_distance memory_limit", lists=lists)
-    view = "the view that the volume fills; it tells distance, lens, up and a cone's axis"
-    declare.add(parser, "camera: look: occlusion: device", camera=view)
+OPTIONS = """
+VOLUME
+output  FILE  .vdiset to write
+size=640x360 device
+[views]
+views       COUNT    how many (default: 32)
+half_angle  DEGREES  from the camera's direction within which they are (default: 180)
+[lists]
+lists       X        lists per pixel along an edge (default: 1)
+max_supersegments sample_distance memory_limit
+camera: the view that the volume fills; it tells distance, lens, up and a cone's axis
+table: occlusion:
+"""

@@ -38,7 +38,7 @@ EXTENSION = Extension(
             "serve",
             "serve VDIs of a volume to web pages that turn it",
             "pyvista-vdi serve knee.nrrd --cmap bone --opacity sigmoid_6",
-            "pyvista_vdi.extensions.web.cli:add_options",
+            "pyvista_vdi.extensions.web.cli:OPTIONS",
             "pyvista_vdi.extensions.web.cli:serve",
         ),
     ),

@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from pyvista_vdi.cli import declare
 from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.errors import naming
@@ -44,7 +43,7 @@ def serve(options: argparse.Namespace) -> int:
         host=options.host,
         port=options.port,
         token=options.token,
-        hosts=options.allow_host,
+        hosts=options.allow_host or (),
         lists=math.prod(options.lists),
         **given(options, GenerationOptions, flat=True),
         device=options.device,
@@ -55,21 +54,15 @@ def serve(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of the verb ``serve``."""
-    declare.add(parser, "volumes")
-    group = parser.add_argument_group("server")
-    lists = declare.Option("most lists of a VDI", "WxH", declare.parse_size, default=(1280, 720))
-    text = "address to listen at, by default this machine's alone"
-    host = declare.Option(text, "ADDRESS", default="127.0.0.1")
-    token = declare.Option("what the URL must carry (default: a random one)", "TEXT")
-    read = declare.number("a port's number, up to 65535", 0, 65535, whole=True)
-    port = declare.Option("0: one that is free", "N", read, default=8765)
-    declare.add(group, "host port token lists", host=host, port=port, token=token, lists=lists)
-    names = "another name by which browsers may call this server; may be repeated"
-    group.add_argument("--allow-host", help=names, metavar="NAME", action="append", default=[])
-    declare.add(parser, "look: occlusion:")
-    group = parser.add_argument_group("limits")
-    names = "max_supersegments sample_distance memory_limit"
-    declare.add(group, names, max_supersegments=8)
-    declare.add(parser, "device")
+OPTIONS = """
+VOLUMES device
+[server]
+host=127.0.0.1  ADDRESS   to listen at, by default this machine's alone
+port=8765       PORT      0: one that is free
+token           TEXT      what the URL must carry (default: a random one)
+allow_host      NAME +    another name by which browsers may call this server
+lists=1280x720  WxH       most lists of a VDI
+table: occlusion:
+[limits]
+max_supersegments=8 sample_distance memory_limit
+"""

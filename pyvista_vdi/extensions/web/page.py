@@ -72,7 +72,7 @@ vdi-viewer {{ width: 100%; height: 100%; aspect-ratio: auto; }}
 vdi-viewer:not(:defined) {{ display: block; text-align: center; }}
 vdi-viewer > img {{ max-width: 100%; max-height: 100%; }}
 p {{ font: 14px sans-serif; text-align: center; }}
-main {{ display: contents; }}
+{style}main {{ display: contents; }}
 h1 {{ position: absolute; width: 1px; height: 1px; margin: 0; overflow: hidden; }}
 </style>
 </head>
@@ -170,13 +170,19 @@ def assembled(views: Sequence[View], *, title: str, controls: str = "all") -> by
             still=_text(_jpeg(view.still, view.size)),
             parts="".join([before, *texts[:1], script, *texts[1:]]),
         )
+    return html_page(title, body, views[0].background, _POLICY).encode()
+
+
+def html_page(title: str, body: str, background: str, policy: str, style: str = "") -> str:
+    """Return a page for what is seen, as large as the window."""
     return _PAGE.format(
         version=__version__,
-        policy=_POLICY,
+        policy=policy,
         title=title,
-        background=views[0].background,
+        background=background,
+        style=style,
         body=body,
-    ).encode()
+    )
 
 
 def write(

@@ -92,7 +92,7 @@ class PlotterWidget(VDIWidget):
             self._draw_later()
 
     def _draw_later(self) -> None:
-        """Have the plotter rendered when nothing has changed for a while."""
+        """Render the plotter when nothing has changed for a while."""
 
         def wait() -> None:
             if self._rest is not None:

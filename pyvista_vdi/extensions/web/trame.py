@@ -26,10 +26,10 @@ except ImportError as error:
         'this is a component for trame, which is not installed: pip install "pyvista-vdi[web]"'
     ) from error
 
-#: The component: a viewer that follows three properties, and says where it is turned to.
+#: The component: a viewer that follows two properties, and says where it is turned to.
 _COMPONENT = """
 window.pyvistaVDI = { install(app) { app.component("vdi-view", {
-  props: ["file", "eye", "background"],
+  props: ["file", "eye"],
   emits: ["turned"],
   render() { return Vue.h("vdi-viewer"); },
   mounted() {
@@ -47,7 +47,6 @@ window.pyvistaVDI = { install(app) { app.component("vdi-view", {
         told = text;
       }, 100);
     });
-    follow("background", (color) => { viewer.background = color; });
     follow("eye", (camera) => { viewer.camera = { ...camera }; });
     follow("file", async (file) => {
       const bytes = new Uint8Array(await new Response(file).arrayBuffer());

@@ -516,7 +516,7 @@ def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget, tmp_
     packed = pvdi.render(kept.with_precision("8-byte"), kept.camera, **look)
     apart = np.abs(picture(page, SIZE, "viewers[0]") / 255 - packed).max(axis=2)
     assert np.mean(apart <= 2 / 255) >= 0.999  # as of what has colours
-    assert page.page.get_by_label("Transfer function and clipping").count()
+    assert page.page.get_by_label("Window").count()
     several = {"series": pvdi.VDISeries([kept]), "set": pvdi.VDISet([kept])}
     for name, vdis in several.items():
         with pytest.raises(pvdi.InvalidVDIError, match=rf"this {name} keeps.*{name}\.classified"):
@@ -611,7 +611,7 @@ def test_subplots_are_where_they_are_in_the_window(open_widget):
 
 def test_what_plays_series_is_sent_with_them_alone(widget, series):
     small, large = widget._esm, VDIWidget(series)._esm
-    assert len(small) < len(large) - 12_000
+    assert len(small) < len(large) - 8_000
     widget.vdi = series
     assert widget._esm == large
 
