@@ -68,7 +68,10 @@ class ListsOnDevice:
     def on(self, runtime: Runtime) -> Iterator[dict[str, DeviceBuffer]]:
         """Hold the lists on a device for a ``with`` block; empty where they are not on it."""
         with runtime.holding(self._lock):
-            yield dict(self._buffers) if runtime is self._runtime else {}
+            if self._buffers and runtime is self._runtime:
+                yield self._buffers
+                return
+        yield {}
 
     def _release(self) -> None:
         for buffer in self._buffers.values():

@@ -105,13 +105,13 @@ def file_of(
         options = {"precision": precision, "compression": DEFLATE, "level": level}
         first = write_several(stream, shown, progress=progress, **options)
         return stream.getvalue(), first
-    lists, values = shown.with_precision(precision), None
-    if isinstance(lists, DeferredVDI):
-        kept, values = lists, lists.about
-        lists = copy.copy(kept.lists)
+    kept = shown.with_precision(precision)
+    lists = kept.lists
+    if isinstance(kept, DeferredVDI):
         begun = kept.classified() if seen is None else seen
+        lists = copy.copy(lists)
         lists.metadata = {**kept.metadata, "transfer_function": begun.metadata["transfer_function"]}
-    write_to(stream, lists, DEFLATE, level, progress, coarse=coarse, deferred=values)
+    write_to(stream, lists, DEFLATE, level, progress, coarse=coarse)
     with zipfile.ZipFile(stream) as archive:
         members = archive.infolist()
     behind = members[2 if members[1].filename == COARSE else 1]
