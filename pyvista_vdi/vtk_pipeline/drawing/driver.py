@@ -100,6 +100,7 @@ class Driver:
         self._images, self._last = Images(), NOTHING
         self._texture, self._no_depth, self._scissor = ImageTexture(), NoDepth(), Scissor()
         self._selection, self._scene_at_hand = Selection(), SceneAtHand(self._say_not_exported)
+        self._view: View | None = None
         self._counted = self._generation = 0  # the VDI that was shown last, and how many were
         # What plans go by
         self._background, self._timer = Background(), Timer(self._tick)
@@ -120,7 +121,6 @@ class Driver:
         self._pictures, self._costs = Pictures(), Costs()
         self._seen: Seen | None = None  # the last frame that somebody watched
         self._stamp: Any = None  # of all that it depended on
-        self._view: View | None = None  # of the last frame
         self._moved_at, self._number = -math.inf, None
         self._pixels = 0.0  # of the last frame, in which the volume may be seen
         if failures:

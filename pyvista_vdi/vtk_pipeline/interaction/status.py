@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.costs import RenderMode
-from pyvista_vdi.quality.dial import describe
+from pyvista_vdi.quality.targets import describe
 from pyvista_vdi.vtk_pipeline.vtk import vtkCornerAnnotation, weakly
 
 _log = logging.getLogger(__name__)
