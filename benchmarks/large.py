@@ -18,8 +18,7 @@ from typing import Any
 from shared import Case, Results, benches, execute, load, marked, parser_of, table
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.large.generate import generate_chunked
-from pyvista_vdi.extensions.large.on_dask import generate_on_dask
+from pyvista_vdi.extensions.large.generate import generate_in_blocks
 from pyvista_vdi.measure.bench import accuracy, ratio
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationRequest
@@ -76,12 +75,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def in_blocks(bench: Any, n: int) -> dict[str, Any]:
     """Return how near the picture of blocks is to that of one piece, by angle."""
-    whole = bench.generate()
-    chunks = [-(-p // k) for p, k in zip(bench.volume.array.shape, CUTS[n], strict=True)]
-    request = GenerationRequest(
-        bench.volume, bench.table, bench.view, bench.size, device=bench.runtime
-    )
-    vdi = generate_chunked(request, chunks=chunks, block_bytes=1)
+    import dask.array as da
+
+    whole, of = bench.generate(), bench.volume
+    chunks = tuple(-(-p // k) for p, k in zip(of.array.shape, CUTS[n], strict=True))
+    volume = pvdi.Volume(da.from_array(of.array, chunks), of.spacing, of.origin, of.direction)
+    request = GenerationRequest(volume, bench.table, bench.view, bench.size, device=bench.runtime)
+    vdi = generate_in_blocks(request, block_bytes=1)
     near = {}
     for angle in LEAST_SSIM:
         view = turned(bench.view, bench.volume.bounds, float(angle))
@@ -111,23 +111,28 @@ def on_cluster(options: Any) -> dict[str, Any]:
         volume = stored(options.store or Path(folder) / "large.zarr", name)
         camera = filling_camera(volume.bounds, options.size)
         function = Classification.composited(LOOKS, "a benchmark").transfer_function_of(volume)
-        given = {"n_workers": 2, "threads_per_worker": 1, "memory_limit": WORKER_BYTES}
-        with LocalCluster(dashboard_address=":0", **given) as cluster, Client(cluster) as client:
-            workers = list(client.nthreads())
+        given = {"threads_per_worker": 1, "memory_limit": WORKER_BYTES, "dashboard_address": ":0"}
+        request = GenerationRequest(volume, function, camera, options.size)
+        with (
+            LocalCluster(n_workers=1, **given) as lone,
+            LocalCluster(n_workers=2, **given) as pair,
+            Client(lone) as by_one,
+            Client(pair) as by_two,
+        ):
             cores = sorted(os.sched_getaffinity(0))
-            for k, at in enumerate(workers):
-                core = {cores[k % len(cores)]}
-                client.run(lambda core=core: os.sched_setaffinity(0, core), workers=[at])
-            before = client.run(peak)
+            for client in (by_one, by_two):
+                for k, at in enumerate(client.nthreads()):
+                    core = {cores[k % len(cores)]}
+                    client.run(lambda core=core: os.sched_setaffinity(0, core), workers=[at])
+            before = by_two.run(peak)
             seconds: dict[str, list[float]] = {"1": [], "2": []}
             for turn in range(options.repeats + 1):
-                for name, some in (("1", workers[:1]), ("2", workers)):
+                for name, client in (("1", by_one), ("2", by_two)):
                     start = time.perf_counter()
-                    request = GenerationRequest(volume, function, camera, options.size)
-                    vdi = generate_on_dask(request, client=client, workers=some, block_bytes=2**24)
+                    vdi = generate_in_blocks(request, client)
                     if turn:  # the first one compiles
                         seconds[name].append(time.perf_counter() - start)
-            after = client.run(peak)
+            after = by_two.run(peak)
         return {
             "points": volume.array.size,
             "supersegments": vdi.n_supersegments,

@@ -19,8 +19,9 @@ typedef struct {
 
 inline ViewRay view_ray(int2 pixel, int width, int height, __global const float *forms, int planes)
 {
-    const Ray of = ray_of_pixel(pixel, width, height);
-    ViewRay ray = {.place = of.place, .t0 = -INFINITY, .t1 = INFINITY};
+    const Rays of = rays_at(pixel, width, height);
+    const size_t place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
+    ViewRay ray = {.place = place, .t0 = -INFINITY, .t1 = INFINITY};
     __global const float *clipped = forms + PLANE_FORMS * FORM_SIZE;
     ray.present = of.present && clip_to_planes(clipped, planes, of.a, of.b, &ray.t0, &ray.t1);
     ray.speed = model_speed(forms, of.a, of.b);
@@ -109,7 +110,7 @@ __kernel void world_rays(
     __global float4 *image)
 {
     const int2 pixel = block_pixel((uint)get_global_id(0), width);
-    if (!ray_of_pixel(pixel, width, height).present)
+    if (!rays_at(pixel, width, height).present)
         return;
     const ViewRay ray = view_ray(pixel, width, height, forms, planes);
     Seen seen = nothing_seen();

@@ -69,8 +69,7 @@ def main() -> None:
             vdi = pvdi.generate(volume, camera, SIZE, client=client, **looks)
     picture = pvdi.render(vdi, camera.azimuth(10))
     write_png(to_bytes(picture, (1, 1, 1)), target)
-    share = vdi.metadata["points_read"] / np.prod(volume.dimensions)
-    print(f"{vdi.metadata['blocks']} blocks, each point read {share:.2g} times; {vdi!r}")
+    print(f"{vdi.metadata['blocks']} blocks; {vdi!r}")
     print(f"written: {target}")
 
 

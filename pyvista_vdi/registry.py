@@ -23,7 +23,7 @@ class FileFormat:
     """A kind of file, known by the end of its name."""
 
     suffix: str  # in small letters, with the dot
-    module: str  # has read and read_info, and write or, of steps, write_steps
+    module: str  # has read, read_info and, of single VDIs, write
     holds: str = "VDI"  # or "series", "set": what is read from it
     read_options: tuple[str, ...] = ()
     write_options: tuple[str, ...] = ()  # beside compression and level
@@ -32,7 +32,6 @@ class FileFormat:
     page: bool = False  # may hold another's file: module has begins_with and data_in
     values: bool = False  # holds deferred VDIs as well
     needs: str = ""  # what its module cannot be loaded without, and the command that installs it
-    verbs: str = ""  # module whose info(options) and convert(options) the command line runs
 
     def load(self) -> Any:
         """Return the module that reads and writes it."""
@@ -54,7 +53,7 @@ class Verb:
     name: str
     summary: str
     example: str
-    options: str  # place of a function that declares options to an argparse.ArgumentParser
+    options: str  # place of its options, as cli.declare.add takes them
     run: str  # place of a function that takes the parsed options and returns the exit status
 
 
@@ -66,7 +65,7 @@ class Extension:
     formats: tuple[FileFormat, ...] = ()
     readers: Places = field(default_factory=dict)  # of volumes, by ends of files' names
     shown: Places = field(default_factory=dict)  # what makes a mapper's Input, by classes of data
-    generators: Places = field(default_factory=dict)  # "blocks", "ranks" of MPI, Dask's "clients"
+    generators: Places = field(default_factory=dict)  # of chunked volumes: "blocks"
     verbs: tuple[Verb, ...] = ()
     methods: Places = field(default_factory=dict)  # of a VDI, or "plotter.vdi.export_html"
     requires: tuple[str, ...] = ()  # extensions without which it is left out

@@ -117,47 +117,34 @@ inline int2 block_pixel(uint item, int width)
                   (int)((block / columns) << 2 | (item >> 2 & 3)));
 }
 
-// The ray of a pixel.
+// The rays of a work-item: one, or those of a block.
 typedef struct {
-    bool present; // the pixel is in the window
-    float a, b;   // its offsets
-    size_t place; // in pictures, top row first
-} Ray;
-
-inline Ray ray_of_pixel(int2 pixel, int width, int height)
-{
-    Ray ray;
-    ray.present = pixel.x < width && pixel.y < height;
-    ray.a = (float)pixel.x + 0.5f - 0.5f * (float)width;
-    ray.b = (float)pixel.y + 0.5f - 0.5f * (float)height;
-    ray.place = (size_t)(height - 1 - pixel.y) * width + pixel.x;
-    return ray;
-}
-
-// The rays of a work-item through part of a window, from `first` on: one, or those of a block.
-typedef struct {
-    Int x, y;    // pixels, of the part
-    Int present; // those in the window
+    Int x, y;    // pixels, of the window or of a part of it
+    Int present; // those in it
     Real a, b;   // pixel offsets
 } Rays;
+
+// Those from a pixel of a window on.
+inline Rays rays_at(int2 corner, int width, int height)
+{
+    Rays rays;
+    rays.x = corner.x + (LANE_NUMBERS & 3);
+    rays.y = corner.y + (LANE_NUMBERS >> 2);
+    rays.present = (rays.x < width) & (rays.y < height);
+    rays.a = offsets_from_middle(rays.x, width);
+    rays.b = offsets_from_middle(rays.y, height);
+    return rays;
+}
+
+// Those of part of a window, from the `first` on; x and y are of the part.
 
 inline Rays rays_of_part(uint first, int width, int height, int first_column, int columns,
                          int first_row, int rows)
 {
-    const int2 corner = block_pixel(first, columns);
-    Rays rays;
-    rays.x = corner.x + (LANE_NUMBERS & 3);
-    rays.y = corner.y + (LANE_NUMBERS >> 2);
-    rays.present = (rays.x < columns) & (rays.y < rows);
+    Rays rays = rays_at(block_pixel(first, columns), columns, rows);
     rays.a = offsets_from_middle(first_column + rays.x, width);
     rays.b = offsets_from_middle(first_row + rays.y, height);
     return rays;
-}
-
-// Those of whole rows.
-inline Rays rays_of_block(uint first, int width, int height, int first_row, int rows)
-{
-    return rays_of_part(first, width, height, 0, width, first_row, rows);
 }
 
 // Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right,
@@ -172,8 +159,16 @@ inline int2 part_pixel(int group, int item, int4 part)
                   (part.y + strip) * (4 * STRIP) + (item >> 2));
 }
 
-// The same for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are their columns
-// and rows.
+// The rays of a work-item whose group has a column of strips, by which it divides once.
+inline Rays rays_of_strips(int4 part, int width, int height)
+{
+    const int item = (int)get_local_id(0) * LANES;
+    return rays_at(part_pixel(((int)get_global_id(0) * LANES - item) / COLUMN_ITEMS, item, part),
+                   width, height);
+}
+
+// Pixel of a work-item for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are
+// their columns and rows.
 inline int2 cell_pixel(__global const int2 *cells, int item)
 {
     const int2 cell = cells[item / CELL_ITEMS];

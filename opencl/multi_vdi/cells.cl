@@ -10,8 +10,7 @@ __attribute__((vec_type_hint(float16))) __kernel void alone_ends(
         *alone, // (cells high, cells wide), bottom row first: the VDI in each of the window's cells
     int vdi, int cells_wide, int width, int height,
     __global const float *opaque_depth, // as for raycasting/raycast.cl
-    int has_opaque_depth,
-    __global float *ends) // top row first
+    __global float *ends)               // top row first
 {
     const int cell = (int)get_global_id(0), row = (int)get_global_id(1);
     if (cell >= cells_wide)
@@ -19,8 +18,7 @@ __attribute__((vec_type_hint(float16))) __kernel void alone_ends(
     const bool here = alone[(height - 1 - row) / CELL * cells_wide + cell] == vdi;
     const size_t first = (size_t)row * width;
     for (int x = cell * CELL; x < min((cell + 1) * CELL, width); ++x)
-        ends[first + x] =
-            here ? (has_opaque_depth ? opaque_depth[first + x] : INFINITY) : -INFINITY;
+        ends[first + x] = here ? (opaque_depth ? opaque_depth[first + x] : INFINITY) : -INFINITY;
 }
 
 // Take a VDI's cells from its picture, which may be the image itself; or clear those of NOBODY.

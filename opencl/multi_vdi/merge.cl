@@ -1,5 +1,5 @@
-// The joint picture of several VDIs: a ray's streams of segments, merged by depth and composited
-// front to back, a ray in a work-item.
+// The joint picture of several VDIs: rays' streams of segments, merged by depth and composited
+// front to back, a ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
 // Every VDI is piecewise constant along a ray, so all of them together are: where several segments
 // cover a piece of the ray, their extinctions add and the colour is the mean by extinction
@@ -8,33 +8,32 @@
 // there. The sums are formed in the order of the streams.
 //
 // -D STREAMS   how many VDIs
-#include "lib/rays.cl"
+#include "lib/pixels.cl"
 #include "lib/compositing.cl"
 #include "multi_vdi/pool.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// A ray's stream of one VDI: the segment that is not behind what has been composited, its slot, and
-// that behind the last one. At the end of a stream a segment begins at infinity.
+// The rays' streams of one VDI: slots of the segments that are not behind what has been composited,
+// and of those behind the last ones. At the end of a stream a segment begins at infinity.
 typedef struct {
-    int slot, end;
+    Int slots, ends;
     Segments at;
 } Stream;
 
-inline void come_to_segment(Stream *stream, __global const float *rows)
+// Load the segments of the rays that are chosen.
+inline void come_to_segments(Stream *stream, __global const float *rows, int capacity, Int chosen)
 {
-    if (stream->slot >= stream->end) {
-        stream->at.from = stream->at.to = INFINITY;
-        return;
-    }
-    __global const float *const at = rows + SLOT(stream->slot);
-    stream->at.from = at[0];
-    stream->at.to = at[FLOATS_APART];
-    stream->at.optical_depth = at[2 * FLOATS_APART];
-    stream->at.color =
-        (float4)(at[3 * FLOATS_APART], at[4 * FLOATS_APART], at[5 * FLOATS_APART], 0.0f);
+    const Int left = chosen && stream->slots < stream->ends;
+    const Segments next = load_segments(rows, SELECT((Int)(0), stream->slots, left), capacity);
+    stream->at.from = SELECT(stream->at.from, SELECT((Real)(INFINITY), next.from, left), chosen);
+    stream->at.to = SELECT(stream->at.to, SELECT((Real)(INFINITY), next.to, left), chosen);
+    stream->at.optical_depth = SELECT(stream->at.optical_depth, next.optical_depth, left);
+    stream->at.color.x = SELECT(stream->at.color.x, next.color.x, left);
+    stream->at.color.y = SELECT(stream->at.color.y, next.color.y, left);
+    stream->at.color.z = SELECT(stream->at.color.z, next.color.z, left);
 }
 
-__kernel void
+KERNEL_OF_LANES void
 merge(__global float *pool,              // see multi_vdi/pool.cl
       int capacity,                      // slots of a ray
       __global const int *ends,          // (streams, rays)
@@ -45,78 +44,99 @@ merge(__global float *pool,              // see multi_vdi/pool.cl
       int width, int height,             // window of V_N
       float transmittance_cutoff,        // the ray ends where less than this is left
       __global const int *streams_of,    // (VDIs): the stream of each, in the order of the owners
-      __global int *needed,   // slots that a ray of each cell needs; over the capacity, the
-                              // ray is not drawn
+      __global int
+          *needed, // slots that a ray of each cell needs; over the capacity, the ray is not drawn
       __global float4 *image, // premultiplied RGBA, top row first
-      __global short *owner)  // the VDI to which each pixel belongs; -1: to none
+      __global short *owner)  // the VDI to which each pixel belongs, top row first; -1: to none
 {
-    const int place = (int)get_global_id(0);
-    const Ray pixel = ray_of_pixel(cell_pixel(cells + first_cell, place), width, height);
-    if (!pixel.present)
+    const int first_ray = (int)get_global_id(0) * LANES;
+    const Rays pixel = rays_at(cell_pixel(cells + first_cell, first_ray), width, height);
+    if (!ANY(pixel.present))
         return;
     // Has every segment found room?
-    const int used = ends[(STREAMS - 1) * rays + place];
-    __global int *const needed_here = needed + first_cell + place / CELL_ITEMS;
-    if (used > *needed_here) // an old value is only lower, and does no harm
-        atomic_max(needed_here, used);
-    if (used > capacity)
+    const Int used =
+        SELECT((Int)(0), LOAD_LANES(0, ends + (STREAMS - 1) * rays + first_ray), pixel.present);
+    const int most = largest_lane(used);
+    __global int *const needed_here = needed + first_cell + first_ray / CELL_ITEMS;
+    if (most > *needed_here) // an old value is only lower, and does no harm
+        atomic_max(needed_here, most);
+    if (most > capacity)
         return;
 
     // A pixel belongs to the first VDI that surely covers it, or else to the first that it meets
-    int owned_by = -1, grade = 0;
+    Int owned_by = -1;
+    Int grades = 0;
     for (int vdi = 0; vdi < STREAMS; ++vdi) {
-        const int meets = contributes[streams_of[vdi] * rays + place];
-        owned_by = meets > grade ? vdi : owned_by;
-        grade = max(meets, grade);
+        const Int meets = TO_INT(LOAD_LANES(0, contributes + streams_of[vdi] * rays + first_ray));
+        owned_by = SELECT(owned_by, (Int)(vdi), meets > grades);
+        grades = max(meets, grades);
     }
-    owner[pixel.place] = (short)owned_by;
+    const Int place = places_in_picture(pixel.x, pixel.y, pixel.present, width, height);
+    const Places places = {place}, owners = {owned_by};
+    for (int k = 0; k < LANES; ++k)
+        if (places.each[k] >= 0)
+            owner[places.each[k]] = (short)owners.each[k];
 
-    __global const float *const rows = pool_of(pool, place, capacity);
+    __global const float *const rows = pool_of(pool, first_ray, capacity);
     Stream streams[STREAMS];
+    Int first = 0;
     for (int j = 0; j < STREAMS; ++j) {
-        streams[j].slot = j > 0 ? streams[j - 1].end : 0;
-        streams[j].end = ends[j * rays + place];
-        come_to_segment(&streams[j], rows);
+        streams[j].slots = first;
+        first = streams[j].ends =
+            SELECT((Int)(0), LOAD_LANES(0, ends + j * rays + first_ray), pixel.present);
+        streams[j].at.optical_depth = streams[j].at.color.x = streams[j].at.color.y =
+            streams[j].at.color.z = 0.0f;
+        streams[j].at.from = streams[j].at.to = INFINITY;
+        come_to_segments(&streams[j], rows, capacity, pixel.present);
     }
     Seen seen = nothing_seen();
-    float reached = -INFINITY;
-    while (!(seen.sums.w < transmittance_cutoff)) {
+    Real reached = -INFINITY;
+    while (true) {
         // Find the next piece that no segment begins or ends in
-        float begin = INFINITY, end = INFINITY;
+        Real begin = INFINITY, end = INFINITY;
         for (int j = 0; j < STREAMS; ++j)
             begin = LOWER_OF(begin, HIGHER_OF(streams[j].at.from, reached));
-        if (!(begin < INFINITY))
+        const Int goes = begin < INFINITY && !(seen.sums.w < transmittance_cutoff);
+        if (!ANY(goes))
             break;
         for (int j = 0; j < STREAMS; ++j)
-            end =
-                LOWER_OF(end, streams[j].at.from <= begin ? streams[j].at.to : streams[j].at.from);
+            end = LOWER_OF(
+                end, SELECT(streams[j].at.from, streams[j].at.to, streams[j].at.from <= begin));
 
         // Sum up its medium: optical depths, and colours times them
-        float optical_depth = 0.0f;
-        float3 colors = (float3)(0.0f);
-        float3 color = (float3)(0.0f); // of the last one
-        int covering = 0;
+        Real optical_depth = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f;
+        Real4 color; // of the last one
+        color.x = color.y = color.z = color.w = 0.0f;
+        Int covering = 0;
         for (int j = 0; j < STREAMS; ++j) {
             const Segments at = streams[j].at;
-            if (!(at.from <= begin))
-                continue;
-            const bool ends_here = at.to <= end;
+            const Int covers = goes && at.from <= begin;
+            const Int ends_here = covers && at.to <= end;
             // A segment that nothing cuts keeps its optical depth, however short it is in t
-            const float share =
-                ends_here && at.from >= begin ? 1.0f : (end - begin) / (at.to - at.from);
-            const float part = at.optical_depth * share;
-            colors += part * at.color.xyz;
+            const Real share = SELECT((end - begin) / (at.to - at.from), (Real)(1.0f),
+                                      ends_here && at.from >= begin);
+            const Real part = SELECT((Real)(0.0f), at.optical_depth * share, covers);
+            red += part * at.color.x;
+            green += part * at.color.y;
+            blue += part * at.color.z;
             optical_depth += part;
-            color = at.color.xyz;
-            ++covering;
-            if (ends_here) {
-                ++streams[j].slot;
-                come_to_segment(&streams[j], rows);
+            color.x = SELECT(color.x, at.color.x, covers);
+            color.y = SELECT(color.y, at.color.y, covers);
+            color.z = SELECT(color.z, at.color.z, covers);
+            covering += COUNT(covers);
+            if (ANY(ends_here)) {
+                streams[j].slots += COUNT(ends_here);
+                come_to_segments(&streams[j], rows, capacity, ends_here);
             }
         }
-        color = covering > 1 && optical_depth > 0.0f ? colors / optical_depth : color;
-        composite_medium(&seen, optical_depth, (float4)(color, 0.0f), optical_depth > 0.0f);
-        reached = end;
+        const Int several = covering > 1;
+        const Real per_depth = 1.0f / optical_depth;        // one division, not three
+        const Int meets = goes && optical_depth >= FLT_MIN; // of less, the reciprocal is not finite
+        color.x = SELECT(color.x, red * per_depth, several);
+        color.y = SELECT(color.y, green * per_depth, several);
+        color.z = SELECT(color.z, blue * per_depth, several);
+        composite_medium(&seen, optical_depth, color, meets);
+        reached = SELECT(reached, end, goes);
     }
-    image[pixel.place] = composited(&seen);
+    store_fours(image, place, composited(&seen));
 }

@@ -8,8 +8,9 @@
 // -D SEGMENT_ROWS=0, 1  how they lie: rays in blocks of 16, component by component, so that
 //                       neighbouring work-items touch neighbouring words; or ray by ray, a
 //                       segment's components together, so that a vector's lanes are loaded and
-//                       stored in whole rows (opencl/cpu16/pool.cl): a ray then has SPARE_SLOTS
-#include "lib/lanes.cl"
+//                       stored in whole rows, as sixteen lanes are (lib/lanes.cl): a ray then has
+//                       SPARE_SLOTS
+#include "lib/transpose.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #define BOX_PLANES 6 // of a VDI's bounds: the first of its planes to clip to
@@ -35,6 +36,80 @@ inline __global float *pool_of(__global float *pool, int first_ray, int capacity
            first_ray % RAY_BLOCK;
 }
 
-// In that part, where a ray's segment in a slot begins, and its components are.
+#if LANES == 16
+// Where the rays keep the segments of their slots.
+#define ROWS_OF(slots, capacity)                                                                   \
+    ((LANE_NUMBERS * ((capacity) + SPARE_SLOTS) + (slots)) * SEGMENT_SIZE)
+#define HALF_ROW 4 // floats; a row's second half reaches into the next slot
+
+// Store the segments of rays that are chosen in their slots. A ray has two slots to spare: what
+// reaches beyond a slot may be stored over, by rays that are not chosen, too, and where there is no
+// room is stored in the first of them.
+inline void store_segments(__global float *rows, Int slots, int capacity, const Segments *segments,
+                           Int chosen)
+{
+    const Places in_memory = {ROWS_OF(min(slots, capacity), capacity)};
+    Place *at = in_memory.each;
+    const Real4 first =
+        transpose(REAL4(segments->from, segments->to, segments->optical_depth, segments->color.x));
+    const Real4 second = transpose(
+        REAL4(segments->color.y, segments->color.z, segments->color.y, segments->color.z));
+#define STORE_ROWS(row, n)                                                                         \
+    vstore4(first.row.s0123, 0, rows + at[n]);                                                     \
+    vstore4(second.row.s0123, 0, rows + at[n] + HALF_ROW);                                         \
+    vstore4(first.row.s4567, 0, rows + at[4 + n]);                                                 \
+    vstore4(second.row.s4567, 0, rows + at[4 + n] + HALF_ROW);                                     \
+    vstore4(first.row.s89ab, 0, rows + at[8 + n]);                                                 \
+    vstore4(second.row.s89ab, 0, rows + at[8 + n] + HALF_ROW);                                     \
+    vstore4(first.row.scdef, 0, rows + at[12 + n]);                                                \
+    vstore4(second.row.scdef, 0, rows + at[12 + n] + HALF_ROW)
+    STORE_ROWS(x, 0);
+    STORE_ROWS(y, 1);
+    STORE_ROWS(z, 2);
+    STORE_ROWS(w, 3);
+#undef STORE_ROWS
+}
+
+inline Segments load_segments(__global const float *rows, Int slots, int capacity)
+{
+    const Places in_memory = {ROWS_OF(slots, capacity)};
+    Place *at = in_memory.each;
+#define LOAD_ROWS(n, half)                                                                         \
+    (Real)(vload4(0, rows + at[n] + (half)), vload4(0, rows + at[4 + (n)] + (half)),               \
+           vload4(0, rows + at[8 + (n)] + (half)), vload4(0, rows + at[12 + (n)] + (half)))
+    const Real4 first =
+        transpose(REAL4(LOAD_ROWS(0, 0), LOAD_ROWS(1, 0), LOAD_ROWS(2, 0), LOAD_ROWS(3, 0)));
+    const Real4 second = transpose(REAL4(LOAD_ROWS(0, HALF_ROW), LOAD_ROWS(1, HALF_ROW),
+                                         LOAD_ROWS(2, HALF_ROW), LOAD_ROWS(3, HALF_ROW)));
+#undef LOAD_ROWS
+    const Segments segments = {first.x, first.y, first.z,
+                               REAL4(first.w, second.x, second.y, (Real)(0.0f))};
+    return segments;
+}
+#else
 #define FLOATS_APART (SEGMENT_ROWS ? 1 : RAY_BLOCK)
 #define SLOT(slot) ((slot) * (SEGMENT_SIZE * FLOATS_APART))
+
+inline void store_segments(__global float *rows, int slot, int capacity, const Segments *segment,
+                           bool chosen)
+{
+    __global float *const at = rows + SLOT(slot);
+    if (!chosen || slot >= capacity)
+        return;
+    at[0] = segment->from;
+    at[FLOATS_APART] = segment->to;
+    at[2 * FLOATS_APART] = segment->optical_depth;
+    at[3 * FLOATS_APART] = segment->color.x;
+    at[4 * FLOATS_APART] = segment->color.y;
+    at[5 * FLOATS_APART] = segment->color.z;
+}
+
+inline Segments load_segments(__global const float *rows, int slot, int capacity)
+{
+    __global const float *const at = rows + SLOT(slot);
+    const Segments segment = {
+        at[0], at[FLOATS_APART], at[2 * FLOATS_APART],
+        (float4)(at[3 * FLOATS_APART], at[4 * FLOATS_APART], at[5 * FLOATS_APART], 0.0f)};
+    return segment;
+}
+#endif

@@ -1,61 +1,68 @@
-// What a ray crosses of one of several VDIs, as segments in a pool (multi_vdi/pool.cl), a ray of a
-// band in a work-item; multi_vdi/merge.cl composites them together.
+// What rays cross of one of several VDIs, as segments in a pool (multi_vdi/pool.cl), a ray of a
+// band or a block of 4 x 4 in a work-item (lib/lanes.cl); multi_vdi/merge.cl composites them
+// together.
 #define ONE_LIST 0
-#include "raycasting/walk.cl"
+#include "raycasting/ray.cl"
 #include "multi_vdi/pool.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// What is written of a ray.
+// What is written of rays.
 typedef struct {
     __global float *rows;
-    int capacity;   // slots
-    int slot;       // behind the last segment; beyond the capacity where there is no room
-    float reached;  // t, so that rounding puts no segment before the end of another
-    float absorbed; // optical depth
-} Stream;
+    int capacity;      // slots of a ray
+    Int slots;         // behind the last segments; beyond the capacity where there is no room
+    Real reached;      // t, so that rounding puts no segment before the end of another
+    Real absorbed;     // optical depth
+    float depth_shift; // this VDI's reference depth less the frame's
+} Made;
 
-// Append what the ray crosses of a medium, from r = from to r = to.
-inline void append_segment(Stream *stream, const ListRay *ray, float from, float to, float4 medium,
-                           float depth_shift)
+inline Int are_done(const Made *streams, const Frame *frame)
 {
-    const float optical_depth = fmin(medium.w * length_between(ray, from, to), MAX_OPTICAL_DEPTH);
-    if (!(from < to && optical_depth > 0.0f))
-        return;
-    const float t_from = HIGHER_OF(ray_time(ray, from) + depth_shift, stream->reached);
-    const float t_to = HIGHER_OF(ray_time(ray, to) + depth_shift, t_from);
-    if (stream->slot < stream->capacity) {
-        __global float *const at = stream->rows + SLOT(stream->slot);
-        at[0] = t_from;
-        at[FLOATS_APART] = t_to;
-        at[2 * FLOATS_APART] = optical_depth;
-        at[3 * FLOATS_APART] = medium.x;
-        at[4 * FLOATS_APART] = medium.y;
-        at[5 * FLOATS_APART] = medium.z;
-    }
-    stream->reached = t_to;
-    stream->absorbed += optical_depth;
-    ++stream->slot;
+    return streams->absorbed > frame->cutoff;
 }
 
-// Whether rays `margin` pixels to each side of (a, b) would meet the VDI's bounds, too.
-inline bool surely_covered(__global const float *forms, float a, float b, float margin)
+// Append what the rays that are chosen cross of a medium, from r = from to r = to.
+inline void take_medium(Made *streams, const ListRay *ray, Real from, Real to, Real4 medium,
+                        Int chosen)
 {
-    bool covered = true;
+    for (int n = 0; n < (CROPPED ? MOST_KEPT : 1); ++n) {
+        if (CROPPED && LANES > 1 && !ANY(chosen && ray->kept.count > n))
+            break;
+        Real kept_from = from, kept_to = to;
+        if (CROPPED)
+            cut_to_part(&ray->kept, n, &kept_from, &kept_to);
+        Segments segments;
+        segments.color = medium;
+        segments.optical_depth =
+            fmin(medium.w * length_between(ray, kept_from, kept_to), MAX_OPTICAL_DEPTH);
+        const Int appended = chosen && kept_from < kept_to && segments.optical_depth > 0.0f;
+        segments.from =
+            HIGHER_OF(ray_time(ray, kept_from) + streams->depth_shift, streams->reached);
+        segments.to = HIGHER_OF(ray_time(ray, kept_to) + streams->depth_shift, segments.from);
+        store_segments(streams->rows, streams->slots, streams->capacity, &segments, appended);
+        streams->reached = SELECT(streams->reached, segments.to, appended);
+        streams->absorbed += SELECT((Real)(0.0f), segments.optical_depth, appended);
+        streams->slots += COUNT(appended);
+    }
+}
+
+#include "raycasting/walk.cl"
+
+// Which of the rays that meet the VDI would meet its bounds, too, `margin` pixels to each side.
+inline Int surely_covered(__global const float *forms, Real a, Real b, float margin, Int meet)
+{
     for (int corner = 0; corner < 4 && margin != 0.0f; ++corner) {
-        float t0 = -INFINITY, t1 = INFINITY;
-        covered = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, BOX_PLANES,
-                                 a + (corner & 1 ? margin : -margin),
-                                 b + (corner & 2 ? margin : -margin), &t0, &t1) &&
-                  covered;
+        Real t0 = -INFINITY, t1 = INFINITY;
+        meet = clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, BOX_PLANES,
+                              a + (corner & 1 ? margin : -margin),
+                              b + (corner & 2 ? margin : -margin), &t0, &t1) &&
+               meet;
     }
-    return covered;
+    return meet;
 }
 
-__kernel void
-segments(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
-         __global const ulong *faces, __global const ulong *media, __global const float *forms,
-         __global const float *opaque_depth, __global const ulong *masks,
-         Frame frame,                 // its cutoff is the optical depth behind which rays end
+KERNEL_OF_LANES void
+segments(VDI_PARAMETERS,              // its cutoff is the optical depth behind which rays end
          __global const int2 *cells,  // see lib/rays.cl
          int first_cell,              // the band's
          int number,                  // of this VDI's stream
@@ -69,46 +76,30 @@ segments(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
                                       // neighbours at `margin` pixels meet its bounds, too
          __global float *dark)        // (rays): t where light has ended in one of the VDIs so far
 {
-    const int place = (int)get_global_id(0);
-    const Ray pixel =
-        ray_of_pixel(cell_pixel(cells + first_cell, place), frame.width, frame.height);
-    if (!pixel.present)
+    const int first = (int)get_global_id(0) * LANES;
+    const Rays pixel = rays_at(cell_pixel(cells + first_cell, first), frame.width, frame.height);
+    if (!ANY(pixel.present))
         return;
     const Lists lists = LISTS_OF(frame);
     const Grid grid = GRID_OF(frame);
-    float t_end = frame.has_opaque_depth ? opaque_depth[pixel.place] : INFINITY;
+    const Int place = places_in_picture(pixel.x, pixel.y, pixel.present, frame.width, frame.height);
     // Light may have ended in a VDI before
-    const float dark_before = number > 0 ? dark[place] : INFINITY;
-    if (dark_before < INFINITY)
-        t_end = fmin(t_end, DARK_FROM(dark_before, depth_shift));
-    const int first_slot = number > 0 ? ends[(number - 1) * band_rays + place] : 0;
-    Stream stream = {pool_of(pool, place, capacity), capacity, first_slot, -INFINITY, 0.0f};
+    const Real dark_before = number > 0 ? LOAD_LANES(0, dark + first) : (Real)(INFINITY);
+    Real t_end = opaque_ends(place, opaque_depth);
+    t_end = SELECT(t_end, fmin(t_end, DARK_FROM(dark_before, depth_shift)), dark_before < INFINITY);
+    const Int first_slots =
+        number > 0 ? LOAD_LANES(0, ends + (number - 1) * band_rays + first) : (Int)(0);
+    Made streams = {
+        pool_of(pool, first, capacity), capacity, first_slots, -INFINITY, 0.0f, depth_shift};
     Path path;
-    begin_path(&path, forms, &frame, pixel.a, pixel.b, t_end);
-    if (path.ray.present)
-        prefetch_ends(&path, &lists, frame.height);
-    Cursor at = begin_walk(&path);
-    for (int turn = 0; at.active; ++turn) {
-        if (SKIP_EMPTY && at.new_stack && turn % TURNS_PER_LOOK == 0) {
-            skip_empty_cells(&at, &path, &grid);
-            if (!at.active)
-                break;
-        }
-        const Crossing crossing = next_crossing(&at, &path, &lists);
-        if (crossing.meets) {
-            const float4 medium = medium_met(&at, &crossing, &path, &lists);
-            for (int n = 0; n < (CROPPED ? MOST_KEPT : 1); ++n) {
-                float2 r = ends_inside(&at, &crossing, &path);
-                if (CROPPED)
-                    r = (float2)(fmax(r.x, path.ray.kept.from[n]), fmin(r.y, path.ray.kept.to[n]));
-                append_segment(&stream, &path.ray, r.x, r.y, medium, depth_shift);
-            }
-        }
-        step_on(&at, &crossing, &path, stream.absorbed > frame.cutoff);
-    }
-    const bool meets = stream.slot > first_slot;
-    ends[number * band_rays + place] = stream.slot;
-    dark[place] = stream.absorbed > frame.cutoff ? fmin(dark_before, stream.reached) : dark_before;
-    contributes[number * band_rays + place] =
-        meets + (meets && surely_covered(forms, pixel.a, pixel.b, margin));
+    begin_path(&path, forms, &frame, pixel.a, pixel.b, t_end, pixel.present);
+    follow(&streams, &path, &lists, &grid, &frame);
+    STORE_LANES(streams.slots, 0, ends + number * band_rays + first);
+    const Real reached = fmin(dark_before, streams.reached);
+    STORE_LANES(SELECT(dark_before, reached, streams.absorbed > frame.cutoff), 0, dark + first);
+    const Int meets = streams.slots > first_slots;
+    const Int covered =
+        ANY(meets) ? surely_covered(forms, pixel.a, pixel.b, margin, meets) : (Int)(0);
+    STORE_LANES(TO_UCHAR(COUNT(meets) + COUNT(covered)), 0,
+                contributes + number * band_rays + first);
 }

@@ -6,7 +6,6 @@ typedef struct {
     int lists_wide, lists_high;       // window of V_O
     int width, height;                // window of V_N
     int planes;                       // to clip to, of the forms
-    int has_opaque_depth;             // whether rays end at `opaque_depth`
     float depth_origin;               // world units
     float cutoff;                     // a ray ends where less transmittance than this is left
     float first_depth;                // where slab 0 begins, view depth less depth_origin

@@ -1,8 +1,6 @@
 // The occupancy grid: how many supersegments reach into each cell (paper, section 4), and for each
 // stack of cells the set of its occupied slabs as one 64-bit mask, which answers a ray's whole
 // crossing of the stack with one load.
-//
-// -D OFFSET_T   type of an offset into the supersegments: int or long
 #include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -36,8 +34,8 @@ inline void count_supersegment(const Counted *grid, float front, float back, __g
 
 // One work-item per list.
 __kernel void
-count_supersegments(__global const OFFSET_T *offsets, // width * height + 1
-                    __global const float *fronts,     // view depth less depth_origin
+count_supersegments(__global const ulong *starts, // of the lists, width * height + 1
+                    __global const float *fronts, // view depth less depth_origin
                     __global const float *backs, Counted grid,
                     __global uint *changes) // of the counts: stacks_high, stacks_wide, SLABS; all 0
 {
@@ -45,12 +43,12 @@ count_supersegments(__global const OFFSET_T *offsets, // width * height + 1
     if (list >= (size_t)grid.width * (size_t)grid.height)
         return;
     __global uint *cells = cells_of_list(&grid, list, changes);
-    for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k)
+    for (ulong k = starts[list]; k < starts[list + 1]; ++k)
         count_supersegment(&grid, fronts[k], backs[k], cells);
 }
 
 // The same of lists of 8 bytes, whose faces are codes of depth (model/packing.py).
-__kernel void count_packed(__global const OFFSET_T *offsets,
+__kernel void count_packed(__global const ulong *starts,
                            __global const int *origins,    // of the lists' depths, steps
                            __global const ushort *strides, // steps per code
                            __global const uint2 *words,
@@ -62,11 +60,20 @@ __kernel void count_packed(__global const OFFSET_T *offsets,
         return;
     __global uint *cells = cells_of_list(&grid, list, changes);
     const int origin = origins[list], stride = strides[list];
-    for (OFFSET_T k = offsets[list]; k < offsets[list + 1]; ++k) {
+    for (ulong k = starts[list]; k < starts[list + 1]; ++k) {
         const float front = (float)(origin + (int)(words[k].x & DEPTH_CODES) * stride) * step;
         const float back = (float)(origin + (int)(words[k].x >> 14 & DEPTH_CODES) * stride) * step;
         count_supersegment(&grid, front, back, cells);
     }
+}
+
+// The first front and the last back of each list that is not empty: one work-item per list.
+__kernel void ends_of_lists(__global const ulong *starts, __global const float *fronts,
+                            __global const float *backs, uint lists, __global float2 *ends)
+{
+    const size_t list = get_global_id(0);
+    if (list < lists && starts[list] < starts[list + 1])
+        ends[list] = (float2)(fronts[starts[list]], backs[starts[list + 1] - 1]);
 }
 
 // One work-item per stack: its changes become counts.

@@ -30,7 +30,7 @@ inline float prepared_extinction(float front, float back, float optical_depth, f
 
 // One work-item per list.
 __kernel void prepare_lists(
-    __global const OFFSET_T *starts,  // of the lists in the arrays, width * height + 1
+    __global const ulong *starts,     // of the lists in the arrays, width * height + 1
     __global const HEADER_T *headers, // of the bundles of lists
     __global const float *fronts,     // view depth less depth_origin
     __global const float *backs,
@@ -51,10 +51,11 @@ __kernel void prepare_lists(
     const float per_depth = length_per_depth(centre_ray, i, j, width, height);
     const Lists lists = {headers, 0, 0, width, height, 0.0f, 0.0f};
     const List list = list_at(&lists, i, j);
-    const OFFSET_T start = starts[place];
+    const ulong start = starts[place];
     const int count = (int)(starts[place + 1] - start);
     for (int n = 0; n < list.count; ++n) {
-        const OFFSET_T entry = entry_of(list, n), k = start + n;
+        const OFFSET_T entry = entry_of(list, n);
+        const ulong k = start + n;
         float2 face = NO_FACE; // of what the list is filled up with
         float3 color = (float3)(0.0f);
         float extinction = 0.0f;

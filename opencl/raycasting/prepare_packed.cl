@@ -6,7 +6,7 @@
 // One work-item per list; the hint keeps Intel's compiler from copying lists in vectors, as long as
 // their longest.
 __attribute__((vec_type_hint(float16))) __kernel void prepare_packed(
-    __global const OFFSET_T *starts,  // of the lists in `stored`, width * height + 1
+    __global const ulong *starts,     // of the lists in `stored`, width * height + 1
     __global const OFFSET_T *headers, // the same in `words`
     __global const int *origins,      // of the lists' depths, steps
     __global const ushort *strides,   // steps per code
@@ -20,7 +20,7 @@ __attribute__((vec_type_hint(float16))) __kernel void prepare_packed(
     const size_t list = get_global_id(0);
     if (list >= (size_t)width * (size_t)height)
         return;
-    const OFFSET_T begin = starts[list], end = starts[list + 1];
+    const ulong begin = starts[list], end = starts[list + 1];
     if (begin == end)
         return;
     const float a = (float)(list % (size_t)width) + 0.5f - 0.5f * (float)width;
@@ -31,6 +31,6 @@ __attribute__((vec_type_hint(float16))) __kernel void prepare_packed(
     __global uint2 *target = words + headers[list];
     target[0] = (uint2)(as_uint(origin), (uint)stride);
     target[1] = (uint2)(as_uint(1.0f / (length(direction) * (float)stride * step)), 0);
-    for (OFFSET_T k = begin; k < end; ++k)
+    for (ulong k = begin; k < end; ++k)
         target[LIST_HEADER + k - begin] = stored[k];
 }

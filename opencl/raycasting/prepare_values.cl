@@ -10,9 +10,9 @@
 
 // One work-item per bundle of lists: they move up in it.
 __attribute__((vec_type_hint(float16))) __kernel void
-prepare_values(__global const OFFSET_T *starts, // of the lists in the arrays, width * height + 1
-               __global const ulong *places,    // headers of the bundles with all supersegments
-               __global const float *fronts,    // view depth less depth_origin
+prepare_values(__global const ulong *starts, // of the lists in the arrays, width * height + 1
+               __global const ulong *places, // headers of the bundles with all supersegments
+               __global const float *fronts, // view depth less depth_origin
                __global const float *backs, __global const float *means,
                __global const float *spreads,
                __global const float *steps,      // of the march, in each supersegment
@@ -38,10 +38,10 @@ prepare_values(__global const OFFSET_T *starts, // of the lists in the arrays, w
         int n = 0;
         if (i < grid.width && j < grid.height) {
             const size_t list = (size_t)j * (size_t)grid.width + (size_t)i;
-            const OFFSET_T end = starts[list + 1];
+            const ulong end = starts[list + 1];
             __global uint *counts = cells_of_list(&grid, list, changes);
             const float per_depth = length_per_depth(centre_ray, i, j, grid.width, grid.height);
-            for (OFFSET_T k = starts[list]; k < end; ++k) {
+            for (ulong k = starts[list]; k < end; ++k) {
                 const float4 medium = classified(integrals, cells, means[k], spreads[k], steps[k]);
                 if (!(medium.w > 0.0f))
                     continue;

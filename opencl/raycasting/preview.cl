@@ -7,6 +7,7 @@
 #include "raycasting/first_supersegment.cl"
 #include "raycasting/ray.cl"
 #include "raycasting/stacks.cl"
+#include "lib/pixels.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -148,8 +149,8 @@ inline float4 medium_at(const ListRay *ray, float r, const Lists *lists, int *gu
     const List list = list_at(lists, i, j);
     Search search = begin_search(*guess);
     Faces face;
-    while (!first_supersegment(&search, lists, list, z, true, ray->depths, &face))
-        ;
+    while (!first_supersegment(&search, lists, list, z, true, true, ray->depths, &face))
+        guess_again(&search, list, false);
     *guess = search.p;
     if (!(face.near <= z) || (CROPPED && !is_kept(&ray->kept, r)))
         return (float4)(0.0f);
@@ -157,22 +158,20 @@ inline float4 medium_at(const ListRay *ray, float r, const Lists *lists, int *gu
 }
 
 __kernel void
-preview(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
-        __global const ulong *faces, __global const ulong *media, __global const float *forms,
-        __global const float *opaque_depth, __global const ulong *masks, Frame frame,
+preview(VDI_PARAMETERS,
         __global const uint *counts, // supersegments in each cell: stacks_high, stacks_wide, SLABS
         int samples,                 // per ray
         __global float4 *image)      // premultiplied RGBA, top row first
 {
-    const Ray pixel =
-        ray_of_pixel(block_pixel((uint)get_global_id(0), frame.width), frame.width, frame.height);
+    const Rays pixel =
+        rays_at(block_pixel((uint)get_global_id(0), frame.width), frame.width, frame.height);
     if (!pixel.present)
         return;
-    const float t_end = frame.has_opaque_depth ? opaque_depth[pixel.place] : INFINITY;
+    const int place = places_in_picture(pixel.x, pixel.y, true, frame.width, frame.height);
     ListRay ray;
-    begin_ray(&ray, forms, &frame, pixel.a, pixel.b, t_end);
+    begin_ray(&ray, forms, &frame, pixel.a, pixel.b, opaque_ends(place, opaque_depth), true);
     if (!ray.present) {
-        image[pixel.place] = (float4)(0.0f);
+        image[place] = (float4)(0.0f);
         return;
     }
     const Lists lists = LISTS_OF(frame);
@@ -224,5 +223,5 @@ preview(__global const HEADER_T *headers, // these as of raycasting/raycast.cl
         weight_before = weight_until;
         length_before += crossing.length;
     }
-    image[pixel.place] = composited(&seen);
+    image[place] = composited(&seen);
 }

@@ -35,6 +35,13 @@ typedef struct {
     float depth_step, nearest_offset;
 } Lists;
 
+// What every kernel takes that draws a frame.
+#define VDI_PARAMETERS                                                                             \
+    __global const HEADER_T *headers, __global const ulong *faces, __global const ulong *media,    \
+        __global const float *forms,        /* see begin_ray */                                    \
+        __global const float *opaque_depth, /* t at which each pixel's ray ends; 0: none does */   \
+        __global const ulong *masks,        /* of the occupancy grid's stacks: occupied slabs */   \
+        Frame frame
 #define LISTS_OF(frame)                                                                            \
     {headers,                                                                                      \
      faces,                                                                                        \
@@ -143,6 +150,27 @@ inline float4 medium_of(const Lists *lists, List list, int k)
                     (float)(high >> 24) * (1.0f / 255.0f),
                     fmin(optical_depth * list.per_code / (float)thickness, FLT_MAX));
 }
+
+#if LANES == 16
+// Depth coordinates of codes of 14 bits, in lists of these origins and strides: depth_of_code.
+inline Real depths_of_codes(const Lists *lists, Int origin, Int stride, Uint codes, Depths depths)
+{
+    const Real offset = TO_REAL(origin + AS_INT(codes & DEPTH_CODES) * stride) * lists->depth_step;
+    const Real before = DEPTH == PARALLEL ? offset : fmax(offset, lists->nearest_offset);
+    return depth_coordinate(before, depths);
+}
+
+// Media of supersegments by their words, in lists of these scales: medium_of.
+inline Real4 media_of_words(Uint low, Uint high, Real per_code)
+{
+    const Uint tau = low >> 28 | (high & 255) << 4;
+    const Uint thickness = (low >> 14 & DEPTH_CODES) - (low & DEPTH_CODES);
+    const Real optical_depth = select((Real)(0.0f), AS_REAL((tau + TAU_BASE - 1) << 16), tau > 0);
+    return REAL4(TO_REAL(high >> 8 & 255) * (1.0f / 255.0f),
+                 TO_REAL(high >> 16 & 255) * (1.0f / 255.0f), TO_REAL(high >> 24) * (1.0f / 255.0f),
+                 fmin(optical_depth * per_code / TO_REAL(thickness), FLT_MAX));
+}
+#endif
 
 // A ray that crosses fewer lists than this goes through the whole depth of a list's neighbourhood:
 // worth to be brought close at once.

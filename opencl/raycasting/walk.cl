@@ -1,213 +1,247 @@
-// A ray's walk through the lists of a VDI (paper, sections 3 and 4), of which kernels make a
-// picture, segments or first hits:
-//
-//     while (at.active) {
-//         skip_empty_cells(&at, ...);        // section 4
-//         crossing = next_crossing(&at, ..); // Algorithm 1
-//         ... composite what it crosses ...
-//         step_on(&at, ...);                    // Amanatides and Woo
-//     }
+// The walk of a work-item's rays, one or a block of 4 x 4 (lib/lanes.cl), through the lists of a
+// VDI (paper, sections 3 and 4), of which programs make a picture, segments or first hits:
+// `follow`.
 //
 // Each turn makes a guess, meets a supersegment or leaves a list, or the last two: rays side by
-// side need not wait for the one that searches longest or meets most (docs/decisions/rays.md).
+// side need not wait for the one that searches longest or meets most (docs/decisions/rays.md,
+// blocks.md).
+//
+// Who includes this says before what is Made of what rays cross; take_medium, which adds it; and
+// are_done, which rays no light is left of.
 //
 // -D SKIP_EMPTY=0, 1   pass by what the occupancy grid says is empty; the picture is the same
-// -D ONE_LIST=0, 1     the view is V_O: a ray stays in a list, whose supersegments a loop of its
-// own
-//                      meets (next_in_list)
+// -D ONE_LIST=0, 1     the view is V_O, and LANES is 1: a ray stays in a list, whose supersegments
+// a
+//                      loop of its own meets
 #include "lib/lanes.cl"
-typedef int Steps;
-typedef float Border;
+typedef Int Steps;
+typedef Real Border;
 #include "raycasting/first_supersegment.cl"
 #include "raycasting/ray.cl"
 #include "raycasting/stepping.cl"
+#include "lib/pixels.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// A ray, and what stepping along it takes.
+// Rays, and what stepping along them takes.
 typedef struct {
     ListRay ray;
     Axis u, v;
-    Sense sense;
 } Path;
 
-inline void begin_path(Path *path, __global const float *forms, const Frame *frame, float a,
-                       float b, float t_end)
+inline void begin_path(Path *path, __global const float *forms, const Frame *frame, Real a, Real b,
+                       Real t_end, Int wanted)
 {
-    begin_ray(&path->ray, forms, frame, a, b, t_end);
+    begin_ray(&path->ray, forms, frame, a, b, t_end, wanted);
     path->u = axis_of(path->ray.along.x, path->ray.deep.x, frame->lists_wide);
     path->v = axis_of(path->ray.along.y, path->ray.deep.y, frame->lists_high);
     take_step(&path->u, path->u.along > 0.0f);
     take_step(&path->v, path->v.along > 0.0f);
-    path->sense = sense_of(path->ray.along.z, path->ray.deep.z, path->ray.away);
 }
 
-inline float lists_crossed(const Path *path) { return fabs(path->u.along) + fabs(path->v.along); }
+inline Real lists_crossed(const Path *path) { return fabs(path->u.along) + fabs(path->v.along); }
 
-// Bring the lists close that a ray begins and ends in, if it crosses few: those in between are
-// others' ends. With ONE_LIST, those of the next column of blocks.
+// Bring the lists close that rays begin and end in, if they cross few: those in between are others'
+// ends. Of blocks, and with ONE_LIST, those of the next column of blocks, which come while this
+// one's are walked through.
 inline void prefetch_ends(const Path *path, const Lists *lists, int height)
 {
-    if (!(lists_crossed(path) < LISTS_TO_PREFETCH))
+    const Int few = path->ray.present && lists_crossed(path) < LISTS_TO_PREFETCH;
+    if (!ANY(few))
         return;
-    const int shift = ONE_LIST ? BLOCK * lists->high / height : 0;
-    const float r_end = path->ray.r_begin + 1.0f;
-    const int first_i = list_index(&path->u, path->ray.start.x, shift);
-    const int first_j = list_index(&path->v, path->ray.start.y, 0);
-    const int last_i = list_index(&path->u, fma(r_end, path->u.along, path->u.deep), shift);
-    const int last_j = list_index(&path->v, fma(r_end, path->v.along, path->v.deep), 0);
-    prefetch_list(lists, first_i, first_j);
-    if (first_i != last_i || first_j != last_j)
-        prefetch_list(lists, last_i, last_j);
+    const Axis *u = &path->u, *v = &path->v;
+    const int shift = LANES > 1 || ONE_LIST ? BLOCK * lists->high / height : 0;
+    const Real r_end = path->ray.r_begin + 1.0f;
+    const Places first_i = {list_index(u, path->ray.start.x, shift)};
+    const Places first_j = {list_index(v, path->ray.start.y, 0)};
+    const Places last_i = {list_index(u, fma(r_end, u->along, u->deep), shift)};
+    const Places last_j = {list_index(v, fma(r_end, v->along, v->deep), 0)};
+    const Places wanted = {few};
+    for (int k = 0; k < LANES; ++k)
+        if (wanted.each[k])
+            prefetch_list(lists, first_i.each[k], first_j.each[k]);
+    for (int k = 0; k < LANES; ++k)
+        if (wanted.each[k] &&
+            (first_i.each[k] != last_i.each[k] || first_j.each[k] != last_j.each[k]))
+            prefetch_list(lists, last_i.each[k], last_j.each[k]);
 }
 
-// How far a ray has come.
+// How far rays have come.
 typedef struct {
-    int i, j;       // the list
-    float r, depth; // depth in its sense
+    Int i, j;      // the lists
+    Real r, depth; // depth in their sense
     Search search;
-    bool active;    // it has not ended
-    bool new_stack; // it has come to a stack of cells that it has not looked at
+    Int active;    // rays that have not ended
+    Int new_stack; // rays in a stack of cells that they have not looked at
 } Cursor;
 
-inline Cursor begin_walk(const Path *path)
+inline Cursor begin_walk(const Path *path, const Sense *sense, Int active)
 {
     Cursor at;
     at.i = list_index(&path->u, path->ray.start.x, 0);
     at.j = list_index(&path->v, path->ray.start.y, 0);
     at.r = path->ray.r_begin;
-    at.depth = path->sense.sign * path->ray.start.z;
-    at.search = begin_search(0); // where Algorithm 1 has lines 1 and 2: there is no list before
-    at.active = path->ray.present;
+    at.depth = sense->sign * path->ray.start.z;
+    at.search = begin_search(0);
+    at.active = active;
     at.new_stack = lists_crossed(path) > FEW_LISTS;
     return at;
 }
 
-inline bool is_outside(const Path *path, int i, int j)
+inline Int are_outside(const Path *path, Int i, Int j)
 {
     return i < 0 || i >= path->u.lists || j < 0 || j >= path->v.lists;
 }
 
-// Pass by stacks of cells, and parts of stacks, whose slabs ahead are empty (section 4).
-inline void skip_empty_cells(Cursor *at, const Path *path, const Grid *grid)
+// Pass by stacks of cells, and parts of stacks, whose slabs ahead are empty (section 4), for the
+// rays that look. In a loop of its own, so that rays meet again behind it.
+inline void skip_empty_cells(Cursor *at, Int looks, const Path *path, const Sense *sense,
+                             const Grid *grid)
 {
     const Axis *u = &path->u, *v = &path->v;
-    at->new_stack = false;
-    for (bool looks = true; looks;) {
+    while (ANY(looks)) {
         // Is the cell empty? Which is the nearest that is not, in this stack?
-        const ulong mask =
-            grid->masks[(at->j >> STACK_SHIFT) * grid->stacks_wide + (at->i >> STACK_SHIFT)];
-        int nearest, nothing;
-        if (!look_ahead(&nearest, &nothing, (uint)mask, (uint)(mask >> HALF_SLABS), &path->sense,
-                        at->depth, true, grid, path->ray.depths))
+        const Int stack = (at->j >> STACK_SHIFT) * grid->stacks_wide + (at->i >> STACK_SHIFT);
+        const Words mask = words_at(grid->masks, SELECT((Int)(0), stack, looks));
+        Int nearest, nothing;
+        const Int passes = look_ahead(&nearest, &nothing, mask.low, mask.high, sense, at->depth,
+                                      looks, grid, path->ray.depths);
+        if (!ANY(passes))
             break;
         // Jump to it, or to the stack's border
-        const int edge_i = stack_edge(u, at->i), edge_j = stack_edge(v, at->j);
-        const float r_border = fmin(crossings(u, edge_i), crossings(v, edge_j));
-        const float r_until =
-            empty_until(r_border, nearest, nothing, &path->sense, grid, path->ray.depths);
-        const int i = index_reached(u, at->i, edge_i, r_until);
-        const int j = index_reached(v, at->j, edge_j, r_until);
-        if (i != at->i || j != at->j) {
-            at->r = r_entered(v, r_entered(u, at->r, at->i, i), at->j, j);
-            at->depth = depth_at(&path->sense, at->r);
-            at->search = begin_search(at->search.p);
-        }
-        const bool ends = r_until >= path->ray.r_begin + 1.0f || is_outside(path, i, j);
-        looks = !ends && ((i ^ at->i) | (j ^ at->j)) >> STACK_SHIFT != 0;
-        at->i = i;
-        at->j = j;
-        at->active = !ends;
+        const Int edge_i = stack_edge(u, at->i), edge_j = stack_edge(v, at->j);
+        const Real r_border = fmin(crossings(u, edge_i), crossings(v, edge_j));
+        const Real r_until = empty_until(r_border, nearest, nothing, sense, grid, path->ray.depths);
+        const Int i = index_reached(u, at->i, edge_i, r_until);
+        const Int j = index_reached(v, at->j, edge_j, r_until);
+        const Int moves = passes && (i != at->i || j != at->j);
+        const Real r = r_entered(v, r_entered(u, at->r, at->i, i), at->j, j);
+        at->r = SELECT(at->r, r, moves);
+        at->depth = SELECT(at->depth, depth_at(sense, r), moves);
+        search_again(&at->search, moves);
+        const Int ends = r_until >= path->ray.r_begin + 1.0f || are_outside(path, i, j);
+        looks = passes && !ends && ((i ^ at->i) | (j ^ at->j)) >> STACK_SHIFT != 0;
+        at->i = SELECT(at->i, i, passes);
+        at->j = SELECT(at->j, j, passes);
+        at->active = at->active && !(passes && ends);
     }
 }
 
 // What a turn has found out.
 typedef struct {
-    List list;
-    bool found; // the first supersegment of the list behind the ray's depth, or none
+    ListMet list;
+    Int found; // the first supersegment of the list behind the ray's depth, or none
     Faces face;
-    bool meets;               // the ray crosses it in the list,
-    bool stays;               // and is still in the list behind it
-    float r_u, r_v;           // where it leaves the list by u and by v
-    float r_next, next_depth; // and where it does
+    Int meets;               // rays that cross it in the list,
+    Int stays;               // and are still in the list behind it
+    Real r_u, r_v;           // where they leave the list by u and by v
+    Real r_next, next_depth; // and where they do
 } Crossing;
 
-// Whether the ray crosses the supersegment of a face before it leaves the list: lines 16 to 20 of
-// Algorithm 1, whose f > i_exit is the wrong way round (docs/conventions.md, "The paper's
-// pseudocode, and its replacement").
-inline void note_face(Crossing *crossing, Faces face)
-{
-    crossing->face = face;
-    crossing->meets = face.near <= crossing->next_depth;
-    crossing->stays = crossing->meets && face.far <= crossing->next_depth;
-}
-
-// Search on for the first supersegment behind the ray's depth, and see where the ray leaves the
-// list.
-inline Crossing next_crossing(Cursor *at, const Path *path, const Lists *lists)
+// Search on for the first supersegments behind the rays' depths (Algorithm 1), and see where the
+// rays leave the lists.
+inline Crossing next_crossing(Cursor *at, const Path *path, const Sense *sense, const Lists *lists)
 {
     Crossing crossing;
-    Faces face;
-    crossing.list = list_at(lists, at->i, at->j);
-    crossing.found = first_supersegment(&at->search, lists, crossing.list, at->depth,
-                                        path->sense.away, path->ray.depths, &face);
+    crossing.list = list_met(lists, at->i, at->j, at->active);
+    crossing.found = first_supersegment(&at->search, lists, crossing.list, at->depth, at->active,
+                                        sense->away, path->ray.depths, &crossing.face);
     crossing.r_u = crossings(&path->u, at->i);
     crossing.r_v = crossings(&path->v, at->j);
     crossing.r_next =
         HIGHER_OF(at->r, LOWER_OF(path->ray.r_begin + 1.0f, LOWER_OF(crossing.r_u, crossing.r_v)));
-    crossing.next_depth = depth_at(&path->sense, crossing.r_next);
-    note_face(&crossing, face);
-    crossing.meets = crossing.meets && crossing.found;
-    crossing.stays = crossing.stays && crossing.found;
+    crossing.next_depth = depth_at(sense, crossing.r_next);
+    crossing.meets = crossing.found && crosses(crossing.face, crossing.next_depth);
+    crossing.stays = crossing.meets && crossing.face.far <= crossing.next_depth;
     return crossing;
 }
 
 // With ONE_LIST: come to the next supersegment of the list, if the ray meets it there.
-inline bool next_in_list(Cursor *at, Crossing *crossing, const Path *path, const Lists *lists)
+inline Int next_in_list(Cursor *at, Crossing *crossing, const Path *path, const Sense *sense,
+                        const Lists *lists)
 {
-    const bool more = crossing->stays && at->search.p + 1 < crossing->list.count;
-    crossing->stays = false;
-    if (!more)
-        return false;
-    ++at->search.p;
-    note_face(crossing,
-              faces_met(lists, crossing->list, at->search.p, path->sense.away, path->ray.depths));
+    const Int more = crossing->stays && at->search.p + 1 < crossing->list.count;
+    crossing->meets = crossing->stays = 0;
+    if (!ANY(more))
+        return 0;
+    at->search.p += 1;
+    crossing->face =
+        faces_met(lists, crossing->list, at->search.p, more, sense->away, path->ray.depths);
+    crossing->meets = crosses(crossing->face, crossing->next_depth);
+    crossing->stays = crossing->meets && crossing->face.far <= crossing->next_depth;
     return crossing->meets;
 }
 
-// Where the ray enters and leaves the supersegment that it meets, r.
-inline float2 ends_inside(const Cursor *at, const Crossing *crossing, const Path *path)
+// Go on to the next supersegments of the lists, or step to the next lists (Amanatides and Woo);
+// rays whose light is `done` end with their lists.
+inline void step_on(Cursor *at, const Crossing *crossing, const Path *path, Int done)
 {
-    float from, to;
-    clip_to_faces(&from, &to, &path->sense, crossing->face.near, crossing->face.far, at->r,
-                  crossing->r_next, at->depth, crossing->next_depth);
-    return (float2)(from, to);
-}
-
-inline float4 medium_met(const Cursor *at, const Crossing *crossing, const Path *path,
-                         const Lists *lists)
-{
-    return medium_of(lists, crossing->list,
-                     index_met(crossing->list, at->search.p, path->sense.away));
-}
-
-// Go on to the next supersegment of the list, or step to the next list (Amanatides and Woo); a ray
-// whose light is `done` ends with its list.
-inline void step_on(Cursor *at, const Crossing *crossing, const Path *path, bool done)
-{
-    if (!crossing->found)
-        return;
-    if (crossing->stays) {
-        at->search.low = ++at->search.p;
-        return;
-    }
-    at->r = crossing->r_next;
-    at->depth = crossing->next_depth;
-    at->search = begin_search(at->search.p);
-    const bool in_u = crossing->r_u <= crossing->r_v;
-    const int i = at->i + (in_u ? path->u.step : 0);
-    const int j = at->j + (in_u ? 0 : path->v.step);
-    at->active = !(crossing->r_next >= path->ray.r_begin + 1.0f || done || is_outside(path, i, j));
+    const Int leaves = crossing->found && !crossing->stays;
+    guess_again(&at->search, crossing->list, crossing->stays);
+    search_again(&at->search, leaves);
+    at->r = SELECT(at->r, crossing->r_next, leaves);
+    at->depth = SELECT(at->depth, crossing->next_depth, leaves);
+    const Int in_u = crossing->r_u <= crossing->r_v;
+    const Int i = at->i + SELECT((Int)(0), path->u.step, leaves && in_u);
+    const Int j = at->j + SELECT((Int)(0), path->v.step, leaves && !in_u);
+    const Int ends =
+        crossing->r_next >= path->ray.r_begin + 1.0f || done || are_outside(path, i, j);
+    at->active = at->active && !(leaves && ends);
     at->new_stack = at->new_stack || ((i ^ at->i) | (j ^ at->j)) >> STACK_SHIFT != 0;
     at->i = i;
     at->j = j;
+}
+
+// Follow the rays that are `active`, of which all go away or come back.
+__attribute__((always_inline)) inline void follow_in_sense(Made *made, const Path *path, Int active,
+                                                           bool away, const Lists *lists,
+                                                           const Grid *grid, const Frame *frame)
+{
+    const Sense sense = sense_of(path->ray.along.z, path->ray.deep.z, away);
+    Cursor at = begin_walk(path, &sense, active);
+    for (int turn = 0; ANY(at.active); ++turn) {
+        // Skip cells of the occupancy grid that no supersegment reaches (section 4)
+        if (SKIP_EMPTY && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
+            skip_empty_cells(&at, at.new_stack && at.active, path, &sense, grid);
+            at.new_stack = 0;
+            if (!ANY(at.active))
+                break;
+        }
+        // Find the first supersegment that ends behind the point of entry (Algorithm 1)
+        Crossing crossing = next_crossing(&at, path, &sense, lists);
+        // Take what the ray crosses of it, also of rays that meet theirs in another turn: it is
+        // close then
+        for (Int meets = crossing.meets; ANY(meets);) {
+            const Int there = at.active && at.search.p < crossing.list.count;
+            const Real4 medium = medium_met(lists, crossing.list, at.search.p, there, away);
+            Real from, to;
+            clip_to_faces(&from, &to, &sense, crossing.face.near, crossing.face.far, at.r,
+                          crossing.r_next, at.depth, crossing.next_depth);
+            take_medium(made, &path->ray, from, to, medium, meets);
+            if (!ONE_LIST)
+                break;
+            crossing.stays = crossing.stays && !are_done(made, frame);
+            meets = next_in_list(&at, &crossing, path, &sense, lists);
+        }
+        // Step on (Amanatides and Woo)
+        step_on(&at, &crossing, path, are_done(made, frame));
+    }
+}
+
+// Follow rays: of several, first those that go away, and then those that come back.
+inline void follow(Made *made, const Path *path, const Lists *lists, const Grid *grid,
+                   const Frame *frame)
+{
+    if (!ANY(path->ray.present))
+        return;
+    prefetch_ends(path, lists, frame->height);
+#if LANES == 1
+    follow_in_sense(made, path, path->ray.present, path->ray.away, lists, grid, frame);
+#else
+    const Int away = path->ray.present && path->ray.away;
+    const Int back = path->ray.present && !path->ray.away;
+    if (ANY(away))
+        follow_in_sense(made, path, away, true, lists, grid, frame);
+    if (ANY(back))
+        follow_in_sense(made, path, back, false, lists, grid, frame);
+#endif
 }

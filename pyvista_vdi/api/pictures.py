@@ -108,7 +108,7 @@ def render(
             for each in given
         ]
         vdi = given if isinstance(vdi, list | tuple) else given[0]
-    else:
+    elif look:
         refuse_unknown(look, "render", _names(render))
     if isinstance(vdi, list | tuple) or model_transforms is not None:
         remedies = {
@@ -174,7 +174,7 @@ def render_depth(
     view = Camera.from_any(camera)
     if look and _keeps_values(vdi):
         vdi = vdi.classified(**look, device=device)  # type: ignore[union-attr]
-    else:
+    elif look:
         refuse_unknown(look, "render_depth", _names(render_depth))
     seen = _seen(vdi, view)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size
@@ -242,7 +242,7 @@ def pick(
     kept = near if isinstance(near, DeferredVDI) else None
     if kept is not None and look:
         near = kept.classified(**look)
-    else:
+    elif look:
         refuse_unknown(look, "pick", _names(pick))
     seen = _seen(near, view)
     size: Any = _picture_size(vdi, seen) if window_size is None else window_size

@@ -29,7 +29,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     That is 0 if all went well, 2 for a mistake in the arguments, 130 after Ctrl-C, and 1 for
     anything else that went wrong.
     """
-    debug = os.environ.get(DEBUG_VARIABLE) == "1"
     try:
         options = parse(sys.argv[1:] if arguments is None else list(arguments))
         if options is None:  # --help and --version have said what there is to say
@@ -38,26 +37,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return int(options.run(options))
     except UsageError as error:
         return _complain(str(error), _MISUSED)
-    except VDIError as error:
-        if debug:
-            raise
-        return _complain(str(error), 1)
-    except MemoryError as error:
-        if debug:
-            raise
-        return _complain(f"not enough memory ({error}): lower --size or --max-supersegments", 1)
-    except KeyboardInterrupt:
-        if debug:
-            raise
-        return _complain("interrupted; nothing was left half done", _INTERRUPTED)
     except BrokenPipeError:
         # Whoever reads our output has seen enough; what Python would flush at exit goes nowhere
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except OSError as error:  # a full disk, or an encoder of films that has ended
-        if debug:
+    except (VDIError, OSError, MemoryError, KeyboardInterrupt) as error:
+        if os.environ.get(DEBUG_VARIABLE) == "1":
             raise
-        return _complain(str(error), 1)
+        if isinstance(error, KeyboardInterrupt):
+            return _complain("interrupted; nothing was left half done", _INTERRUPTED)
+        if isinstance(error, MemoryError):
+            error = f"not enough memory ({error}): lower --size or --max-supersegments"
+        return _complain(str(error), 1)  # of OSError: a full disk, or an encoder that has ended
 
 
 @contextlib.contextmanager

@@ -1,47 +1,62 @@
-"""Declares options to a parser: those that several verbs have, any other, and their types."""
+"""The options of subcommands: what each is called, how its value is read, and what help says.
+
+They are written as help shows them, a line each: name, value and text with two spaces or more
+between them. What the value is called says how it is read; a name may have a default, ``size=8x6``,
+and one that has not been given is ``None``. Options of the public functions need no line: they are
+made of the records that declare them.
+"""
 
 from __future__ import annotations
 
 import argparse
 import math
 import re
+from collections.abc import Callable
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float, memory_limit_bytes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import (
-    QUALITIES,
-    Deferral,
-    GenerationOptions,
-    QualityTarget,
-    declared,
-)
-from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
-#: More than any screen shows.
-MOST_FRAMES_PER_SECOND = 1000
 
-#: Where options go: a verb's parser, or a group of it.
-Options = argparse._ActionsContainer
+def number(
+    what: str, low: float = -math.inf, high: float = math.inf, *, whole: bool = False
+) -> Callable[[str], Any]:
+    """Return what reads a number between two, which neither NaN nor infinity is."""
 
-#: The options of the public functions: defaults, choices and texts are theirs.
-_DECLARED = declared(
-    Classification, Deferral, DrawingOptions, GenerationOptions, QualityTarget, RenderOptions
-)
+    def read(text: str) -> float:
+        try:
+            value = int(text) if whole else float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and low <= value <= high):
+            raise argparse.ArgumentTypeError(f"expected {what}; got {text!r}")
+        return value
 
-#: What the step along a ray is where none is given.
-_HALF = " (default: half the smallest spacing)"
+    return read
 
-VDI_FILE = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
 
-VOLUME_FILE = (
-    "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
-    "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
-)
+NUMBER = number("a number, like 0.5")
+WHOLE = number("a whole number", whole=True)
+COUNT = number("a whole number above 0", 1, whole=True)
+PORT = number("a port's number, up to 65535", 0, 65535, whole=True)
+RATE = number("frames per second, 0 or above", 0)
+#: Of what moves: more than any screen shows is no rate.
+FPS = number("frames per second, above 0 and up to 1000", math.ulp(0.0), 1000)
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """Return numbers from ``0,5,30``."""
+    found = tuple(map(as_float, text.split(",")))
+    if not all(map(math.isfinite, found)):
+        raise argparse.ArgumentTypeError(
+            f"expected numbers with commas between them, like 0,5,30; got {text!r}"
+        )
+    return found
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -55,51 +70,15 @@ def parse_size(text: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def parse_number(text: str) -> float:
-    """Return a number, which neither NaN nor infinity is."""
-    number = as_float(text)
-    if not math.isfinite(number):
-        raise argparse.ArgumentTypeError(f"expected a number, like 0.5; got {text!r}")
-    return number
-
-
-def parse_whole(text: str) -> int:
-    """Return a whole number."""
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a whole number; got {text!r}") from None
-
-
-def parse_numbers(text: str) -> tuple[float, ...]:
-    """Return numbers from ``0,5,30``."""
-    numbers = tuple(as_float(part) for part in text.split(","))
-    if not all(map(math.isfinite, numbers)):
-        raise argparse.ArgumentTypeError(
-            f"expected numbers with commas between them, like 0,5,30; got {text!r}"
-        )
-    return numbers
-
-
-def parse_bytes(text: str) -> int | None:
-    """Return bytes from ``2GiB``, or from a plain number."""
+def _bytes(text: str) -> int | None:
     try:
         return memory_limit_bytes(text)
     except InvalidArgumentError:
-        raise argparse.ArgumentTypeError(
-            f"expected a size such as 2GiB or 800MB; got {text!r}"
-        ) from None
+        message = f"expected a size such as 2GiB or 800MB; got {text!r}"
+        raise argparse.ArgumentTypeError(message) from None
 
 
-def parse_count(text: str) -> int:
-    """Return a whole number above 0."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number above 0; got {text!r}")
-    return int(text)
-
-
-def parse_level(text: str) -> int | str:
-    """Return ``"auto"``, or a level's number."""
+def _level(text: str) -> int | str:
     if text != "auto" and not text.isdecimal():
         raise argparse.ArgumentTypeError(
             f"expected auto, or a level's number from 0, the finest; got {text!r}"
@@ -107,354 +86,220 @@ def parse_level(text: str) -> int | str:
     return text if text == "auto" else int(text)
 
 
-def parse_channel(text: str) -> int | str:
-    """Return a channel's number, or its name."""
+def _number_or_name(text: str) -> int | str:
     return int(text) if text.isdecimal() else text
 
 
-def parse_port(text: str) -> int:
-    """Return a port's number, 0 to 65535."""
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"a port is a number up to 65535; got {text!r}")
-    return int(text)
+def _opacity(text: str) -> str | list[float]:
+    return list(numbers(text)) if re.match(r"[-+.\d]", text) else text
 
 
-def parse_rate(text: str) -> float:
-    """Return frames per second."""
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = -1.0
-    if not 0 <= rate < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected frames per second, 0 or above; got {text!r}")
-    return rate
-
-
-def parse_frames_per_second(text: str) -> float:
-    """Return frames per second of what moves."""
-    rate = parse_rate(text)
-    if not 0 < rate <= MOST_FRAMES_PER_SECOND:
-        raise argparse.ArgumentTypeError(
-            f"expected frames per second, above 0 and up to {MOST_FRAMES_PER_SECOND}; got {text!r}"
-        )
-    return rate
-
-
-def parse_opacity(text: str) -> str | list[float]:
-    """Return the name of a mapping, or opacities from ``0,0.2,1``."""
-    return list(parse_numbers(text)) if re.match(r"[-+.\d]", text) else text
-
-
-def parse_color(text: str) -> tuple[float, ...]:
+def color(text: str) -> tuple[float, ...]:
     """Return RGB, each from 0 to 1, from a name or numbers."""
     if re.match(r"[-+.\d]", text):
-        color = parse_numbers(text)
-        if len(color) != 3 or not all(0 <= c <= 1 for c in color):
+        found = numbers(text)
+        if len(found) != 3 or not all(0 <= c <= 1 for c in found):
             raise argparse.ArgumentTypeError(f"expected R,G,B from 0 to 1; got {text!r}")
-        return color
+        return found
     from PIL import ImageColor
 
     try:
-        red, green, blue = ImageColor.getrgb(text)[:3]
+        return tuple(c / 255 for c in ImageColor.getrgb(text)[:3])
     except ValueError as error:
         raise argparse.ArgumentTypeError(
             f"{text!r} is no colour: give a name, #rrggbb or R,G,B from 0 to 1"
         ) from error
-    return red / 255, green / 255, blue / 255
 
 
-def option(
-    options: Options,
-    name: str,
-    text: str | None,
-    metavar: Any = None,
-    kind: Any = None,
-    **more: Any,
-) -> None:
-    """Add an option that takes a value, or an argument."""
-    options.add_argument(name, help=text, metavar=metavar, type=kind, **more)
+#: What reads a value, by what it is called: a text, where that is not here.
+_READERS: dict[str, Callable[[str], Any]] = {
+    **dict.fromkeys(("X", "X Y Z", "LOW HIGH", "DEGREES", "LENGTH", "S", "T"), NUMBER),
+    "N": WHOLE,
+    "COUNT": COUNT,
+    "RATE": RATE,
+    "FPS": FPS,
+    "PORT": PORT,
+    "WxH": parse_size,
+    "SIZE": _bytes,
+    "A,B,...": numbers,
+    "COLOR": color,
+    "auto|N": _level,
+    "N|NAME": _number_or_name,
+    "NAME|A,B,...": _opacity,
+}
+#: What values are called, by the types of options in the records; of others ``NAME``.
+_CALLED = {
+    "bool": "-",
+    "OcclusionLike": "-",
+    "int": "N",
+    "float": "X",
+    "MemoryLike": "SIZE",
+    "RangeLike": "LOW HIGH",
+    "ArrayLike": "A,B,...",
+    "OpacityLike": "NAME|A,B,...",
+}
+_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral)
+
+_OPTIONS = """
+output              FILE      .vdi, .exr or .html to write
+size                WxH       window size in pixels
+spacing             X Y Z     between voxels, in place of what the file says
+origin              X Y Z     of its first voxel, in the same way
+level               auto|N    of a multi-scale store: 0 is the finest; by default by the view
+channel             N|NAME    of a file that holds several
+series              N|NAME    of a DICOM folder or a TIFF file that holds several
+time_index          N         which step of several
+position            X Y Z     eye, world coordinates
+focal_point         X Y Z     point looked at, world coordinates
+view_up             X Y Z     direction that is up
+view_angle          DEGREES   vertical, full
+parallel_scale      LENGTH    half the viewport's height; makes the projection parallel
+camera_json         FILE      Camera.to_dict() as JSON
+azimuth=0           DEGREES   turn by
+elevation=0         DEGREES   lift by
+tf                  {tf}      a standard transfer function; --cmap and --opacity change its parts
+transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
+occlusion_radius    LENGTH    how far something hides (default: 0.05 of the bounds' diagonal)
+occlusion_strength  S         0 to 1, which is darkest (default: 0.1)
+memory_limit        SIZE      of the device, like 2GiB; what does not fit goes there in bricks
+criterion           NAME      where a list is cut: least-error (default) or homogeneity
+max_bytes           SIZE      most bytes of the VDI on the device, like 20MB
+compression         {lz4,zstd,deflate,none}  of .vdi, by default lz4; .html has deflate
+compression_level   N         1 (fast) to 9 (small)
+time                T         of a series, the step nearest in time (default: the first)
+background          COLOR     a name, #rrggbb or R,G,B from 0 to 1
+scheduler           ADDRESS   of stores: that of Dask, whose workers make the VDIs
+device              NAME      OpenCL device, see pyvista-vdi devices
+json                -         print JSON
+out=.               FOLDER    where the files go
+angles              A,B,...   degrees from the generating view
+no_vtk              -         leave out VTK's mappers
+""".replace("{tf}", f"{{{','.join(TRANSFER_FUNCTIONS)}}}")
+
+#: Options that stand together in help, after their title and what is said of them.
+_GROUPS = {
+    "camera": """[camera] By default {}.
+        position focal_point view_up view_angle parallel_scale camera_json azimuth elevation""",
+    "look": """[classification] Names, defaults and meaning are those of PyVista's add_volume.
+        tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale shade
+        scalars preference interpolation ambient diffuse specular specular_power""",
+    "values": """[classification] Of VDIs that keep values.
+        tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale
+        transfer_function""",
+    "deferral": """[classified afterwards] Values are kept; convert, render and view take the look.
+        classification value_range importance""",
+    "occlusion": """[ambient occlusion] Either option below turns it on, too.
+        ambient_occlusion occlusion_radius occlusion_strength""",
+}
+_GROUPS["table"] = f"{_GROUPS['look']} transfer_function"
+
+_VDI = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
+_VOLUME = (
+    "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
+    "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+)
+_STEPS = "; several are time steps, step_2 before step_10, and so are those of a store or a .pvd"
+#: What is read, by names for it: of which some may be a volume that is known by its name.
+_FILES = {
+    "VDI": _VDI,
+    "VDIS": _VDI,
+    "VOLUME": _VOLUME,
+    "VOLUMES": _VOLUME + _STEPS,
+    "VDI|VOLUME": f"{_VDI}; or a volume: {_VOLUME}",
+    "VDIS|VOLUMES": f"VDIs; or volumes, each {_VOLUME}{_STEPS}",
+}
 
 
-def known(
-    options: Options,
-    name: str,
-    metavar: Any = None,
-    kind: Any = None,
-    more: str = "",
-    *,
-    default: Any = None,
-    **others: Any,
-) -> None:
-    """Add an option of the public functions, of this name, by what is declared of it.
+def add(parser: Any, lines: str) -> None:
+    """Add options that are written as help shows them.
 
-    ``more`` is put behind its text, and so is ``default``, if it is a number; ``...`` is the one
-    that is declared.
+    A line is an option; or the names of some that are known, of files (in capitals) and of groups,
+    which end in a colon, behind which the rest of the line is put into their text; or the title of
+    a group in brackets, to which those belong that follow.
     """
-    told = _DECLARED[name]
-    default = told.default if default is ... else default
-    text = told.what.replace("``", "") + more
-    if isinstance(default, int | float):
-        text += f" (default: {default:g})"
-    flag = f"--{name.replace('_', '-')}"
-    option(options, flag, text, metavar, kind, default=default, **others)
+    into = parser
+    for line in map(str.strip, lines.splitlines()):
+        group, _, said = line.partition(": ")
+        if line.startswith("["):
+            title, _, said = line[1:].partition("]")
+            into = parser.add_argument_group(title, said.strip() or None)
+        elif said and "{}" in _GROUPS.get(group, ""):
+            add(parser, _GROUPS[group].format(said))
+        elif "  " in line:
+            _add_option(into, *re.split(" {2,}", line, maxsplit=2))
+        else:
+            for name in line.split():
+                if name in _FILES:
+                    _add_files(parser, name)
+                elif name.endswith(":"):
+                    add(parser, _GROUPS[name[:-1]])
+                else:
+                    known, value, text = _KNOWN[name.partition("=")[0]]
+                    _add_option(into, name if "=" in name else known, value, text)
 
 
-def switch(options: Options, name: str, text: str | None = None, **more: Any) -> None:
-    """Add an option that takes none."""
-    options.add_argument(name, help=text, action="store_true", **more)
-
-
-def vdi_file(options: Options) -> None:
-    """Add the VDI to read."""
-    option(options, "file", VDI_FILE, "FILE")
-
-
-def output(options: Options, text: str = ".vdi, .exr or .html to write") -> None:
-    """Add the file to write."""
-    options.add_argument("-o", "--output", metavar="FILE", required=True, help=text)
-
-
-def volume(options: Options) -> None:
-    """Add the volume: a file's name, or one that is known; and where its voxels lie."""
-    _file_or_example(options, "file", VOLUME_FILE, "VOLUME")
-
-
-def volumes(options: Options) -> None:
-    """Add volumes, the time steps of one."""
+def _add_files(parser: Any, what: str) -> None:
+    """Add what a subcommand reads, which may be a volume that is known by its name."""
+    several, called = "S" in what, "VOLUME" if what.startswith("VOLUME") else "FILE"
+    how: dict[str, Any] = {"help": _FILES[what], "metavar": called}
+    if "VOLUME" not in what or what == "VDIS|VOLUMES":
+        parser.add_argument(
+            *(["files"] if several else ["file"]), **how, nargs="+" * several or None
+        )
+        return
+    into = parser.add_mutually_exclusive_group(required=True)
+    if several:
+        into.add_argument("files", nargs="*", default=[], **how)
+    else:
+        into.add_argument("file", nargs="?", **how)
     text = (
-        f"{VOLUME_FILE}; several are time steps, step_2 before step_10, and so are those of a "
-        "store or a .pvd"
-    )
-    _file_or_example(options, "files", text, "VOLUME", nargs="*", default=[])
-
-
-def vdi_or_volume(options: Options) -> None:
-    """Add what to show: a VDI or a volume."""
-    _file_or_example(options, "file", f"{VDI_FILE}; or a volume: {VOLUME_FILE}", "FILE")
-
-
-def _file_or_example(
-    options: Options,
-    name: str,
-    text: str,
-    metavar: str,
-    nargs: str = "?",
-    **more: Any,
-) -> None:
-    source = options.add_mutually_exclusive_group(required=True)
-    option(source, name, text, metavar, nargs=nargs, **more)
-    option(
-        source,
-        "--example",
         "a volume known by name: brain, ct and rayleigh_taylor are shipped, others are read from "
-        "the folder that PYVISTA_VDI_DATA names",
-        "NAME",
     )
-    grid(options)
+    text += "the folder that PYVISTA_VDI_DATA names"
+    into.add_argument("--example", help=text, metavar="NAME")
+    add(parser, "spacing origin level channel series time_index")
 
 
-def grid(options: Options) -> None:
-    """Add where a volume's voxels lie, and what is taken of a store of chunks."""
-    xyz = ("X", "Y", "Z")
-    text = "between voxels, in place of what the volume's file says (1 where it says nothing)"
-    option(options, "--spacing", text, xyz, parse_number, nargs=3)
-    option(options, "--origin", "of its first voxel, in the same way", xyz, parse_number, nargs=3)
-    text = "of a multi-scale store: 0 is the finest; auto (default): what the view requires"
-    option(options, "--level", text, "auto|N", parse_level)
-    text = "of a file that holds several (default of a store: 0)"
-    option(options, "--channel", text, "N|NAME", parse_channel)
-    text = "of a DICOM folder or a TIFF file that holds several"
-    option(options, "--series", text, "N|NAME", parse_channel)
-    text = "which step of several (default of a store: 0; of a series or a server all)"
-    option(options, "--time-index", text, "N", parse_whole)
+def _add_option(into: Any, name: str, value: str, text: str) -> None:
+    """Add an option; a value in brackets need not be given, one with ``+`` may be repeated."""
+    name, _, default = name.partition("=")
+    how: dict[str, Any] = {"help": f"{text} (default: {default})" if default else text}
+    names, read = value.split(), _READERS.get(value, str)
+    if value == "-":
+        how |= {"action": "store_true", "default": None}
+    elif value.startswith("{"):
+        how |= {"choices": value[1:-1].split(","), "default": default or None}
+    elif value.startswith("["):
+        how |= {"nargs": "?", "const": default, "metavar": value[1:-1]}
+    elif value.endswith((" ...", " +")):
+        how |= {"metavar": names[0]}
+        how |= {"nargs": "+"} if names[1] == "..." else {"action": "append"}
+    else:
+        how |= {"type": read, "metavar": tuple(names) if names[1:] else value}
+        how |= {"nargs": len(names)} if names[1:] else {}
+        how |= {"default": read(default)} if default else {}
+    if name == "output":
+        how["required"] = True
+    flags = [f"--{each.replace('_', '-')}" for each in name.split("|")]
+    into.add_argument(*(["-o"] if name == "output" else []), *flags, **how)
 
 
-def array(options: Options) -> None:
-    """Add which array of the volume is meant."""
-    known(options, "scalars", "NAME")
-    known(options, "preference", choices=_DECLARED["preference"].choices)
+def _known() -> dict[str, tuple[str, str, str]]:
+    """Return the options that are known by their names: name and default, value, and text."""
+    found = {}
+    for name, told in declared(*_RECORDS, GenerationOptions, QualityTarget).items():
+        value = _CALLED.get(told.kind.removesuffix(" | None"), "NAME")
+        value = "DEGREES" if "degrees" in told.what else value
+        value = "{" + ",".join(told.choices) + "}" if told.choices else value
+        text, usual = told.what.replace("``", ""), told.default
+        plain = isinstance(usual, int | float) and not isinstance(usual, bool)
+        text += f" (default: {usual:g})" if plain else ""
+        text += f" (default: {usual})" if told.choices and usual else ""
+        found[name] = name, value, text
+    for line in _OPTIONS.strip().splitlines():
+        name, value, text = re.split(" {2,}", line, maxsplit=2)
+        found[name.partition("=")[0]] = name, value, text
+    return found
 
 
-def size(options: Options, default: tuple[int, int] | None) -> None:
-    """Add the window's size, pixels; the VDI's own without a default."""
-    shown = "the VDI's" if default is None else f"{default[0]}x{default[1]}"
-    text = f"window size in pixels (default: {shown})"
-    option(options, "--size", text, "WxH", parse_size, default=default)
-
-
-def time(options: Options) -> None:
-    """Add which step of a series to show."""
-    text = "of a series, the step nearest in time (default: the first)"
-    option(options, "--time", text, "T", parse_number)
-
-
-def angles(options: Options, text: str, default: tuple[float, ...] | None = None) -> None:
-    """Add the new views."""
-    option(options, "--angles", text, "A,B,...", parse_numbers, default=default)
-
-
-def repeats(
-    options: Options, text: str, default: int | None = None, metavar: str | None = "N"
-) -> None:
-    """Add how often frames are timed."""
-    option(options, "--repeats", text, metavar, parse_count, default=default)
-
-
-def no_vtk(options: Options) -> None:
-    """Add the way to do without VTK."""
-    switch(options, "--no-vtk", "leave out VTK's mappers")
-
-
-def camera(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add the view; ``default`` says in words what it is without these options."""
-    group = parser.add_argument_group("camera", f"By default {default}.")
-    for name, text in (
-        ("--position", "eye, world coordinates"),
-        ("--focal-point", "point looked at, world coordinates"),
-        ("--view-up", "direction that is up"),
-    ):
-        option(group, name, text, ("X", "Y", "Z"), parse_number, nargs=3)
-    option(group, "--view-angle", "vertical, full", "DEGREES", parse_number)
-    parallel = "half the viewport's height in world units; makes the projection parallel"
-    option(group, "--parallel-scale", parallel, "LENGTH", parse_number)
-    option(group, "--camera-json", "Camera.to_dict() as JSON", "FILE")
-    option(group, "--azimuth", "turn by", "DEGREES", parse_number, default=0.0)
-    option(group, "--elevation", "lift by", "DEGREES", parse_number, default=0.0)
-
-
-def classification(parser: argparse.ArgumentParser, *, tables: bool = True) -> None:
-    """Add how the volume looks; ``tables``: also its transfer function as a file."""
-    group = parser.add_argument_group(
-        "classification", "Names, defaults and meaning are those of PyVista's add_volume."
-    )
-    _look(group)
-    switch(group, "--shade", _DECLARED["shade"].what, default=None)
-    array(group)
-    known(group, "interpolation", choices=_DECLARED["interpolation"].choices)
-    for name in ("ambient", "diffuse", "specular", "specular_power"):
-        known(group, name, "X", parse_number)
-    if tables:
-        _table(group)
-
-
-def look_of_values(parser: argparse.ArgumentParser) -> None:
-    """Add how values look that were kept to be classified afterwards."""
-    group = parser.add_argument_group("classification", "Of VDIs that keep values.")
-    _look(group)
-    _table(group)
-
-
-def _look(group: Options) -> None:
-    standard = "a standard transfer function; --cmap and --opacity change parts of it"
-    option(group, "--tf", standard, choices=tuple(TRANSFER_FUNCTIONS))
-    known(group, "cmap", "NAME")
-    known(group, "opacity", "NAME|A,B,...", parse_opacity, ", 0 to 1")
-    known(group, "clim", ("LOW", "HIGH"), parse_number, nargs=2)
-    known(group, "n_colors", "N", parse_whole)
-    known(group, "opacity_unit_distance", "LENGTH", parse_number)
-    for name in ("flip_scalars", "log_scale"):
-        switch(group, f"--{name.replace('_', '-')}", _DECLARED[name].what, default=None)
-
-
-def _table(group: Options) -> None:
-    text = "TransferFunction.to_dict() as JSON, in place of the others; needs no PyVista"
-    option(group, "--transfer-function", text, "FILE")
-
-
-def deferral(parser: argparse.ArgumentParser) -> None:
-    """Add what is kept of the scalars, where they are classified afterwards."""
-    group = parser.add_argument_group(
-        "classified afterwards", "Values are kept: convert, render and view then take the look."
-    )
-    known(group, "classification", choices=_DECLARED["classification"].choices)
-    known(group, "value_range", ("LOW", "HIGH"), parse_number, nargs=2)
-    known(group, "importance", "A,B,...", parse_numbers)
-
-
-def occlusion(parser: argparse.ArgumentParser) -> None:
-    """Add ambient occlusion."""
-    group = parser.add_argument_group("ambient occlusion", "Either option below turns it on, too.")
-    switch(group, "--ambient-occlusion", "darken what is hidden from the light around it")
-    radius = "how far something hides, model units (default: 0.05 of the bounds' diagonal)"
-    option(group, "--occlusion-radius", radius, "LENGTH", parse_number)
-    strength = "0 to 1 (default: 0.1; 1 is darkest)"
-    option(group, "--occlusion-strength", strength, "S", parse_number)
-
-
-def longest(options: Options, default: Any = ...) -> None:
-    """Add how long lists may be."""
-    known(options, "max_supersegments", "N", parse_whole, default=default)
-
-
-def step(options: Options) -> None:
-    """Add how finely the volume is sampled."""
-    known(options, "sample_distance", "LENGTH", parse_number, _HALF)
-
-
-def limits(parser: argparse.ArgumentParser) -> None:
-    """Add how much a VDI may hold, and how finely the volume is sampled."""
-    group = parser.add_argument_group("limits")
-    longest(group)
-    names = ": {} (default) or {}".format(*_DECLARED["criterion"].choices)
-    known(group, "criterion", "NAME", more=names, default=...)
-    step(group)
-    known(group, "tolerance", kind=parse_number, default=...)
-    known(group, "view_cone", "DEGREES", parse_number, default=...)
-    memory_limit(group)
-
-
-def memory_limit(options: Options) -> None:
-    """Add how much memory of the device is taken."""
-    more = (
-        ", like 2GiB; a volume that does not fit goes there brick by brick (default: what the "
-        "device has)"
-    )
-    known(options, "memory_limit", "SIZE", parse_bytes, more)
-
-
-def target(parser: argparse.ArgumentParser) -> None:
-    """Add goals, from which the limits are chosen."""
-    group = parser.add_argument_group(
-        "quality",
-        "Choose lists, their length and precision from a short measurement on this device; --size "
-        "is then that of the pictures. Not with --max-supersegments, --tolerance or --precision.",
-    )
-    goals = [f"{ssim:g} ({name})" for name, ssim in QUALITIES.items() if ssim is not None]
-    named = f": an SSIM of {', '.join(goals)} against volume rendering; reference asks for nothing"
-    known(group, "quality", more=named, choices=tuple(QUALITIES))
-    known(group, "target_ssim", "S", parse_number)
-    known(group, "full_fps", "RATE", parse_number)
-    known(group, "max_bytes", "SIZE", parse_bytes, ", like 20MB")
-    known(group, "target_angle", "DEGREES", parse_number, default=...)
-
-
-def file_format(parser: argparse.ArgumentParser) -> None:
-    """Add how a VDI is written."""
-    group = parser.add_argument_group("file")
-    option(
-        group,
-        "--compression",
-        "of .vdi: lz4 (default), zstd, deflate (for pages) or none; of .html: deflate",
-        choices=("lz4", "zstd", "deflate", "none"),
-    )
-    level = "1 (fast) to 9 (small); by default 9 for lz4, 6 for deflate, 1 for others"
-    option(group, "--compression-level", level, "N", parse_whole)
-    option(
-        group,
-        "--precision",
-        "of .vdi: exact (24 bytes per supersegment before they are compressed; default of "
-        "generate) or 8-byte; convert keeps what the file has; of .html: 8-byte by "
-        "default",
-        choices=PRECISIONS,
-    )
-
-
-def scheduler(options: Options) -> None:
-    """Add the cluster."""
-    text = "of stores: VDIs are made by the workers of the Dask cluster with this scheduler"
-    option(options, "--scheduler", text, "ADDRESS")
-
-
-def device(options: Options) -> None:
-    """Add the OpenCL device."""
-    option(options, "--device", "OpenCL device, see pyvista-vdi devices", "NAME")
+_KNOWN = _known()

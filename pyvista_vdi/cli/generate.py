@@ -1,4 +1,4 @@
-"""The verb ``generate``: a volume becomes a file that holds a VDI."""
+"""The subcommand ``generate``: a volume becomes a file that holds a VDI."""
 
 from __future__ import annotations
 
@@ -8,25 +8,23 @@ import time
 
 from pyvista_vdi.api import generate as generate_vdi
 from pyvista_vdi.cli.inputs import (
-    ambient_occlusion,
+    PLACE,
     camera,
     classification,
     file_options,
-    has_own_place,
-    kept_values,
+    given,
     measuring,
     read_volume,
+    refuse_with_values,
     say_vdi,
-    settings,
 )
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
-from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import Deferral, QualityTarget, declared
+from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import describe
@@ -34,63 +32,43 @@ from pyvista_vdi.quality.targets import describe
 
 def generate(options: argparse.Namespace) -> int:
     """Generate a VDI and write it."""
-    path = checked_target(options.output)
-    file_arguments = file_options(options)
-    precision = file_arguments.pop("precision", "exact")
-    asked = {name: getattr(options, name) for name in declared(QualityTarget)}
-    target = QualityTarget(**asked)  # refused before the volume is read, too
-    arguments = classification(options)
-    looks = Classification.composited(arguments, "generate")  # refused before the volume is read
-    kept = kept_values(options)
-    deferred = Deferral(**kept).deferred
-    occlusion = ambient_occlusion(options)
+    # Refuse what cannot be before the volume is read
+    path, file_arguments = checked_target(options.output), file_options(options)
+    target, look = (
+        QualityTarget(**given(options, QualityTarget, flat=True)),
+        classification(options),
+    )
+    looks = Classification.composited(look, "generate")
+    refuse_with_values(options)
+    how = given(options, GenerationOptions, QualityTarget, Deferral)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
     volume = as_seen(options, volume, view)
+    # Say what is going to be made, and how much memory that may take
     if isinstance(volume, StoredVolume):
         print(volume.describe(), file=sys.stderr)
-    nx, ny, nz = volume.dimensions
-    width, height = options.size
-    if volume.chunked:
-        needed = f"{width} x {height} lists: block by block"
-    elif target:
+    (nx, ny, nz), (width, height) = volume.dimensions, options.size
+    needed = f"{width} x {height} lists: block by block"
+    if target and not volume.chunked:
         needed = f"pictures of {width} x {height}: settings are chosen by a measurement"
-    else:
-        most = estimate(
-            volume,
-            options.size,
-            max_supersegments=options.max_supersegments,
-            criterion=options.criterion,
-            ambient_occlusion=occlusion,
-            memory_limit=options.memory_limit,
-            transfer_function=None if deferred else looks.transfer_function_of(volume),
-            device=options.device,
-        )
-        needed = f"{width} x {height} lists: up to {most.total / 2**20:.0f} MiB"
+    elif not volume.chunked:
+        deferred = options.classification == "deferred"
+        table = None if deferred else looks.transfer_function_of(volume)
+        flat = given(options, GenerationOptions, flat=True)
+        flat |= {"transfer_function": table, "device": options.device}
+        most = estimate(volume, options.size, **flat).total / 2**20
+        needed = f"{width} x {height} lists: up to {most:.0f} MiB"
     print(f"{nx} x {ny} x {nz} points, {needed}", file=sys.stderr)
     start = time.perf_counter()
+    how |= {"client": options.scheduler, "device": options.device, **look}
     with measuring("generating a VDI") as bar:
-        vdi = generate_vdi(
-            volume,
-            view,
-            options.size,
-            max_supersegments=options.max_supersegments,
-            precision=precision,
-            **{name: value for name, value in asked.items() if name not in Settings.declared},
-            **kept,
-            ambient_occlusion=occlusion,
-            settings=settings(options),
-            client=options.scheduler,
-            device=options.device,
-            progress=bar,
-            **arguments,
-        )
+        vdi = generate_vdi(volume, view, options.size, progress=bar, **how)
     seconds = time.perf_counter() - start
+    file_arguments.pop("precision", None)  # which it has
     with measuring("writing it") as bar:
         vdi.save(path, progress=bar, **file_arguments)
     say_vdi(options, vdi, f", {seconds:.1f} s")
-    chosen = describe(vdi.metadata)
-    if chosen is not None:
+    if (chosen := describe(vdi.metadata)) is not None:
         print(chosen)
     return 0
 
@@ -106,7 +84,7 @@ def as_seen(options: argparse.Namespace, volume: Volume, view: Camera) -> Volume
 
 def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:
     """Return V_O: the options' own view, or the one that the volume fills, turned as asked."""
-    if has_own_place(options):
+    if any(getattr(options, name) is not None for name in PLACE):
         return camera(options, filling_camera(volume.bounds, options.size))
     if not abs(ELEVATION + options.elevation) < 90:
         raise InvalidArgumentError(

@@ -1,4 +1,4 @@
-"""What verbs share: volumes, cameras and looks that they read, files and bars that they show."""
+"""What subcommands share: volumes, cameras and looks that they read, files, bars."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ import argparse
 import json
 import logging
 import os
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from importlib.util import find_spec
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any, TypeVar
@@ -20,44 +18,85 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileEr
 from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, stores, volumes
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import StoredVolume, is_store
-from pyvista_vdi.io.volumes import list_volumes
 from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import Deferral, declared
+from pyvista_vdi.model.options import QualityTarget, declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.progress import DelayedBar
-from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
 _T = TypeVar("_T")
 
 #: Seconds between two looks of a bar at the clock.
 _PULSE = 0.5
-
-#: Options that are arguments of the same name, given only if the user gave them.
-CLASSIFICATION = tuple(declared(Look))
-
-#: Options that say how a volume's file is read.
-_OF_A_VOLUME = ("scalars", "preference", "spacing", "origin")
-
 #: Options that say what is taken of a file or a store that holds several volumes.
-OF_A_STORE = ("level", "channel", "time_index", "series")
-
-#: Options that say what is read, and how a volume looks.
-OF_NO_LOOK = (*_OF_A_VOLUME, *OF_A_STORE)
-OF_ANY_VOLUME = (*OF_NO_LOOK, "tf", "transfer_function", *CLASSIFICATION)
-
+OF_SEVERAL = ("level", "channel", "time_index", "series")
+#: Options that say how a volume's file is read.
+OF_VOLUMES = ("scalars", "preference", "spacing", "origin", *OF_SEVERAL)
+#: Options that give colours and opacities.
+LOOK = ("tf", "transfer_function", *declared(Look))
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
+_SHADING = ("shade", "ambient", "diffuse", "specular", "specular_power")
+_OCCLUSION = ("ambient_occlusion", "occlusion_radius", "occlusion_strength")
+
+
+def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dict[str, Any]:
+    """Return the options of some records that were given, as arguments of public functions.
+
+    What is seldom turned is in ``settings``, or ``flat`` beside the others.
+    """
+    values = {name: getattr(options, name, None) for name in declared(*records)}
+    found = {name: value for name, value in values.items() if value is not None}
+    of = {n: getattr(options, f"occlusion_{n}", None) for n in ("radius", "strength")}
+    of = {name: value for name, value in of.items() if value is not None}
+    if "ambient_occlusion" in values and (of or "ambient_occlusion" in found):
+        found["ambient_occlusion"] = AmbientOcclusion(**of)
+    seldom = {name: found.pop(name) for name in Settings.declared if name in found and not flat}
+    return found | ({"settings": Settings(**seldom)} if seldom else {})
+
+
+def classification(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments that say how the volume looks; which array it is, the volume says."""
+    found = {**(TRANSFER_FUNCTIONS[options.tf] if options.tf else {}), **given(options, Look)}
+    path = getattr(options, "transfer_function", None)
+    if path is not None:
+        function = from_json(path, TransferFunction.from_dict, "transfer function")
+        found["transfer_function"] = function
+    return found
+
+
+def refuse_with_values(options: argparse.Namespace) -> None:
+    """Refuse, before a volume is read, what does not go with when scalars are classified."""
+    if options.classification != "deferred":
+        refuse(options, ("value_range", "importance"), "--classification deferred")
+        return
+    why = "--classification deferred keeps values, which have no colours yet: "
+    found = format_named(options.output)
+    if found is not None and not found.values and found.holds == "VDI":
+        raise InvalidArgumentError(f"{why}write a .vdi file in place of {found.suffix}")
+    names = (*_SHADING, *_OCCLUSION, *declared(QualityTarget))
+    refuse(options, names, "VDIs that have colours", why)
+    looks = [name for name in LOOK if name != "interpolation"]
+    refuse(options, looks, "'pyvista-vdi render', view or convert of what is written", why)
+
+
+def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:
+    """Refuse options that were given and would mean nothing: they are for something else."""
+    for name in names:
+        value = getattr(options, name, None)
+        if value is not None and value is not False:
+            values = value if isinstance(value, list | tuple) else [value] * (value is not True)
+            shown = [v if isinstance(v, str) else plain_number(v) for v in values]
+            option = " ".join([f"--{name.replace('_', '-')}", *shown])
+            raise UnsupportedError(f"{why}{option} is for {what}: leave it out")
 
 
 def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volume:
@@ -66,34 +105,30 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
     A store is read whole, unless ``in_chunks``.
     """
     if options.example is not None:
-        refuse(options, OF_A_STORE, "files that hold several volumes, and this is none")
+        refuse(options, OF_SEVERAL, "files that hold several volumes, and this is none")
         from pyvista_vdi import examples
 
         return laid_out(examples.load_data(options.example, as_volume=True), options)
     if is_store(options.file):
-        volume: Any = open_store(options)
+        volume: Volume = open_store(options)
         if len(volume.store.levels) > 1 and options.level in (None, "auto"):
             # Of another level they are others
             refuse(options, ("spacing", "origin"), "one level of a store, which --level chooses")
-        return laid_out(volume if in_chunks else _loaded(volume), options)
-    array = options.scalars
-    if array is not None and options.preference == "cell":
-        of_cells = f"cell:{array}"  # where points have one of that name, too
-        names = {each.name for each in list_volumes(options.file)}
-        array = of_cells if of_cells in names else array
-    volume = volumes.read_volume(
-        options.file,
-        array=array,
-        series=getattr(options, "series", None),
-        channel=options.channel,
-        time=options.time_index,
-        level=options.level,
-        spacing=options.spacing,
-        origin=options.origin,
-    )
+        volume = laid_out(volume, options)
+    else:
+        array = options.scalars
+        if array is not None and options.preference == "cell":
+            of_cells = f"cell:{array}"  # where points have one of that name, too
+            names = {each.name for each in volumes.list_volumes(options.file)}
+            array = of_cells if of_cells in names else array
+        names = {"series", "channel", "level", "spacing", "origin"}
+        chosen = {name: getattr(options, name) for name in names}
+        volume = volumes.read_volume(options.file, array=array, time=options.time_index, **chosen)
     if volume.chunked and not in_chunks:
-        volume = _loaded(volume)
-    return volume  # type: ignore[no-any-return]
+        remedy = "take a coarser level by --level, or make a VDI of it (pyvista-vdi generate)"
+        require_free_memory(volume.array.nbytes, f"the volume in {options.file}", remedy)
+        volume = volume.load()
+    return volume
 
 
 def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
@@ -116,24 +151,9 @@ def quietly() -> Iterator[None]:
 
 def open_store(options: argparse.Namespace) -> StoredVolume:
     """Open the store that is named, with what is asked of it."""
-    return stores.open_store(
-        options.file,
-        level="auto" if options.level is None else options.level,
-        channel=0 if options.channel is None else options.channel,
-        time=0 if options.time_index is None else options.time_index,
-    )
-
-
-def _loaded(volume: Volume) -> Volume:
-    remedy = "take a coarser level by --level, or make a VDI of it (pyvista-vdi generate)"
-    path = volume.store.path if isinstance(volume, StoredVolume) else volume.name
-    require_free_memory(volume.array.nbytes, f"the volume in {path}", remedy)
-    return volume.load()
-
-
-def is_series(options: argparse.Namespace) -> bool:
-    """Whether FILE names a series of VDIs."""
-    return options.file is not None and holds(options.file) == "series"
+    asked = {"level": options.level, "channel": options.channel, "time": options.time_index}
+    chosen: Any = {name: value for name, value in asked.items() if value is not None}
+    return stores.open_store(options.file, **chosen)
 
 
 def is_volume(options: argparse.Namespace) -> bool:
@@ -142,8 +162,7 @@ def is_volume(options: argparse.Namespace) -> bool:
         return True
     if not is_vdi_file(options.file) and holds(options.file) in (None, "VDI"):
         return True
-    is_vdi = f"{printable(options.file)} is a VDI: "
-    refuse(options, (*_OF_A_VOLUME, *OF_A_STORE), "volumes", is_vdi)
+    refuse(options, OF_VOLUMES, "volumes", f"{printable(options.file)} is a VDI: ")
     return False
 
 
@@ -159,110 +178,9 @@ def require_vdi(file: str, verb: str) -> None:
         )
 
 
-def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:
-    """Refuse options that were given and would mean nothing: they are for something else."""
-    for name in names:
-        value = getattr(options, name, None)
-        if value is not None and value is not False:
-            raise UnsupportedError(f"{why}{as_option(name)} is for {what}: leave it out")
-
-
 def volume_name(options: argparse.Namespace) -> str:
     """Return a short name of the volume, for files and reports."""
-    if options.example is not None:
-        return str(options.example)
-    return Path(options.file).resolve().name.split(".")[0]
-
-
-def classification(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that say how the volume looks; which array it is, the volume says."""
-    given = dict(TRANSFER_FUNCTIONS[options.tf]) if options.tf else {}
-    for name in CLASSIFICATION:
-        if getattr(options, name, None) is not None:
-            given[name] = getattr(options, name)
-    path = getattr(options, "transfer_function", None)
-    if path is not None:
-        given["transfer_function"] = from_json(
-            path, TransferFunction.from_dict, "transfer function"
-        )
-    return given
-
-
-def settings(options: argparse.Namespace) -> Settings:
-    """Return what is seldom turned, as far as there are options of it."""
-    given = {name: getattr(options, name, None) for name in Settings.declared}
-    return Settings(**{name: value for name, value in given.items() if value is not None})
-
-
-def kept_values(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that say what is kept where scalars are classified afterwards.
-
-    What goes with none of that is refused, by the options' names.
-    """
-    given = {name: getattr(options, name) for name in declared(Deferral)}
-    kept = {name: value for name, value in given.items() if value is not None}
-    if kept.get("classification") == "deferred":
-        _refuse_with_values(options)
-    else:
-        for name in [name for name in kept if name != "classification"]:
-            separator = " " if name == "value_range" else ","
-            values = separator.join(map(plain_number, kept[name]))
-            raise InvalidArgumentError(
-                f"{as_option(name)} {values} says what is kept to be classified afterwards: give "
-                f"--classification deferred as well, or leave {as_option(name)} out"
-            )
-    return {name: value for name, value in kept.items() if name not in Settings.declared}
-
-
-def _refuse_with_values(options: argparse.Namespace) -> None:
-    """Refuse what VDIs that keep values cannot have, before a volume is read."""
-
-    def given(*names: str) -> str:
-        values = {name: getattr(options, name, None) for name in names}
-        return ", ".join(as_option(n) for n, value in values.items() if value not in (None, False))
-
-    found = format_named(options.output)
-    if found is not None and not found.values and found.holds == "VDI":
-        raise InvalidArgumentError(
-            f"--classification deferred keeps values, and {found.suffix} files hold colours: write "
-            "a .vdi file, of which 'pyvista-vdi convert' with --cmap makes one, or leave "
-            "--classification out"
-        )
-    if given("shade"):
-        raise UnsupportedError(
-            "--shade needs the volume's gradients, which --classification deferred does not keep: "
-            "leave out one of them"
-        )
-    look = given("tf", "transfer_function", *(n for n in CLASSIFICATION if n != "interpolation"))
-    if look:
-        raise InvalidArgumentError(
-            f"--classification deferred keeps values, whatever their look: give {look} to "
-            "'pyvista-vdi render', view or convert of what is written"
-        )
-    occlusion = given("ambient_occlusion", "occlusion_radius", "occlusion_strength")
-    if occlusion:
-        raise UnsupportedError(
-            f"{occlusion}: ambient occlusion follows from opacities, which --classification "
-            "deferred does not keep: leave it out"
-        )
-    if target := given("quality", "target_ssim", "full_fps", "max_bytes"):
-        raise UnsupportedError(
-            f"{target}: settings are chosen by a look, which --classification deferred does not "
-            "have: give --max-supersegments"
-        )
-
-
-def as_option(name: str) -> str:
-    """Return an argument's name as the command line has it."""
-    return f"--{name.replace('_', '-')}"
-
-
-def has_vtk(options: argparse.Namespace) -> bool:
-    """Whether VTK's mappers take part; says so where they cannot."""
-    if not options.no_vtk and find_spec(BACKEND) is None:
-        print("VTK is not installed: its mappers are left out", file=sys.stderr)
-        return False
-    return not options.no_vtk
+    return options.example or Path(options.file).resolve().name.split(".")[0]
 
 
 @contextmanager
@@ -297,9 +215,8 @@ def measuring(label: str) -> Iterator[DelayedBar]:
         while not finished.wait(_PULSE):
             bar.pulse()
 
-    pulsing = Thread(target=pulse, daemon=True)
+    Thread(target=pulse, daemon=True).start()
     try:
-        pulsing.start()
         yield bar
     finally:
         finished.set()
@@ -317,70 +234,40 @@ def say_written(files: Iterable[Path]) -> None:
     print("Written: " + ", ".join(printable(path) for path in files))
 
 
-def ambient_occlusion(options: argparse.Namespace) -> AmbientOcclusion | None:
-    """Return the ambient occlusion that the options ask for, if any."""
-    values = {n: getattr(options, f"occlusion_{n}") for n in ("radius", "strength")}
-    given = {n: value for n, value in values.items() if value is not None}
-    return AmbientOcclusion(**given) if options.ambient_occlusion or given else None
-
-
 def camera(options: argparse.Namespace, default: Camera) -> Camera:
     """Return the view that the camera options make of a default."""
-    view = given_camera(options) or default
+    view = default
+    if options.camera_json is not None:
+        view = from_json(options.camera_json, Camera.from_dict, "camera")
     names = ("position", "focal_point", "view_up", "view_angle")
     changes = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
     if options.parallel_scale is not None:
         changes |= {"parallel_scale": options.parallel_scale, "parallel_projection": True}
     elif options.view_angle is not None:
         changes["parallel_projection"] = False
-    if changes:
-        view = view.replace(**changes)
-    if options.azimuth:
-        view = view.azimuth(options.azimuth)
+    view = view.replace(**changes) if changes else view
+    view = view.azimuth(options.azimuth) if options.azimuth else view
     return view.elevation(options.elevation) if options.elevation else view
 
 
-def given_camera(options: argparse.Namespace) -> Camera | None:
-    """Return the view in the file that ``--camera-json`` names, if it was given."""
-    if options.camera_json is None:
-        return None
-    return from_json(options.camera_json, Camera.from_dict, "camera")
-
-
-#: Options that a file's writer takes as arguments; ``--level`` is that of a volume's store.
-_FILE_ARGUMENTS = {
-    "compression": "compression",
-    "compression_level": "level",
-    "precision": "precision",
-}
-
-
-def of_the_file(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments of a file that were given."""
-    given = {argument: getattr(options, name, None) for name, argument in _FILE_ARGUMENTS.items()}
-    return {argument: value for argument, value in given.items() if value is not None}
-
-
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments of ``VDI.save`` that the options stand for; refused now, not later."""
-    given, written = of_the_file(options), format_named(options.output)
-    for name, argument in _FILE_ARGUMENTS.items():
+    """Return the arguments of ``save`` that the options stand for; refused now, not later."""
+    names = {"compression": "compression", "compression_level": "level", "precision": "precision"}
+    written = format_named(options.output)
+    for name, argument in names.items():
         of = [each.suffix for each in registry.formats() if argument in each.write_options]
-        if of and written is not None and argument not in written.write_options:
+        if of and written and written.holds == "VDI" and argument not in written.write_options:
             refuse(options, (name,), f"{' and '.join(of)}, not {printable(options.output)}")
-    check_write_options(options.output, given)
-    return given
+    found = {argument: getattr(options, name, None) for name, argument in names.items()}
+    found = {argument: value for argument, value in found.items() if value is not None}
+    if written and written.holds == "VDI":
+        check_write_options(options.output, found)
+    return found
 
 
 def keeps_values(found: Any) -> bool:
     """Whether what was read keeps values, so that a look can be given."""
     return getattr(found, "value_range", None) is not None
-
-
-def with_look(options: argparse.Namespace, found: Any, file: str, *, colors: bool = True) -> Any:
-    """Return what was read, classified as the options ask where it keeps values."""
-    look = look_for(options, found, file, colors=colors)
-    return found.classified(**look) if look else found
 
 
 def look_for(
@@ -390,26 +277,20 @@ def look_for(
 
     Where it does not, a look is refused, and where ``colors`` are needed the lack of one.
     """
-    if keeps_values(found):
-        look = classification(options)
-        if colors and not look:
-            raise UnsupportedError(
-                f"{printable(file)} keeps values, which have no colours yet: give --cmap, "
-                "--opacity, --tf or --transfer-function"
-            )
-        return look
-    for name in ("tf", "transfer_function", *CLASSIFICATION):
-        value = getattr(options, name, None)
-        if value is not None:
-            text = " ".join(map(str, value)) if isinstance(value, list | tuple) else value
-            raise UnsupportedError(
-                f"{printable(file)} has its look, and {as_option(name)} {text} is for "
-                "VDIs that keep values: leave it out"
-            )
-    return {}
+    named = printable(file)
+    if not keeps_values(found):
+        refuse(options, LOOK, "VDIs that keep values", f"{named} has its look, and ")
+        return {}
+    look = classification(options)
+    if colors and not look:
+        raise UnsupportedError(
+            f"{named} keeps values, which have no colours yet: give --cmap, --opacity, --tf or "
+            "--transfer-function"
+        )
+    return look
 
 
-def say_vdi(options: argparse.Namespace, vdi: VDI | DeferredVDI, more: str = "") -> None:
+def say_vdi(options: argparse.Namespace, vdi: Any, more: str = "") -> None:
     """Print what was written to ``--output``."""
     width, height = vdi.window_size
     print(
@@ -418,16 +299,10 @@ def say_vdi(options: argparse.Namespace, vdi: VDI | DeferredVDI, more: str = "")
     )
 
 
-def has_own_place(options: argparse.Namespace) -> bool:
-    """Whether the options say where the eye is, instead of turning the default view."""
-    return any(getattr(options, name) is not None for name in PLACE)
-
-
 def from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _T:
     """Return what a file of JSON describes; ``kind`` says what that is."""
     try:
-        state = json.loads(Path(path).read_text(encoding="utf-8"))
-        return build(state)
+        return build(json.loads(Path(path).read_text(encoding="utf-8")))
     except OSError as error:
         raise InvalidArgumentError(
             f"the {kind} {path} cannot be read: {error.strerror or error}; check the file's name"

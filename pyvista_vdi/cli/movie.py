@@ -1,4 +1,4 @@
-"""The verbs that write moving pictures: ``turntable`` and ``movie``."""
+"""The subcommands that write moving pictures: ``turntable`` and ``movie``."""
 
 from __future__ import annotations
 
@@ -69,8 +69,9 @@ def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], li
     steps, how = None, {"device": options.device}
     draw: Any = render_volume if inputs.is_volume(options) else render
     if draw is render:
-        inputs.refuse(options, inputs.OF_NO_LOOK, "volumes", "this is a VDI: ")
-        shown = inputs.with_look(options, read(options.file), options.file)
+        shown = read(options.file)
+        if look := inputs.look_for(options, shown, options.file):
+            shown = shown.classified(**look)
         steps = None if getattr(shown, "times", None) is None else len(shown)
         first, size = picture_view(shown if steps is None else shown[0])
     else:

@@ -10,12 +10,12 @@ from typing import Any, NoReturn
 
 from pyvista_vdi import registry
 from pyvista_vdi._version import __version__
+from pyvista_vdi.cli.declare import add
 from pyvista_vdi.cli.verbs import VERBS
 
 _DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
 
-
-#: What the command says without a verb.
+#: What the command says without a subcommand.
 _LESSON = f"""{_DESCRIPTION} Version {__version__}.
 
 A first session, with a volume that is shipped:
@@ -30,15 +30,14 @@ With your own, a file or a folder of DICOM slices:
 
   pyvista-vdi generate scans/head -o head.vdi --cmap ct-bone
 
-pyvista-vdi --help lists all verbs, pyvista-vdi generate --help explains one, and
+pyvista-vdi --help lists all subcommands, pyvista-vdi generate --help explains one, and
 pyvista-vdi devices says on what it runs.
 """
 
 #: So many names are listed where none of them is meant; more are left to ``--help``.
 _LISTED = 16
 
-
-#: Verbs that went, and what does their work.
+#: Subcommands that went, and what does their work.
 _GONE = {
     "benchmark": "the paper's tables are measured by a script of a checkout, benchmarks/paper.py"
 }
@@ -64,54 +63,64 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
 
     Raises UsageError, which suggests what may have been meant.
     """
-    parser, verbs = _make_parser(arguments[0] if arguments else "")
-    if not arguments:
+    added = registry.verbs()
+    known = {name: (verb.summary, verb.example) for name, verb in {**VERBS, **added}.items()}
+    name, *rest = arguments or [""]
+    if not name:
         print(_LESSON, end="")
-        return None
-    if arguments[0] in _GONE:
-        raise UsageError(f"there is no verb {arguments[0]!r}: {_GONE[arguments[0]]}")
-    if not arguments[0].startswith("-") and arguments[0] not in verbs:
-        raise UsageError(
-            f"there is no verb {arguments[0]!r}: {_suggestion(arguments[0], list(verbs))}"
+    elif name in ("-h", "--help"):
+        listed = "\n".join(f"    {name:<11}{summary}" for name, (summary, _) in known.items())
+        print(f"usage: pyvista-vdi [--version] SUBCOMMAND ...\n\n{_DESCRIPTION}\n\n{listed}\n")
+        print("Each explains itself: pyvista-vdi generate --help")
+    elif name == "--version":
+        print(f"pyvista-vdi {__version__}")
+    elif name not in known:
+        hint = _GONE.get(name) or _suggestion(name, list(known))
+        raise UsageError(f"there is no subcommand {name!r}: {hint}")
+    else:
+        summary, example = known[name]
+        parser = _Parser(
+            prog=f"pyvista-vdi {name}",
+            description=f"{summary[0].upper()}{summary[1:]}.",
+            epilog=f"Example:\n  {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
         )
-    if arguments[0] in verbs:
-        _check_option_names(verbs[arguments[0]], arguments[1:])
+        own = VERBS.get(name)
+        add(parser, registry.load(added[name].options) if own is None else own.options)
+        place = added[name].run if own is None else f"{__package__}.{own.module}:{name}"
+        parser.set_defaults(run=_run, place=place)
+        return _parsed(parser, rest)
+    return None
+
+
+def _parsed(parser: _Parser, arguments: list[str]) -> argparse.Namespace | None:
+    """Parse the arguments of a subcommand; name one that is not known before its value."""
+    options = [name for name in parser._option_string_actions if name.startswith("--")]
+    names = (text.split("=")[0] for text in arguments[: [*arguments, "--"].index("--")])
+    wrong = [text for text in names if text.startswith("--") and text not in options]
     try:
-        options, unknown = parser.parse_known_args(arguments)
-    except SystemExit:  # after --help and --version
+        found, unknown = (None, wrong) if wrong else parser.parse_known_args(arguments)
+    except SystemExit:  # after --help
         return None
     if unknown:
-        _refuse_argument(verbs[options.verb], unknown[0])
-    return options
+        # With the value that was given with it
+        argument = next(text for text in arguments if text.startswith(unknown[0]))
+        hint = f"; see {parser.prog} --help"
+        if argument.startswith("-"):
+            hint = f": {_suggestion(argument.split('=')[0], options)}"
+        raise UsageError(f"{parser.prog.split()[-1]} takes no argument {argument!r}{hint}")
+    return found
 
 
-def _check_option_names(verb: _Parser, arguments: Sequence[str]) -> None:
-    """Name an unknown option before argparse takes the value behind it for a file."""
-    for argument in arguments[: arguments.index("--") if "--" in arguments else None]:
-        name = argument.split("=")[0]
-        if name.startswith("--") and name not in _option_names(verb):
-            _refuse_argument(verb, argument)
-
-
-def _option_names(verb: _Parser) -> list[str]:
-    return [name for name in verb._option_string_actions if name.startswith("--")]
-
-
-def _refuse_argument(verb: _Parser, argument: str) -> NoReturn:
-    hint = f"; see {verb.prog} --help"
-    if argument.startswith("-"):
-        hint = f": {_suggestion(argument.split('=')[0], _option_names(verb))}"
-    raise UsageError(f"{verb.prog.split()[-1]} takes no argument {argument!r}{hint}")
-
-
-def run_verb(options: argparse.Namespace) -> int:
-    """Import the verb's module, which brings what it needs, and run it."""
-    verb = registry.load(options.place)
+def _run(options: argparse.Namespace) -> int:
+    """Import the subcommand's module, which brings what it needs, and run it."""
+    function = registry.load(options.place)
     if getattr(options, "device", None) is not None:
         from pyvista_vdi.device import get_runtime
 
         get_runtime(options.device)  # a wrong name is said before minutes of reading
-    return int(verb(options))
+    return int(function(options))
 
 
 def _suggestion(name: str, known: Sequence[str]) -> str:
@@ -120,34 +129,3 @@ def _suggestion(name: str, known: Sequence[str]) -> str:
         return f"did you mean {near[0]!r}?"
     names = list(dict.fromkeys(known))
     return f"known are {', '.join(names)}" if len(names) <= _LISTED else "see --help"
-
-
-def _make_parser(asked: str) -> tuple[_Parser, dict[str, _Parser]]:
-    """Return the parser and those of all verbs, of which only the one that is asked has options."""
-    parser = _Parser(
-        prog="pyvista-vdi",
-        description=_DESCRIPTION,
-        epilog="Each verb explains itself: pyvista-vdi generate --help",
-        allow_abbrev=False,
-    )
-    parser.add_argument("--version", action="version", version=f"pyvista-vdi {__version__}")
-    subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
-    verbs: dict[str, _Parser] = {}
-    added = registry.verbs()
-    known = {name: verb[1:] for name, verb in VERBS.items()} | {
-        name: (verb.summary, verb.example, None) for name, verb in added.items()
-    }
-    for name, (summary, example, add_options) in known.items():
-        verbs[name] = subparsers.add_parser(
-            name,
-            help=summary,
-            description=summary[0].upper() + summary[1:] + ".",
-            epilog=f"Example:\n  {example}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-            allow_abbrev=False,
-        )
-        if name == asked:
-            (add_options or registry.load(added[name].options))(verbs[name])
-        of_core = f"{__package__}.{VERBS[name][0]}:{name}" if name in VERBS else None
-        verbs[name].set_defaults(run=run_verb, place=of_core or added[name].run)
-    return parser, verbs

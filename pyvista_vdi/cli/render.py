@@ -1,4 +1,4 @@
-"""The verbs that show a VDI: ``render`` and ``view``."""
+"""The subcommands that show a VDI: ``render`` and ``view``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pyvista_vdi.api import render as render_vdi
 from pyvista_vdi.cli.inputs import (
     camera,
     classification,
-    is_series,
+    given,
     is_volume,
     keeps_values,
     look_for,
@@ -22,7 +22,6 @@ from pyvista_vdi.cli.inputs import (
     read_volume,
     refuse,
     require_vdi,
-    settings,
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -30,22 +29,18 @@ from pyvista_vdi.io import checked_png_target, to_bytes, write_png
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import RATE, VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
-from pyvista_vdi.model.vdi import VDI, picture_view
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
-
-#: What has times.
-_SERIES = "series, .vdis"
 
 
 def render(options: argparse.Namespace) -> int:
     """Render a VDI from a new view and write the picture."""
     target = checked_png_target(options.output)
     if not any(holds(file) == "series" for file in options.files):
-        refuse(options, ("time",), _SERIES)
+        refuse(options, ("time",), "series, .vdis")
     vdis, share = [], 0.5 / len(options.files)
     with measuring("rendering") as bar:
         for k, file in enumerate(options.files):
@@ -54,22 +49,15 @@ def render(options: argparse.Namespace) -> int:
             vdis.append(_at(found, options.time))
         # A look is for those that keep values, and is over the ranges of all of them
         asks = next((k for k, vdi in enumerate(vdis) if keeps_values(vdi)), 0)
-        look = look_for(options, vdis[asks], options.files[asks])
+        how = look_for(options, vdis[asks], options.files[asks])
+        how |= {"device": options.device, **given(options, RenderOptions)}
         bar(0.5, "drawing")
-        first = vdis[0]
-        own, size = picture_view(first)
-        view = camera(options, own)
-        several = len(vdis) > 1
-        transforms = [vdi.camera.model_transform for vdi in vdis]
-        image = render_vdi(
-            vdis if several else first,
-            view,
-            options.size or size,
-            model_transforms=transforms if several else None,
-            settings=settings(options),
-            device=options.device,
-            **look,
-        )
+        own, size = picture_view(vdis[0])
+        shown: Any = vdis[0]
+        if len(vdis) > 1:
+            shown = vdis
+            how["model_transforms"] = [vdi.camera.model_transform for vdi in vdis]
+        image = render_vdi(shown, camera(options, own), options.size or size, **how)
     write_png(to_bytes(image, options.background), target)
     print(f"{printable(options.output)}: {image.shape[1]} x {image.shape[0]}")
     return 0
@@ -77,104 +65,68 @@ def render(options: argparse.Namespace) -> int:
 
 def view(options: argparse.Namespace) -> int:
     """Open a plotter on a VDI, or write what it shows."""
-    screenshot = None
-    if options.screenshot is not None:
-        screenshot = str(checked_png_target(options.screenshot))
-    if not is_series(options):
-        refuse(options, ("play", "rate", "time"), _SERIES)
-    shown: Any
+    off_screen = options.screenshot is not None
+    target = checked_png_target(options.screenshot) if off_screen else None
+    if options.file is None or holds(options.file) != "series":
+        refuse(options, ("play", "rate", "time"), "series, .vdis")
     if is_volume(options):
-        look = classification(options)
-        shown = read_volume(options)
-        size = options.size or WINDOW_SIZE
+        shown: Any = read_volume(options)
+        look, size = classification(options), options.size or WINDOW_SIZE
         first = filling_camera(shown.bounds, size)
     else:
         shown = read(options.file)
-        vdi = _at(shown, options.time)
-        first, own = picture_view(vdi)
-        size = options.size or own
-        look = look_for(options, shown, options.file)
+        first, own = picture_view(_at(shown, options.time))
+        look, size = look_for(options, shown, options.file), options.size or own
     # Last: what is wrong with the file is said with and without a display
-    if screenshot is None and (trouble := why_no_window()) is not None:
+    if not off_screen and (trouble := why_no_window()) is not None:
         raise UnsupportedError(
             f"no window can be opened: {trouble}; write a picture instead: --screenshot FILE.png"
         )
-    _show(shown, first, size, look, options, screenshot)
-    if screenshot is not None:
-        print(f"{printable(options.screenshot)}: written")
+    pv = import_pyvista()
+    with pv.vtk_verbosity("off"):
+        plotter = pv.Plotter(off_screen=off_screen, window_size=list(size))
+    try:
+        how = {"device": options.device, **given(options, DrawingOptions), **look}
+        actor = plotter.add_vdi(shown, **how)
+        _show(plotter, actor, first, options)
+        if target is not None:
+            with warnings.catch_warnings():
+                # The error itself is raised below; no file is written then
+                warnings.filterwarnings("ignore", "the VDI cannot be drawn", VDIWarning)
+                warnings.filterwarnings("ignore", "generating the VDI was interr", VDIWarning)
+                picture = plotter.screenshot(return_img=True)
+            actor.mapper.driver.raise_trouble()
+            write_png(np.asarray(picture), target)
+            print(f"{printable(options.screenshot)}: written")
+    finally:
+        plotter.close()
     return 0
 
 
-def _at(found: VDI | DeferredVDI | VDICollection, time: float | None) -> Any:
+def _at(found: Any, time: float | None) -> Any:
     """Return a VDI or a set, or of a series the step nearest in time, by default the first."""
     if isinstance(found, VDICollection) and found.times is not None:
         return found[0 if time is None else found.nearest(time)]
     return found
 
 
-def _show(
-    shown: VDI | DeferredVDI | VDICollection | Volume,
-    camera: Camera,
-    size: tuple[int, int],
-    looks: dict[str, Any],
-    options: argparse.Namespace,
-    screenshot: str | None,
-) -> None:
-    """Open a plotter that shows one of these from a view, or write what it shows.
-
-    No file is written where the picture cannot be drawn or is interrupted.
-    """
-    pv = import_pyvista()
+def _show(plotter: Any, actor: Any, first: Camera, options: argparse.Namespace) -> None:
+    """Show an actor from a view; of a series the step that is asked for, and in a window all."""
     from pyvista_vdi.vtk_pipeline.filters.view import aim
 
-    with pv.vtk_verbosity("off"):
-        plotter = pv.Plotter(off_screen=screenshot is not None, window_size=list(size))
-    try:
-        actor = plotter.add_vdi(
-            shown,
-            target_fps=options.target_fps,
-            regenerate=options.regenerate,
-            draw=options.draw,
-            device=options.device,
-            **looks,
-        )
-        if options.status:
-            actor.show_status(plotter)
-        if isinstance(shown, VDICollection) and shown.times is not None:
-            _begin(actor, plotter, options, slider=screenshot is None)
-        aim(plotter.camera, camera)
-        plotter.renderer.reset_camera_clipping_range()
-        if screenshot is None:
-            plotter.show()
-            return
-        with warnings.catch_warnings():
-            # The error itself is raised below
-            warnings.filterwarnings("ignore", "the VDI cannot be drawn", VDIWarning)
-            warnings.filterwarnings("ignore", "generating the VDI was interrupted", VDIWarning)
-            picture = plotter.screenshot(return_img=True)
-        actor.mapper.driver.raise_trouble()
-        write_png(np.asarray(picture), screenshot)
-    finally:
-        plotter.close()
-
-
-def _begin(actor: Any, plotter: Any, options: argparse.Namespace, *, slider: bool) -> None:
-    """Show the step that is asked for, and in a window its slider; the space bar plays."""
+    aim(plotter.camera, first)
+    plotter.renderer.reset_camera_clipping_range()
+    if options.status:
+        actor.show_status(plotter)
     if options.time is not None:
         actor.time = options.time
-    if not slider:
+    if options.screenshot is not None:
         return
-    if len(actor.series) > 1:
-        actor.add_time_slider(plotter)
-
-    rate = RATE if options.rate is None else options.rate
-
-    def play_or_pause() -> None:
-        if actor.playing:
-            actor.pause()
-        else:
+    if actor.series is not None:
+        rate = RATE if options.rate is None else options.rate
+        plotter.add_key_event("space", lambda: actor.pause() if actor.playing else actor.play(rate))
+        if len(actor.series) > 1:
+            actor.add_time_slider(plotter)
+        if options.play:
             actor.play(rate)
-
-    plotter.add_key_event("space", play_or_pause)
-    if options.play:
-        actor.play(rate)
+    plotter.show()

@@ -7,9 +7,6 @@ from typing import Any
 
 from pyvista_vdi.model.whole_file import whole_file
 
-#: What lengths and positions in tables are measured in: files of VDIs say no more.
-LENGTHS = {"lengths": "in the units of the volume's spacing, model units"}
-
 
 def printable(text: object) -> str:
     """Return a text whose every character can be shown: names and files may hold any.
@@ -27,9 +24,9 @@ def mebibytes(n: int) -> str:
     return f"{n / 2**20:.1f} MiB"
 
 
-def table(rows: dict[str, str]) -> str:
+def table(rows: dict[str, Any]) -> str:
     """Return names and what they stand for in two columns."""
-    column = max(len(name) for name in rows)
+    column = max(map(len, rows))
     return "\n".join(printable(f"{name:<{column}}  {value}") for name, value in rows.items())
 
 

@@ -44,12 +44,12 @@ SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
 #: By folder of ``opencl/``, those that programs with a file of it know.
 OF_FOLDERS: dict[str, str] = {
-    "cpu16": "STEEPEST",
     "generation": "RUN_WORDS LISTS_PER_ITEM",
     "large": "RUN_WORDS",
     "lib": "STRIP COLUMN_ITEMS CELL CELL_ITEMS PLANE_FORMS",
     "multi_vdi": "CELL CELL_ITEMS SEGMENT_SIZE SPARE_SLOTS",
-    "raycasting": "BUNDLE_SHIFT BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS DEPTH_CODES",
+    "raycasting": "BUNDLE_SHIFT BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS DEPTH_CODES "
+    "STEEPEST",
     "volume": "MACROCELL_SHIFT",
 }
 

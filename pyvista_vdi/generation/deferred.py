@@ -18,7 +18,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import with_arrays
 from pyvista_vdi.model.volume import Volume
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
@@ -103,18 +103,8 @@ def generate_deferred(
         metadata.pop(name)
     if volume.chunks is None:  # else all would be read for it
         metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
-    lists = VDI(
-        made.camera,
-        made.window_size,
-        made.offsets,
-        made.front,
-        made.back,
-        color,
-        spread,
-        made.bounds,
-        depth_origin=made.depth_origin,
-        metadata=metadata,
-    )
+    arrays = made.arrays._replace(color=color, optical_depth=spread)
+    lists = with_arrays(made, arrays, metadata=metadata)
     about = {
         "version": 1,
         "value_range": (low, high),

@@ -5,12 +5,12 @@ from typing import Any
 from pyvista_vdi._version import __version__
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.generation.list_arrays import growing_lists, require_room
+from pyvista_vdi.generation.list_arrays import GrowingLists, bring_to_host, require_room
 from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.types import Progress
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, made_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays
 
@@ -33,6 +33,7 @@ def generate_vdi(request: GenerationRequest) -> VDI:
     require_room(0, size)
     report(progress, 0.0)  # first: a bar says that kernels are compiled
     runtime = get_runtime(request.device)
+    bring_to_host(runtime)  # what was made before
     slices = Slices(runtime, size, options)
     medium = DeviceVolume(
         runtime, volume, request.transfer_function, options, room=slices.room(volume)
@@ -41,7 +42,13 @@ def generate_vdi(request: GenerationRequest) -> VDI:
         medium.giving_bricks_back(),
         Records(runtime, medium.rays, camera, size, slices, options) as records,
         March(records, medium, camera) as march,
-        growing_lists(runtime, size, options.max_supersegments, slices.rows * width) as lists,
+        GrowingLists(
+            runtime,
+            size,
+            options.max_supersegments,
+            slices.rows * width,
+            stay=options.memory_limit is None,
+        ) as lists,
     ):
         for part in slices:
             records.begin(part)
@@ -56,21 +63,15 @@ def generate_vdi(request: GenerationRequest) -> VDI:
                 report(progress, part.first_row / height)
             # Pack the lists behind those made before
             records.pack(lists)
-        offsets, front, back, color, optical_depth = lists.finished()
+        arrays = lists.staying()
     report(progress, 1.0)
-
-    made_by = made_from(request, medium, runtime.info.name)
-    return VDI(
+    return made_vdi(
         camera,
         size,
-        offsets,
-        front,
-        back,
-        color,
-        optical_depth,
+        arrays,
         volume.bounds,
         depth_origin=records.depth_origin,
-        metadata={**made_by, **request.metadata},
+        metadata={**made_from(request, medium, runtime.info.name), **request.metadata},
     ).with_precision(options.precision)
 
 

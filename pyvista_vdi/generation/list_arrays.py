@@ -1,7 +1,9 @@
-"""The arrays of a VDI while slices of lists are written into them, one behind the other."""
+"""The arrays of a VDI while slices of lists are written into them, and lists that stay there."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+import contextlib
+import threading
+import weakref
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -17,55 +19,134 @@ from pyvista_vdi.device import (
 from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
 from pyvista_vdi.generation.kernels import LIST_OFFSETS, SUM_LENGTHS
 from pyvista_vdi.model.host_memory import require_host_memory
+from pyvista_vdi.model.packing import Arrays
 
-#: A VDI's arrays of supersegments, as messages call them, and the shape of an element.
-_LIST_ARRAYS: dict[str, tuple[int, ...]] = {
-    "front depths": (),
-    "back depths": (),
-    "supersegment colours": (3,),
-    "optical depths": (),
+#: A VDI's arrays of supersegments, as kernels and as messages call them, and an element's shape.
+_ARRAYS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "fronts": ("front depths", ()),
+    "backs": ("back depths", ()),
+    "colors": ("supersegment colours", (3,)),
+    "optical_depths": ("optical depths", ()),
 }
 #: Bytes of a supersegment in them, and in the largest of them.
 SUPERSEGMENT_BYTES, _LARGEST_ELEMENT = 24, 12
 
+#: Share of a device's own memory that lists may take there.
+_SHARE = 16
 
-class GrowingLists(ABC):
-    """A VDI's arrays while slices of lists are written into them, one behind the other.
 
-    Room for every list at its longest is asked for at once: systems take memory as it is written,
-    so that what stays unused costs nothing, and nothing is ever copied. :meth:`finished` gives it
-    back. The device sums up the lists' lengths itself; the host learns the sum of a slice when it
-    has launched the march of the next, and waits for nothing else.
+class ListsOnDevice:
+    """Lists in a device's own memory, where they were made, until somebody asks for arrays.
+
+    A device has those of one VDI: before it makes the next, they are brought to the host.
     """
 
-    _offsets_on_device: DeviceBuffer
+    def __init__(
+        self, runtime: Runtime, offsets: NDArray[np.uint64], buffers: dict[str, DeviceBuffer]
+    ) -> None:
+        offsets.setflags(write=False)
+        self.offsets, self._runtime, self._buffers = offsets, runtime, buffers
+        self._arrays: Arrays | None = None
+        self._lock = threading.Lock()
+        _latest[runtime] = weakref.ref(self)
 
-    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
-        self._runtime = runtime
-        self._size = size
-        self._limit = limit
-        self._most = size[0] * size[1] * limit  # supersegments
-        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
-        self._offsets[0] = 0
+    def arrays(self) -> Arrays:
+        """Return the arrays; the device's memory is given back."""
+        runtime, n = self._runtime, int(self.offsets[-1])
+        with runtime.holding(self._lock):
+            if self._arrays is None:
+                found = []
+                for name, (_, item) in _ARRAYS.items():
+                    array = np.empty((n, *item), np.float32)
+                    runtime.download(self._buffers[name], array, count=array.size)
+                    found.append(array)
+                self._arrays = Arrays(self.offsets, *found)
+                self._release()
+            return self._arrays
+
+    @contextlib.contextmanager
+    def on(self, runtime: Runtime) -> Iterator[dict[str, DeviceBuffer]]:
+        """Hold the lists on a device for a ``with`` block; empty where they are not on it."""
+        with runtime.holding(self._lock):
+            yield dict(self._buffers) if runtime is self._runtime else {}
+
+    def _release(self) -> None:
+        for buffer in self._buffers.values():
+            buffer.release()
+        self._buffers = {}
+
+
+_latest: "weakref.WeakKeyDictionary[Runtime, weakref.ref[ListsOnDevice]]" = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def bring_to_host(runtime: Runtime) -> None:
+    """Bring the lists that are where a device made them to the host, if their VDI still lives."""
+    latest = _latest.pop(runtime, None)
+    if latest is not None and (lists := latest()) is not None:
+        lists.arrays()
+
+
+class GrowingLists:
+    """A VDI's arrays while slices of lists are written into them, one behind the other.
+
+    A device that uses arrays in place writes them in the host's memory. Room for every list at its
+    longest is asked for at once: systems take memory as it is written, so that what stays unused
+    costs nothing, and nothing is ever copied. :meth:`finished` gives it back. Any other device has
+    buffers of its own, for a slice at its longest or, where lists may ``stay``, for as many as a
+    share of its memory holds; what does not fit is brought to the host. The device sums up the
+    lists' lengths itself; the host learns the sum of a slice when it has launched the march of the
+    next, and waits for nothing else unless the lists might pass the end of the buffers.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        size: tuple[int, int],
+        limit: int,
+        slice_lists: int,
+        *,
+        stay: bool = False,
+    ) -> None:
+        self._runtime, self._size, self._limit = runtime, size, limit
+        lists = size[0] * size[1]
+        self._most = lists * limit  # supersegments
+        self._offsets = aligned_empty(lists + 1, np.uint64)
         self._made = 0  # lists, those of the last slice included
-        self._first = 0  # place, on the device, of the next slice's first offset
         self._known = 0  # supersegments of all lists whose sum is known here
-        self._summing: Callable[[], int] | None = None  # waits for the sum with the last slice
-        self._arrays = {name: GrowingArray(item) for name, item in _LIST_ARRAYS.items()}
-        self._targets: list[DeviceBuffer] = []  # of slices' supersegments, in the arrays' order
-        self._sums = runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths")
-        shared = {"partial": GROUP, "sums": self._sums}
-        self._sum_lengths = runtime.bind(SUM_LENGTHS, **shared)
-        self._place_lists = runtime.bind(LIST_OFFSETS, **shared)
+        self._begin = self._end = 0  # supersegments that the buffers hold
+        self._wait: Callable[[], None] | None = None  # for the sum with the last slice
+        self._sum = np.zeros(1, np.uint64)
+        self._arrays = {name: GrowingArray(item) for name, (_, item) in _ARRAYS.items()}
+        self._targets: dict[str, DeviceBuffer] = {}
+        # Supersegments that a device's own buffers have room for
+        largest = runtime.info.max_allocation // _LARGEST_ELEMENT
+        share = runtime.info.global_memory // (_SHARE * SUPERSEGMENT_BYTES) if stay else 0
+        self._room = max(slice_lists * limit, min(share, largest, self._most))
+        with kept_together() as keep:
+            sums = keep(runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths"))
+            offsets = keep(runtime.target(self._offsets, "list offsets"))
+            runtime.write(offsets, np.zeros(1, np.uint64), first=0)
+            shared = {"partial": GROUP, "sums": sums}
+            self._sum_lengths = runtime.bind(SUM_LENGTHS, **shared)
+            self._place_lists = runtime.bind(LIST_OFFSETS, **shared, all_offsets=offsets)
+            self._sums, self._starts = sums, offsets
+            try:
+                self._make_room(0, 1)
+            except BaseException:
+                self._release_targets()
+                raise
 
     def __enter__(self) -> "GrowingLists":
         return self
 
     def __exit__(self, *_: object) -> None:
         try:
-            self._runtime.finish()  # the arrays may go when nothing is copied into them any more
+            self._runtime.finish()  # the arrays may go when nothing is written into them any more
         finally:
-            for buffer in (*self._targets, self._sums, self._offsets_on_device):
+            self._release_targets()
+            for buffer in (self._sums, self._starts):
                 buffer.release()
 
     def follow(self, lengths: DeviceBuffer, n: int) -> dict[str, Any]:
@@ -74,174 +155,78 @@ class GrowingLists(ABC):
         Returns the arguments ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
         """
         self.wait()
-        items, made, offsets = blocks_to_sum(n) * GROUP, self._first, self._offsets_on_device
+        items, made = blocks_to_sum(n) * GROUP, self._made
         self._sum_lengths(items, GROUP, lists=n, lengths=lengths)
-        self._place_lists(items, GROUP, lists=n, lengths=lengths, made=made, all_offsets=offsets)
-        held = self._expect(n)
-        arrays = zip(("fronts", "backs", "colors", "optical_depths"), self._targets, strict=True)
-        return {"offsets": offsets, "made": made, "held": held, **dict(arrays)}
+        self._place_lists(items, GROUP, lists=n, lengths=lengths, made=made)
+        self._made += n
+        self._wait = self._runtime.download_later(self._starts, self._sum, first=self._made)
+        if self._known + n * self._limit > self._end:
+            self.wait()
+        return {"offsets": self._starts, "made": made, "held": self._begin, **self._targets}
 
     def wait(self) -> None:
         """Wait until the lengths of the last slice are summed up."""
-        if self._summing is None:
+        if self._wait is None:
             return
-        begin, self._known = self._known, self._summing()
-        self._summing = None
+        self._wait()
+        self._wait = None
+        begin, self._known = self._known, int(self._sum[0])
         require_room(self._known, self._size)
-        self._learned(begin)
-
-    def finished(self) -> list[NDArray[Any]]:
-        """Return offsets, fronts, backs, colours and optical depths."""
-        self.wait()
-        self._collect_all()
-        arrays = [array.finished(self._known) for array in self._arrays.values()]
-        return [self._offsets, *arrays]
-
-    @abstractmethod
-    def _expect(self, n: int) -> int:
-        """Begin to fetch the sum with n more lists, and make room for them.
-
-        Returns the supersegments before those that the targets hold.
-        """
-
-    @abstractmethod
-    def _learned(self, begin: int) -> None:
-        """Do what can be done now that it is known which supersegments the last slice has."""
-
-    @abstractmethod
-    def _collect_all(self) -> None:
-        """Bring what the device still has to the arrays."""
-
-
-class _ListsInPlace(GrowingLists):
-    """The arrays on a device that uses them in place: all slices are written by the same buffers.
-
-    These reach as far as they may; where the lists might pass their end, the host waits for the
-    lengths of the slice, and makes others.
-    """
-
-    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
-        super().__init__(runtime, size, limit, slice_lists)
-        self._begin = self._end = 0  # supersegments that the buffers hold
-        self._parts: list[NDArray[Any]] = []  # and what they are to fill
-        with kept_together() as keep:
-            keep(self._sums)
-            self._offsets_on_device = keep(runtime.target(self._offsets, "list offsets"))
-            runtime.write(self._offsets_on_device, np.zeros(1, np.uint64), first=0)
-            try:
-                self._make_room(0, 1)
-            except BaseException:
-                self._release_targets()
-                raise
-
-    def _expect(self, n: int) -> int:
-        last = np.zeros(1, np.uint64)
-        self._made = self._first = self._made + n
-        wait = self._runtime.download_later(self._offsets_on_device, last, first=self._made)
-
-        def summed() -> int:
-            wait()
-            return int(last[0])
-
-        self._summing = summed
-        if self._known + n * self._limit > self._end:
-            self.wait()
-        return self._begin
-
-    def _learned(self, begin: int) -> None:
         if self._known > self._end:
             self._make_room(begin, self._known)
+
+    def finished(self) -> Arrays:
+        """Return the arrays, on the host."""
+        self.wait()
+        self._runtime.download(self._starts, self._offsets)
+        self._collect(self._known)
+        return Arrays(self._offsets, *(a.finished(self._known) for a in self._arrays.values()))
+
+    def staying(self) -> Arrays | ListsOnDevice:
+        """Return lists that stay in the device's own memory, or the arrays where they are not."""
+        self.wait()
+        if self._begin > 0 or self._runtime.in_place_alignment is not None:
+            return self.finished()
+        self._runtime.download(self._starts, self._offsets)
+        buffers, self._targets = {"starts": self._starts, **self._targets}, {}
+        self._starts = self._sums  # all that is to be released
+        return ListsOnDevice(self._runtime, self._offsets, buffers)
 
     def _make_room(self, begin: int, end: int) -> None:
         """Make buffers of the supersegments from ``begin``, those made so far, to ``end``."""
         self._collect(begin)
+        alignment = self._runtime.in_place_alignment
+        if alignment is None:
+            for name, (what, item) in {} if self._targets else _ARRAYS.items():
+                self._targets[name] = self._runtime.buffer((self._room, *item), name=what)
+            self._begin, self._end = begin, begin + self._room
+            return
         for array in self._arrays.values():
             array.reserve(end, self._most)
-        alignment = self._runtime.in_place_alignment or 1
         begin -= begin % alignment  # so many elements are aligned as well
         room = min(array.room for array in self._arrays.values())
         largest = self._runtime.info.max_allocation // _LARGEST_ELEMENT
-        end = max(end, min(room, begin + largest))
-        self._begin, self._end = begin, end
+        self._begin, self._end = begin, max(end, min(room, begin + largest))
         for name, array in self._arrays.items():
-            part: NDArray[Any] = array.part(begin, end)
-            self._targets.append(self._runtime.target(part, name))
-            self._parts.append(part)
+            part: NDArray[Any] = array.part(begin, self._end)
+            self._targets[name] = self._runtime.target(part, _ARRAYS[name][0])
 
     def _collect(self, made: int) -> None:
-        """Wait until so many supersegments are in the arrays, and release the buffers."""
-        for target, part in zip(self._targets, self._parts, strict=True):
-            filled = part[: made - self._begin]
+        """Wait until so many supersegments are in the host's arrays; in place, release buffers."""
+        in_place = self._runtime.in_place_alignment is not None
+        for name, target in self._targets.items():
+            array = self._arrays[name]
+            if not in_place:
+                array.reserve(made, self._most)
+            filled = array.part(self._begin, made)
             self._runtime.download(target, filled, count=filled.size)
-        self._release_targets()
+        if in_place:
+            self._release_targets()
 
     def _release_targets(self) -> None:
-        while self._targets:
-            self._targets[-1].release()
-            self._targets.pop()
-        self._parts.clear()
-
-    def _collect_all(self) -> None:
-        self._collect(self._known)
-        self._runtime.download(self._offsets_on_device, self._offsets)
-
-
-class _CopiedLists(GrowingLists):
-    """The arrays beside any other device, which has buffers of a slice at its longest.
-
-    What a slice has is copied from there while the next one is marched, before it is packed.
-    """
-
-    def __init__(self, runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int):
-        super().__init__(runtime, size, limit, slice_lists)
-        with kept_together() as keep:
-            keep(self._sums)
-            self._offsets_on_device = keep(
-                runtime.buffer((slice_lists + 1,), np.uint64, "list offsets")
-            )
-            runtime.write(self._offsets_on_device, np.zeros(1, np.uint64), first=0)
-            self._targets = [
-                keep(runtime.buffer((slice_lists * limit, *item), name=name))
-                for name, item in _LIST_ARRAYS.items()
-            ]
-        self._copies: list[Callable[[], None]] = []
-
-    def _expect(self, n: int) -> int:
-        before, ends = np.split(self._offsets[self._made : self._made + n + 1], [1])
-        wait = self._runtime.download_later(self._offsets_on_device, ends, first=1)
-        self._made += n
-
-        def summed() -> int:
-            wait()
-            np.add(ends, before, out=ends)
-            return int(ends[-1])
-
-        self._summing = summed
-        return 0
-
-    def _learned(self, begin: int) -> None:
-        if any(self._known > array.room for array in self._arrays.values()):
-            self._runtime.finish()  # what is being copied would not move with the array
-        copies = []
-        for target, array in zip(self._targets, self._arrays.values(), strict=True):
-            array.reserve(self._known, self._most)
-            part: NDArray[Any] = array.part(begin, self._known)
-            copies.append(self._runtime.download_later(target, part))
-        self._copies = copies  # a copy that nobody remembers is waited for; those before are done
-
-    def _collect_all(self) -> None:
-        self._runtime.finish()
-
-
-def growing_lists(
-    runtime: Runtime, size: tuple[int, int], limit: int, slice_lists: int
-) -> GrowingLists:
-    """Return the arrays of a VDI of so many lists, for slices of up to ``slice_lists``."""
-    offsets_bytes = 8 * (size[0] * size[1] + 1)
-    in_place = runtime.in_place_alignment is not None
-    if in_place and offsets_bytes <= runtime.info.max_allocation:
-        return _ListsInPlace(runtime, size, limit, slice_lists)
-    return _CopiedLists(runtime, size, limit, slice_lists)
+        for target in self._targets.values():
+            target.release()
+        self._targets = {}
 
 
 def blocks_to_sum(lists: int) -> int:

@@ -17,7 +17,7 @@ from pyvista_vdi.io.volumes.formats import FORMATS
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.whole_file import check_writable, with_suffix
+from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.registry import FileFormat
 
 #: What reads and writes a VDI in its VTK form, as any image of VTK's.
@@ -72,46 +72,10 @@ def write(
     progress: Progress | None = None,
     **options: Any,
 ) -> Path:
-    """Write a VDI to a file: ``.vdi``, an OpenEXR deep image, or a page with a viewer.
+    """Write a VDI to a file, whole or not at all, and return that: see :meth:`VDI.save`.
 
-    The file appears whole or not at all: it is written under a temporary name in the same folder
-    and moved into place, and what was there before stays until then.
-
-    Parameters
-    ----------
-    vdi : VDI or DeferredVDI
-        What to write; the second in ``.vdi`` files and pages only.
-    path : path-like
-        The target; its name ends in ``.vdi``, ``.exr`` or ``.html``.
-    progress : callable, optional
-        Called with the finished fraction, 0 to 1; when it returns False, nothing is written.
-    **options
-        ``compression`` and ``level`` for these; ``precision`` for ``.vdi`` and ``.html``, there
-        ``title``, ``background`` and ``controls`` as well, and of a DeferredVDI what its
-        transfer function begins with, as :meth:`DeferredVDI.classified` takes it: ``cmap``,
-        ``opacity``, ... . ``.exr`` has none.
-        See :func:`pyvista_vdi.io.vdi_file.writer.write`,
-        :func:`pyvista_vdi.extensions.web.page.page`.
-
-    Returns
-    -------
-    pathlib.Path
-        The file, links followed.
-
-    Raises
-    ------
-    VDIFileError
-        If the target cannot be written, or the metadata hold what JSON cannot.
-    InvalidArgumentError
-        If an option is unknown or out of its range.
-    Cancelled
-        If ``progress`` returned False.
-    MissingDependencyError
-        If what such files need is not installed: OpenEXR for ``.exr``.
-
-    See Also
-    --------
-    read : reads it again.
+    ``progress`` is called with the finished fraction; when it returns False, nothing is written.
+    ``options`` are those of the format, and of pages the look that a DeferredVDI begins with.
     """
     target = checked_target(path)
     found = format_named(target) or _own()
@@ -127,36 +91,9 @@ def write(
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **options: Any) -> Any:
-    """Read a VDI from a ``.vdi`` file, an OpenEXR deep image or a page.
+    """Read a VDI, a series or a set, whatever the format of its name holds.
 
-    Or a series or a set of them: whatever the format of that name holds.
-
-    Parameters
-    ----------
-    path : path-like
-        The file; a name that ends in ``.exr`` makes it an OpenEXR file, ``.html`` a page.
-    progress : callable, optional
-        As for :func:`write`.
-    **options
-        ``camera`` and ``thickness`` for ``.exr``: see :func:`pyvista_vdi.read`.
-
-    Returns
-    -------
-    VDI or DeferredVDI or VDISeries or VDISet
-        The same to the last bit as was written by :func:`write`; of ``.exr`` within float32's
-        rounding.
-
-    Raises
-    ------
-    VDIFileError
-        If the file is absent, foreign, of a newer version, truncated or damaged; the message
-        says which and what can be done.
-    InvalidArgumentError
-        If an option is unknown.
-    Cancelled
-        If ``progress`` returned False.
-    MissingDependencyError
-        If what such files need is not installed: OpenEXR for ``.exr``.
+    See :func:`pyvista_vdi.read`, which has the options and the errors.
     """
     found = format_of(path) or _own()
     of_volumes = tuple(suffix for each in FORMATS.values() for suffix in each.suffixes)
@@ -170,22 +107,9 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
 
 
 def read_info(path: str | os.PathLike[str]) -> FileInfo:
-    """Read what a file says about itself; the arrays of a ``.vdi`` file are not touched.
+    """Read what a file says about itself: view, size, metadata; of a ``.vdi`` file no array.
 
-    Parameters
-    ----------
-    path : path-like
-        A ``.vdi``, ``.exr`` or ``.html`` file.
-
-    Returns
-    -------
-    FileInfo
-        View, size, metadata.
-
-    Raises
-    ------
-    VDIFileError
-        As for :func:`read`, except that damaged arrays of a ``.vdi`` file are not noticed.
+    VDIFileError is raised as by :func:`read`, but for damaged arrays.
     """
     return (format_of(path) or _own()).load().read_info(path)  # type: ignore[no-any-return]
 
@@ -193,15 +117,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
 def is_vdi_file(path: str | os.PathLike[str]) -> bool:
     """Whether a file is to be read as a VDI: by its name, or else by its content.
 
-    Parameters
-    ----------
-    path : path-like
-        A file, or a folder; it need not exist.
-
-    Returns
-    -------
-    bool
-        For unknown names, whether it begins as ours.
+    It need not exist, and may be a folder.
     """
     found = format_named(path)
     if found is not None and found.holds == "VDI":
@@ -210,29 +126,12 @@ def is_vdi_file(path: str | os.PathLike[str]) -> bool:
 
 
 def checked_target(path: str | os.PathLike[str]) -> Path:
-    """Raise now if a VDI could not be written there later; nothing is left behind.
+    """Return a target, links followed; nothing is left behind.
 
-    Parameters
-    ----------
-    path : path-like
-        The target; its name ends in one of :func:`suffixes`.
-
-    Returns
-    -------
-    pathlib.Path
-        The target, links followed.
-
-    Raises
-    ------
-    VDIFileError
-        If the name ends in something else, or the target cannot be written.
-    MissingDependencyError
-        If what writes such files is not installed.
+    Raises VDIFileError now if a VDI could not be written there later: its name ends in none of
+    :func:`suffixes`, or it cannot be written; MissingDependencyError if what writes it is missing.
     """
-    try:
-        target = Path(path)
-    except TypeError as error:
-        raise VDIFileError(f"a file's name is a path; got {type(path).__name__}") from error
+    target = as_path(path)
     if target.suffix.lower() == ".vti":
         raise VDIFileError(f"{target}: VTK writes its own files, {_TO_VTK}; name a .vdi file here")
     named = format_named(with_suffix(target, suffixes(), "a VDI"))

@@ -71,7 +71,7 @@ class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the optio
 
     Parameters
     ----------
-{"".join(entries(_Fields.declared.values()))}
+{entries(_Fields.declared.values())}
     Raises
     ------
     TypeError
@@ -115,7 +115,6 @@ def takes(
     aliases: Mapping[str, str] | None = None,
     returns: Mapping[str, Any] | None = None,
     kinds: Mapping[str, str] | None = None,
-    defaults: Mapping[str, Any] | None = None,
     flat: bool = False,
     **records: Any,
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -125,17 +124,14 @@ def takes(
     has the options instead, by keyword, or where ``order`` has their names as positional arguments
     of that order; and its docstring an entry for each that it does not describe itself.
     ``aliases`` are other names that are taken as well. ``returns``: what the function returns, by
-    the values of an option, of which the first is its default; ``kinds``: types of options that
-    are others than declared, and ``defaults``. What is seldom turned is taken as ``settings``,
-    or where that is to be ``flat`` like the others.
+    the values of an option; ``kinds``: types of options that are others than declared. What is
+    seldom turned is taken as ``settings``, or where that is to be ``flat`` like the others.
     """
     options: dict[str, Option] = {}
     for each in records.values():
         options |= each.declared
     for name, kind in (kinds or {}).items():
         options[name] = replace(options[name], kind=kind)
-    for name, default in (defaults or {}).items():
-        options[name] = replace(options[name], default=default)
     hidden = {name: told for name, told in options.items() if told.setting and not flat}
     shown = {name: told for name, told in options.items() if name not in hidden}
     if hidden:
@@ -163,7 +159,7 @@ def takes(
             except TypeError as error:
                 raise TypeError(f"{called_by}() {error}") from None
             given |= zip(first, args, strict=False)
-            made = records_of(given, called_by, *records.values(), defaults=defaults, flat=flat)
+            made = records_of(given, called_by, *records.values(), flat=flat)
             return function(**given, **dict(zip(records, made, strict=True)))
 
         told: Any = called
@@ -253,7 +249,7 @@ def _documented(text: str, options: Iterable[Option]) -> str:
         for names in re.findall(rf"^ {{{margin}}}(\w[\w, *]*?)(?: :.*)?$", head, re.MULTILINE)
         for name in names.split(", ")
     }
-    new = "".join(entries((each for each in options if each.name not in described), margin))
+    new = entries((each for each in options if each.name not in described), margin)
     if "Parameters\n" not in head:
         new = f"\n{' ' * margin}Parameters\n{' ' * margin}----------\n{new}"
     return head.rstrip() + "\n" + new + tail

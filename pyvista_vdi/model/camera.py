@@ -20,10 +20,9 @@ MAX_WINDOW_EDGE = 65536
 
 
 def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
-    """Return ``window_size`` as two positive Python ints.
+    """Return width and height in pixels as two Python ints; ``name`` is for errors.
 
-    ``window_size``: width and height in pixels. ``name``: what to call it in an error. Returns:
-    ``(width, height)``. Raises InvalidArgumentError if it is not two whole numbers between 1 and
+    Raises InvalidArgumentError if they are not two whole numbers between 1 and
     :data:`MAX_WINDOW_EDGE`.
     """
     try:
@@ -36,7 +35,7 @@ def check_window_size(window_size: Sequence[int], *, name: str = "window_size") 
         raise InvalidArgumentError(
             f"{name} must be (width, height), two whole numbers of pixels; got {window_size!r}"
         )
-    if not all(1 <= edge <= MAX_WINDOW_EDGE for edge in size):
+    if not (1 <= size[0] <= MAX_WINDOW_EDGE and 1 <= size[1] <= MAX_WINDOW_EDGE):
         raise InvalidArgumentError(
             f"{name} must be between 1 and {MAX_WINDOW_EDGE} pixels along each edge; "
             f"got {size[0]} x {size[1]}"
@@ -110,23 +109,23 @@ class Camera:
         use_horizontal_view_angle: bool = False,
         model_transform: ArrayLike | None = None,
     ) -> None:
-        horizontal = as_flag(use_horizontal_view_angle, "use_horizontal_view_angle")
         checked = {
-            "position": _vector("position", position, 3),
             "focal_point": _vector("focal_point", focal_point, 3),
-            "view_up": _vector("view_up", view_up, 3),
-            "view_angle": as_float(view_angle),
+            "model_transform": _affine(model_transform),
             "parallel_projection": as_flag(parallel_projection, "parallel_projection"),
             "parallel_scale": as_float(parallel_scale),
+            "position": _vector("position", position, 3),
+            "use_horizontal_view_angle": as_flag(
+                use_horizontal_view_angle, "use_horizontal_view_angle"
+            ),
+            "view_angle": as_float(view_angle),
+            "view_up": _vector("view_up", view_up, 3),
             "window_center": _vector("window_center", window_center, 2),
-            "use_horizontal_view_angle": horizontal,
-            "model_transform": _affine(model_transform),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
-        matrix = self.model_transform.tobytes()
-        key = tuple(matrix if name == "model_transform" else checked[name] for name in _STATE)
-        object.__setattr__(self, "_key", key)
+        checked["model_transform"] = self.model_transform.tobytes()
+        object.__setattr__(self, "_key", tuple(checked.values()))
         object.__setattr__(self, "_axes", self._checked_axes())
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -186,7 +185,8 @@ class Camera:
             )
         if model_transform is None:
             matrix = camera.GetModelTransformMatrix()
-            model_transform = [[matrix.GetElement(i, j) for j in range(4)] for i in range(4)]
+            elements = [matrix.GetElement(k // 4, k % 4) for k in range(16)]
+            model_transform = np.reshape(elements, (4, 4))
         return cls(
             camera.GetPosition(),
             camera.GetFocalPoint(),
@@ -216,11 +216,7 @@ class Camera:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all arguments of the constructor, as plain numbers and lists (for JSON)."""
-        state: dict[str, Any] = {name: getattr(self, name) for name in _STATE}
-        for name in ("position", "focal_point", "view_up", "window_center"):
-            state[name] = list(state[name])
-        state["model_transform"] = self.model_transform.tolist()
-        return state
+        return {name: np.asarray(getattr(self, name)).tolist() for name in _STATE}
 
     def to_pyvista(self) -> Any:
         """Return the view of the model frame as a PyVista camera: ``plotter.camera = ...``.

@@ -257,8 +257,9 @@ class Classification(Look, ArrayChoice):
         arguments = {each.name: getattr(self, each.name) for each in fields(Look)}
         arguments["clim"] = range_to_classify(self.scalars, self.clim)
         from_arguments = registry.method("TransferFunction.from_arguments")
+        scalars = volume.array if volume.rgba else np.array(volume.finite_range())
         return from_arguments(  # type: ignore[no-any-return]
-            volume.array, rgba=volume.rgba, **arguments
+            scalars, rgba=volume.rgba, **arguments
         )
 
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import UnsupportedError, warn_external
 from pyvista_vdi.model.checks import as_range
 from pyvista_vdi.model.deferred import DeferredVDI, Floats
+from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, with_arrays
 
 #: Straight colours and optical depths of supersegments.
 Media = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -26,18 +27,21 @@ Media = tuple[NDArray[np.float32], NDArray[np.float32]]
 #: of a fiftieth of it has 327.
 CELLS = 1 << 14
 
+#: Whole numbers of this stand for opacities on devices: sums over all cells stay below 2^63.
+_UNITS = 2.0**40
+
 
 def classify(
     deferred: DeferredVDI,
     transfer_function: TransferFunction,
-    media: Callable[[DeferredVDI, Floats], Media] | None = None,
+    media: Callable[[ValuesLook], Media] | None = None,
 ) -> VDI:
     """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
     values of :func:`spread_of_values`. The VDI's arrays are made when they are asked for, by
-    ``media``, which does what :func:`media_of_values` does, the default; a raycast asks for none.
-    Errors and warnings: :meth:`DeferredVDI.classified`.
+    ``media`` if it is given; a raycast asks for none. Errors and warnings are those of
+    :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
         ("shading", transfer_function.shading),
@@ -64,7 +68,7 @@ def classify(
         "transfer_function": transfer_function.to_dict(),
         "deferred": deferred.about,
     }
-    return VDI._of_values(ValuesLook(deferred, of_cells, media or media_of_values), metadata)
+    return with_arrays(deferred, ValuesLook(deferred, of_cells, media), metadata=metadata)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,66 +76,59 @@ class ValuesLook:
     """Values and the transfer function that a VDI shows of them.
 
     ``of_cells``: (step opacity times colour, step opacity) at the low end of the range, and of
-    cells of it, float64 (1 + CELLS, 4). ``media``: makes straight colours and optical depths, and
-    may take a device for it.
+    cells of it, float64 (1 + CELLS, 4). ``media``: what makes straight colours and optical depths
+    of it on a device; :meth:`media_of` by default.
     """
 
     deferred: DeferredVDI
     of_cells: Floats
-    media: Callable[[DeferredVDI, Floats], Media]
+    media: Callable[[ValuesLook], Media] | None = None
 
-    @property
-    def lists(self) -> VDI:
-        """The lists of all that is kept."""
-        return self.deferred.lists
-
-    def made(self) -> VDI:
+    def arrays(self) -> Arrays:
         """Return the arrays: what is transparent is left out."""
-        straight, optical_depth = self.media(self.deferred, self.of_cells)
-        lists = self.lists
-        rows: Any = np.flatnonzero(optical_depth > 0)
-        offsets = lists.offsets
+        color, optical_depth = self.media_of() if self.media is None else self.media(self)
+        arrays = self.deferred.arrays._replace(color=color, optical_depth=optical_depth)
+        rows = np.flatnonzero(optical_depth > 0)
         if len(rows) == len(optical_depth):
-            rows = slice(None)
-        else:
-            offsets = np.searchsorted(rows, offsets.astype(np.int64)).astype(np.uint64)
-        return VDI(
-            lists.camera,
-            lists.window_size,
-            offsets,
-            lists.front[rows],
-            lists.back[rows],
-            straight[rows],
-            optical_depth[rows],
-            lists.bounds,
-            depth_origin=lists.depth_origin,
-        )
+            return arrays
+        return arrays.take(np.searchsorted(rows, arrays.offsets.view(np.int64)), rows)
 
     def optical_depths(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the optical depths of some of all supersegments, float32, by float64."""
-        return media_of_values(self.deferred, self.of_cells, rows)[1]
+        return self.media_of(rows)[1]
 
+    def media_of(self, rows: Any = slice(None)) -> Media:
+        """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64."""
+        deferred, of_cells = self.deferred, self.of_cells
+        integrals = np.zeros((CELLS + 1, 4))
+        np.cumsum(of_cells[1:], axis=0, out=integrals[1:])
+        mean, spread = (a[rows].astype(np.float64) for a in (deferred.mean, deferred.spread))
+        low, high, even, above = spread_of_values(mean, spread)
+        means = (1 - even - above)[:, np.newaxis] * of_cells[0]
+        for first, last, share in ((low, high, even), (high, np.ones_like(high), above)):
+            # Over a cell at least
+            widening = np.maximum(0.5 / CELLS - (last - first) / 2, 0)
+            ends = [np.clip(x, 0, 1) * CELLS for x in (first - widening, last + widening)]
+            between = _integral(integrals, ends[1]) - _integral(integrals, ends[0])
+            means += between * (share / (ends[1] - ends[0]))[:, np.newaxis]
+        of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
+        optical_depth = (-np.log1p(-of_step) * deferred.steps[rows]).astype(np.float32)
+        straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
+        return np.clip(straight, 0, 1).astype(np.float32), optical_depth
 
-def media_of_values(deferred: DeferredVDI, of_cells: Floats, rows: Any = slice(None)) -> Media:
-    """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64.
+    def integrals(self) -> NDArray[np.float32]:
+        """Return what kernels take of a transfer function, float32 (CELLS + 2, 2, 4).
 
-    ``of_cells``: as for :class:`ValuesLook`. ``rows``: the supersegments; all by default.
-    """
-    integrals = np.zeros((CELLS + 1, 4))
-    np.cumsum(of_cells[1:], axis=0, out=integrals[1:])
-    mean, spread = (a[rows].astype(np.float64) for a in (deferred.mean, deferred.spread))
-    low, high, even, above = spread_of_values(mean, spread)
-    means = (1 - even - above)[:, np.newaxis] * of_cells[0]
-    for first, last, share in ((low, high, even), (high, np.ones_like(high), above)):
-        # Over a cell at least
-        widening = np.maximum(0.5 / CELLS - (last - first) / 2, 0)
-        ends = [np.clip(x, 0, 1) * CELLS for x in (first - widening, last + widening)]
-        between = _integral(integrals, ends[1]) - _integral(integrals, ends[0])
-        means += between * (share / (ends[1] - ends[0]))[:, np.newaxis]
-    of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
-    optical_depth = (-np.log1p(-of_step) * deferred.steps[rows]).astype(np.float32)
-    straight = means[:, :3] / np.maximum(means[:, 3:], np.finfo(np.float64).tiny)
-    return np.clip(straight, 0, 1).astype(np.float32), optical_depth
+        The low end of the range, then the integrals over cells up to each. Pairs of a large part
+        and what it leaves. Where nothing is added, nothing changes: sums are of whole numbers.
+        """
+        units = np.rint(self.of_cells * _UNITS).astype(np.int64)
+        table = np.zeros((CELLS + 2, 4), np.int64)
+        table[0] = units[0]
+        np.cumsum(units[1:], axis=0, out=table[2:])
+        whole = table / _UNITS
+        large = whole.astype(np.float32)
+        return np.stack([large, (whole - large).astype(np.float32)], axis=1)
 
 
 def spread_of_values(mean: Floats, spread: Floats) -> tuple[Floats, Floats, Floats, Floats]:

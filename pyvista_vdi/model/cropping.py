@@ -161,13 +161,14 @@ class Cropping:
         ends = np.asarray(self.normals)[:, :, None] * box  # normal, axis, low or high
         return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
 
-    def within(self, bounds: Sequence[float]) -> Within:
-        """Return what is kept of a box, and how simply that can be said.
+    def within(
+        self, bounds: Sequence[float]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Return what is kept of a box of the model frame, outside of which nothing counts.
 
-        Parameters
-        ----------
-        bounds : sequence of float, shape (6,)
-            Of the data, model frame. Regions that lie outside do not count.
+        Low and high plane of each axis, moved into the box, float64 (3, 2); and between which
+        places along each normal all is kept, (3, 2), NaN if that is nothing, or ``None`` where it
+        takes the regions to say it.
         """
         box = self.reach(bounds)
         planes = np.reshape(np.asarray(self.planes), (3, 2))
@@ -181,27 +182,14 @@ class Cropping:
         regions = [region for region in itertools.product(*there) if self.keeps(*region)]
         cuts = np.stack([low, high], axis=1)
         if not regions:
-            return Within(cuts, np.full((3, 2), np.nan))
+            return cuts, np.full((3, 2), np.nan)
         ends = np.array([(min(axis), max(axis)) for axis in zip(*regions, strict=True)])
         covered = [[i for i in t if a <= i <= b] for t, (a, b) in zip(there, ends, strict=True)]
         if len(regions) < len(list(itertools.product(*covered))):
-            return Within(cuts, None)
+            return cuts, None
         borders = np.stack([box[:, 0], low, high, box[:, 1]], axis=1)
         kept = np.stack([borders[range(3), ends[:, 0]], borders[range(3), ends[:, 1] + 1]], axis=1)
-        return Within(cuts, kept)
-
-
-@dataclass(frozen=True)
-class Within:
-    """What cropping keeps of a box.
-
-    ``cuts``: the low and the high plane of each axis, moved into the box, float64 (3, 2). ``box``:
-    low and high of what is kept along each normal, where that is a box, float64 (3, 2): NaN if it
-    is nothing. ``None`` where it takes the regions to say it.
-    """
-
-    cuts: NDArray[np.float64]
-    box: NDArray[np.float64] | None
+        return cuts, kept
 
 
 def checked_opacity_multiplier(multiplier: Any) -> float:

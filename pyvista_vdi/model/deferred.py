@@ -4,29 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidVDIError,
-)
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_floats, as_number, as_range
-from pyvista_vdi.model.packing import check_precision
-from pyvista_vdi.model.vdi import VDI
-
-if TYPE_CHECKING:
-    import os
+from pyvista_vdi.model.packing import Arrays, check_precision
+from pyvista_vdi.model.vdi import VDI, Lists, with_arrays
 
 Floats = NDArray[np.float64]
 
 
-class DeferredVDI:
+class DeferredVDI(Lists):
     """A VDI whose supersegments keep the mean and the spread of the values along the ray.
 
     It is a view-dependent stand-in for a volume that has not been classified yet:
@@ -140,7 +133,12 @@ class DeferredVDI:
         return deferred
 
     def _set(self, lists: VDI, value_range: Any, unit: Any, step: Any, importance: Any) -> None:
-        self._lists = lists
+        self._lists, self.camera, self.window_size = lists, lists.camera, lists.window_size
+        self.bounds, self.depth_origin, self.metadata = (
+            lists.bounds,
+            lists.depth_origin,
+            lists.metadata,
+        )
         low, high = as_range(value_range)
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InvalidVDIError(
@@ -175,34 +173,9 @@ class DeferredVDI:
         }
 
     @property
-    def camera(self) -> Camera:
-        """The generating view V_O."""
-        return self._lists.camera
-
-    @property
-    def window_size(self) -> tuple[int, int]:
-        """Lists along each edge of the viewport."""
-        return self._lists.window_size
-
-    @property
-    def picture_size(self) -> tuple[int, int]:
-        """Width and height of the pictures that it was made for, pixels."""
-        return self._lists.picture_size
-
-    @property
-    def offsets(self) -> NDArray[np.uint64]:
-        """Where each list begins, uint64 (W * H + 1,)."""
-        return self._lists.offsets
-
-    @property
-    def front(self) -> NDArray[np.float32]:
-        """View depth of the front faces less ``depth_origin``, float32 (n,)."""
-        return self._lists.front
-
-    @property
-    def back(self) -> NDArray[np.float32]:
-        """View depth of the back faces less ``depth_origin``, float32 (n,)."""
-        return self._lists.back
+    def arrays(self) -> Arrays:
+        """Those of :attr:`lists`, not public."""
+        return self._lists.arrays
 
     @cached_property
     def mean(self) -> NDArray[np.float32]:
@@ -237,31 +210,6 @@ class DeferredVDI:
         return low + (high - low) * self.mean.astype(np.float64)
 
     @property
-    def bounds(self) -> tuple[float, float, float, float, float, float]:
-        """Axis-aligned bounds in the model frame."""
-        return self._lists.bounds
-
-    @property
-    def depth_origin(self) -> float:
-        """World units, added to every front and back."""
-        return self._lists.depth_origin
-
-    @property
-    def metadata(self) -> dict[str, Any]:
-        """How it was made."""
-        return self._lists.metadata
-
-    @property
-    def n_supersegments(self) -> int:
-        """Number of supersegments in all lists."""
-        return self._lists.n_supersegments
-
-    @property
-    def counts(self) -> NDArray[np.int64]:
-        """Supersegments per list, int64 (H, W), bottom row first."""
-        return self._lists.counts
-
-    @property
     def nbytes(self) -> int:
         """Bytes of all arrays in memory."""
         return self._lists.nbytes
@@ -282,9 +230,8 @@ class DeferredVDI:
         In 8 bytes depths have 14 bits of the list's extent, the mean 3825 steps over the range of
         values, the spread 4 significant bits and the share 8 bits.
         """
-        if precision == self.precision:
+        if check_precision(precision) == self.precision:
             return self
-        check_precision(precision)
         lists = self._lists
         mean = self.mean.astype(np.float64)
         low, spread = np.zeros_like(mean), lists.optical_depth
@@ -294,19 +241,8 @@ class DeferredVDI:
             mean, low = whole // 15 / 255, whole % 15 / 15
             fraction, exponent = np.frexp(spread)
             spread = np.ldexp(np.round(fraction * 16) / 16, exponent)
-        color = np.stack([mean, low, self.share], axis=1)
-        plain = VDI(
-            lists.camera,
-            lists.window_size,
-            lists.offsets,
-            lists.front,
-            lists.back,
-            color,
-            spread,
-            lists.bounds,
-            depth_origin=lists.depth_origin,
-            metadata=lists.metadata,
-        )
+        color = np.stack([mean, low, self.share], axis=1).astype(np.float32)
+        plain = with_arrays(lists, lists.arrays._replace(color=color, optical_depth=spread))
         return DeferredVDI.of_lists(plain.with_precision(precision), self.about)
 
     def classified(self, **look: Any) -> VDI:
@@ -345,19 +281,6 @@ class DeferredVDI:
         >>> bone = kept.classified(cmap="bone", opacity=[0, 0, 0.4, 0.9])  # doctest: +SKIP
         """
         return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
-
-    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi`` file, or a page in which its transfer function is edited.
-
-        ``kept.save("brain.html", cmap="bone", opacity="sigmoid")``; see
-        :func:`pyvista_vdi.io.write`. `pyvista_vdi.read` opens both.
-        """
-        return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
-
-    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
-        """Return what a notebook shows: a viewer in which it is classified, or a picture."""
-        forms = registry.method("VDI._repr_mimebundle_", lambda vdi, *_: {"text/plain": repr(vdi)})
-        return forms(self, include, exclude)
 
     def __repr__(self) -> str:
         low, high = self.value_range

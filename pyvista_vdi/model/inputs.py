@@ -1,6 +1,8 @@
 """What a user calls a volume or a VDI, VTK's objects and PyVista's among it, as ours."""
 
+import functools
 import os
+import weakref
 from collections.abc import Iterable
 from typing import Any
 
@@ -33,12 +35,9 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         read: Volume = registry.method("Volume.read")(volume, array=array)
         return read if array is not None else _with_scalars(read, scalars)
     if hasattr(volume, "GetClassName"):
-        from_vtk = registry.method("Volume.from_vtk")
         if scalars is not None and not isinstance(scalars, str):
             volume, scalars = registry.method("Volume.with_scalars")(volume, scalars, None)
-        return from_vtk(  # type: ignore[no-any-return]
-            volume, scalars=scalars, preference=preference
-        )
+        return _kept_volume(volume, scalars, preference)
     if isinstance(volume, np.ndarray):
         raise InvalidVolumeError(
             f"got a NumPy array of shape {volume.shape}, which has no spacing: "
@@ -48,6 +47,24 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         "expected a pyvista.ImageData, a vtkImageData, a pyvista_vdi.Volume or a file's path; "
         f"got {_described(volume)}"
     )
+
+
+#: The volume that was made of each VTK image last, by the image's id: what it was made of, which
+#: changes with the image, and the image, whose end is its end.
+_kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
+
+
+def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
+    """Return the volume that a VTK image is, the same until the image is told to be modified."""
+    matrix = getattr(image, "GetDirectionMatrix", None)
+    made_of = (scalars, preference, image.GetMTime(), matrix and matrix().GetMTime())
+    kept = _kept.get(id(image))
+    if kept is not None and kept[0] == made_of:
+        return kept[1]
+    volume = Volume.from_vtk(image, scalars, preference)
+    forget = functools.partial(_kept.pop, id(image), None)
+    _kept[id(image)] = made_of, volume, weakref.ref(image, lambda _: forget())
+    return volume
 
 
 def _with_scalars(volume: Volume, scalars: Any) -> Volume:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -121,11 +121,8 @@ class Light:
                 "a light must be a Light, a vtkLight or a pyvista.Light; "
                 f"got {type(light).__name__}"
             )
-        kind = "scene"
-        if light.LightTypeIsHeadlight():
-            kind = "headlight"
-        elif light.LightTypeIsCameraLight():
-            kind = "camera"
+        of_camera = "camera" if light.LightTypeIsCameraLight() else "scene"
+        kind = "headlight" if light.LightTypeIsHeadlight() else of_camera
         follows = kind != "scene"  # its matrix is what VTK last made of the camera
         return cls(
             kind,
@@ -222,11 +219,7 @@ class Lights:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON."""
-        lights = [
-            {item.name: getattr(light, item.name) for item in fields(light)}
-            for light in self.lights
-        ]
-        return {"lights": lights, "two_sided": self.two_sided}
+        return {"lights": [asdict(light) for light in self.lights], "two_sided": self.two_sided}
 
 
 def _number(name: str, value: Any) -> float:

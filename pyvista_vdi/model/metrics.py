@@ -149,8 +149,13 @@ def compare_images(
     mean_square = float(np.mean(np.square(difference)))
     mean, reference_mean = float(a.mean()), float(b.mean())
     both_black = 1.0 if mean == 0 else math.inf
+    ssim = math.nan
+    if min(a.shape[:2]) >= SSIM_WINDOW:
+        from skimage.metrics import structural_similarity  # loads SciPy
+
+        ssim = float(structural_similarity(a, b, **SSIM_ARGUMENTS))
     return Comparison(
-        ssim=_ssim(a, b),
+        ssim=ssim,
         psnr=math.inf if mean_square == 0 else -10 * math.log10(mean_square),
         # Rounded to a millionth of a step: what float64 leaves of a whole number of steps
         worst_pixel=round(float(difference.max()) * 255, 6),
@@ -260,21 +265,3 @@ def list_places(
         for pixels, n, extent, of_lists, c in zip(size, count, seen, held, centre, strict=True)
     )
     return columns, rows
-
-
-def _ssim(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    if min(a.shape[:2]) < SSIM_WINDOW:
-        return math.nan
-    from skimage.metrics import structural_similarity  # loads SciPy
-
-    # Windows in which nothing differs have an SSIM of 1: only the others are filtered
-    other = (a != b).any(axis=2)
-    if not other.any():
-        return 1.0
-    ends = [np.flatnonzero(other.any(axis=axis))[[0, -1]] for axis in (1, 0)]
-    near = tuple(slice(max(0, low - SSIM_WINDOW), high + 1 + SSIM_WINDOW) for low, high in ends)
-    there = float(structural_similarity(a[near], b[near], **SSIM_ARGUMENTS))
-    middles, of_all = (
-        math.prod(edge - SSIM_WINDOW + 1 for edge in image.shape[:2]) for image in (a[near], a)
-    )
-    return 1 - (1 - there) * (middles / of_all)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
@@ -110,15 +110,6 @@ class Option:
         }
         return replace(self, name=name, **told)
 
-    @property
-    def entry(self) -> tuple[str, str]:
-        """Type and text in a docstring."""
-        words = [_WORDS.get(part, part) for part in self.kind.split(" | ") if part != "None"]
-        said = "{" + ", ".join(f'"{each}"' for each in self.choices) + "}" * bool(self.choices)
-        said = said if self.choices else " or ".join(words)
-        optional = ", optional" if self.default is None and "None" in self.kind else ""
-        return said + optional, f"{self.what[0].upper()}{self.what[1:]}. {self.more}".rstrip()
-
 
 #: What documentation calls the types of ``model/types.py``.
 _WORDS = {
@@ -207,28 +198,29 @@ def record(cls: type[_Record]) -> type[_Record]:
     told = {each.name: (each.metadata.get("option"), str(each.type)) for each in fields(cls)}
     cls.declared = {name: each.named(name, kind) for name, (each, kind) in told.items() if each}
     RECORDS.append(cls)
-    listed = "".join(["\n\n    Attributes\n    ----------\n", *entries(cls.declared.values())])
-    about, raises, tail = (cls.__doc__ or "").partition("\n    Raises\n")
-    cls.__doc__ = about.rstrip() + listed + raises + tail
     return cls
 
 
-def entries(options: Iterable[Option], indent: int = 4) -> Iterator[str]:
-    """Yield what documentation has of options, as numpydoc's parameters or attributes."""
-    margin = " " * indent
-    for each in options:
-        kind, text = each.entry
-        yield f"{margin}{each.name} : {kind}\n"
-        yield (
-            textwrap.fill(
-                text,
-                100,
-                initial_indent=margin + "    ",
-                subsequent_indent=margin + "    ",
-                break_long_words=False,
-            )
-            + "\n"
-        )
+def entries(options: Iterable[Option], indent: int = 4) -> str:
+    """Return what documentation has of options, as numpydoc's parameters."""
+    return "".join(_entry(o.name, o.kind, o.choices, o.what, o.more, indent) for o in options)
+
+
+@cache
+def _entry(
+    name: str, kind: str, choices: tuple[str, ...], what: str, more: str, indent: int
+) -> str:
+    words = [_WORDS.get(part, part) for part in kind.split(" | ") if part != "None"]
+    if choices:
+        words = ["{" + ", ".join(f'"{each}"' for each in choices) + "}"]
+    optional = ", optional" if "None" in kind else ""
+    margin = " " * (indent + 4)
+    text = f"{what[0].upper()}{what[1:]}. {more}".rstrip()
+    lines = textwrap.wrap(text, 100 - indent - 4, break_long_words=False)
+    return "".join(
+        [f"{margin[4:]}{name} : {' or '.join(words)}{optional}\n"]
+        + [f"{margin}{line}\n" for line in lines]
+    )
 
 
 @record
@@ -490,10 +482,6 @@ class QualityTarget(Options):
     def to_dict(self) -> dict[str, Any]:
         """Return what was asked for, by the names of the arguments."""
         return {name: value for name, value in self.given.items() if name != "target_angle"}
-
-
-#: The names of what :class:`GenerationOptions` takes, which tell it from a classification.
-GENERATION_NAMES = tuple(declared(GenerationOptions))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Packed supersegments: 8 bytes each in place of 24, in integers alone.
+"""The arrays of a VDI's supersegments, and the same in 8 bytes each, by integers alone.
 
 ``docs/conventions.md`` ("Packed supersegments") has the bits and what they lose.
 """
@@ -6,13 +6,12 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, TypeAlias, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.host_memory import aligned_empty
 
@@ -43,23 +42,38 @@ _LEAST_TAU = np.float32(2.0**-19)
 _COLOR_STEPS, _COLOR_BITS = 255, (8, 16, 24)
 
 
-class Lists(Protocol):
-    """The parts of a :class:`~pyvista_vdi.model.vdi.VDI` that packing reads."""
+def lengths_of_lists(offsets: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Return the supersegments of each list, int64 (W * H,)."""
+    starts = offsets.view(np.int64)
+    return starts[1:] - starts[:-1]
 
-    camera: Camera
-    depth_origin: float
+
+class Arrays(NamedTuple):
+    """The arrays of a :class:`~pyvista_vdi.VDI`, in the order of its constructor's arguments."""
+
+    offsets: NDArray[np.uint64]
     front: NDArray[np.float32]
     back: NDArray[np.float32]
     color: NDArray[np.float32]
     optical_depth: NDArray[np.float32]
 
-    @property
-    def counts(self) -> NDArray[np.int64]:
-        """Supersegments per list, int64 (H, W)."""
+    def take(self, offsets: NDArray[Any], rows: Any) -> "Arrays":
+        """Return some supersegments, by a slice or by their numbers, in lists of other offsets."""
+        return Arrays(offsets.astype(np.uint64, copy=False), *(array[rows] for array in self[1:]))
 
-    @property
-    def n_supersegments(self) -> int:
-        """Number of supersegments in all lists."""
+
+class Codes(NamedTuple):
+    """What the two words of a supersegment hold, uint32 (n,) each; colours in bits 8 to 31."""
+
+    front: NDArray[np.uint32]
+    back: NDArray[np.uint32]
+    tau: NDArray[np.uint32]
+    color: NDArray[np.uint32]
+
+    def words(self) -> NDArray[np.uint32]:
+        """Return the words, uint32 (n, 2)."""
+        low = self.front | self.back << np.uint32(14) | self.tau << np.uint32(28)
+        return np.stack([low, self.tau >> np.uint32(4) | self.color], axis=1)
 
 
 @dataclass(frozen=True)
@@ -69,13 +83,15 @@ class Packed8:
     A depth is ``step * (origins[i] + code * strides[i])`` in list i, in whole numbers below 2^24
     that float32 holds, times a power of two: exact on every device.
 
-    ``step``: step of the VDI's depth grid, world units; a power of two. ``origins``: int32 (W *
-    H,): where each list's codes begin, steps; 0 for an empty list. ``strides``: uint16 (W * H,):
-    steps per code; 0 for an empty list. ``words``: uint32 (n, 2): front in bits 0 to 13, back in 14
-    to 27, optical depth in 28 to 39, red, green and blue from 40, 48 and 56 on.
+    ``step``: step of the VDI's depth grid, world units; a power of two. ``offsets``: the lists'.
+    ``origins``: int32 (W * H,): where each list's codes begin, steps; 0 for an empty list.
+    ``strides``: uint16 (W * H,): steps per code; 0 for an empty list. ``words``: uint32 (n, 2):
+    front in bits 0 to 13, back in 14 to 27, optical depth in 28 to 39, red, green and blue from 40,
+    48 and 56 on.
     """
 
     step: float
+    offsets: NDArray[np.uint64]
     origins: NDArray[np.int32]
     strides: NDArray[np.uint16]
     words: NDArray[np.uint32]
@@ -86,52 +102,31 @@ class Packed8:
         """Bytes beside the VDI's own arrays."""
         return self.origins.nbytes + self.strides.nbytes + self.words.nbytes
 
-    def depth_codes(
-        self, first: int = 0, last: int | None = None
-    ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-        """Return the codes of fronts and backs, uint32."""
-        low, mask = self.words[first:last, 0], np.uint32(DEPTH_CODES)
-        return np.bitwise_and(low, mask), np.bitwise_and(low >> np.uint32(14), mask)
+    def codes(self, rows: slice | NDArray[np.int64]) -> Codes:
+        """Return the codes of some supersegments."""
+        low, high = self.words[rows].T
+        mask = np.uint32(DEPTH_CODES)
+        tau = low >> np.uint32(28) | (high & np.uint32(0xFF)) << np.uint32(4)
+        return Codes(low & mask, low >> np.uint32(14) & mask, tau, high & np.uint32(0xFFFFFF00))
 
-    def tau_codes(self, first: int = 0, last: int | None = None) -> NDArray[np.uint32]:
-        """Return the codes of optical depths, uint32."""
-        low, high = self.words[first:last].T
-        return np.bitwise_or(low >> np.uint32(28), (high & np.uint32(0xFF)) << np.uint32(4))
-
-    def colors(self, first: int = 0, last: int | None = None) -> NDArray[np.uint8]:
-        """Return red, green and blue, uint8 (n, 3)."""
-        words = np.ascontiguousarray(self.words[first:last, 1], "<u4")
-        return np.ascontiguousarray(words.view(np.uint8).reshape(-1, 4)[:, 1:])
-
-    def media(self, counts: NDArray[np.int64]) -> dict[str, NDArray[np.float32]]:
-        """Return front, back, color and optical_depth; ``counts`` are the lists' lengths."""
-        n = len(self.words)
-        media = {name: aligned_empty(n, np.float32) for name in ("front", "back", "optical_depth")}
-        media["color"] = aligned_empty((n, 3), np.float32)
+    def arrays(self) -> Arrays:
+        """Return the values that it stands for."""
+        n, counts = len(self.words), lengths_of_lists(self.offsets)
+        front, back, tau = (aligned_empty(n, np.float32) for _ in range(3))
+        color = aligned_empty((n, 3), np.float32)
         for lists, part in _pieces(counts):
+            codes = self.codes(part)
             own = np.repeat(np.arange(lists.start, lists.stop), counts[lists])
-            for name, values in self.media_at(part, own, *media).items():
-                media[name][part] = values
-        return media
+            front[part], back[part] = (self.depths(own, code) for code in codes[:2])
+            bits = np.where(codes.tau > 0, codes.tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
+            tau[part] = bits.astype(np.uint32).view(np.float32)
+            color[part] = unpacked_color(codes.color)
+        return Arrays(self.offsets, front, back, color, tau)
 
-    def media_at(
-        self, rows: slice | NDArray[np.int64], lists: NDArray[np.int64], *names: str
-    ) -> dict[str, NDArray[np.float32]]:
-        """Return the named ones of some supersegments, in these lists."""
-        low, high = self.words[rows, 0], self.words[rows, 1]
-        media = {}
-        if "color" in names:
-            media["color"] = unpacked_color(high)
-        for name, first_bit in (("front", 0), ("back", 14)):
-            if name in names:
-                codes = (low >> np.uint32(first_bit) & np.uint32(DEPTH_CODES)).view(np.int32)
-                whole = self.origins[lists] + codes * self.strides[lists].astype(np.int32)
-                media[name] = whole.astype(np.float32) * np.float32(self.step)
-        if "optical_depth" in names:
-            tau = low >> np.uint32(28) | (high & np.uint32(0xFF)) << np.uint32(4)
-            bits = np.where(tau > 0, tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
-            media["optical_depth"] = bits.astype(np.uint32).view(np.float32)
-        return media
+    def depths(self, lists: NDArray[np.int64], codes: NDArray[np.uint32]) -> NDArray[np.float32]:
+        """Return what codes of depth in some lists stand for, world units less the origin."""
+        whole = self.origins[lists] + codes.view(np.int32) * self.strides[lists].astype(np.int32)
+        return whole.astype(np.float32) * np.float32(self.step)
 
 
 def check_precision(precision: object) -> str:
@@ -139,32 +134,40 @@ def check_precision(precision: object) -> str:
     return one_of(precision, "precision", PRECISIONS)
 
 
-def packing_of(vdi: Lists) -> Packed8:
-    """Return a VDI's supersegments in 8 bytes each.
+def packing_of(arrays: Arrays, nearest: float) -> Packed8:
+    """Return supersegments in 8 bytes each; ``nearest`` is the least depth in front of the eye.
 
     Raises InvalidArgumentError if a list is too long for that.
     """
-    counts = vdi.counts.reshape(-1)
+    counts, n = lengths_of_lists(arrays.offsets), len(arrays.front)
     if counts.max() > DEPTH_CODES:
         raise InvalidArgumentError(
             f"a list of {counts.max()} supersegments cannot be packed into 8 bytes each: at most "
             f"{DEPTH_CODES} have depths of their own; use the precision 'exact'"
         )
     origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
-    words = np.empty((vdi.n_supersegments, 2), np.uint32)
+    words = np.empty((n, 2), np.uint32)
     # Find the shortest power of two of which at most GRID reach every depth
     step = 1.0
-    if vdi.n_supersegments:
-        farthest = max(-float(vdi.front.min()), float(vdi.back.max()))
+    if n:
+        farthest = max(-float(arrays.front.min()), float(arrays.back.max()))
         exponent = math.frexp(farthest / GRID)[1]  # farthest / GRID < 2^exponent
         if farthest / 2.0 ** (exponent - 1) <= GRID:
             exponent -= 1
         step = 2.0 ** max(exponent, _LEAST_STEP_EXPONENT)
     for lists, part in _pieces(counts):
-        origins[lists], strides[lists], front, back = _depths(vdi, step, counts[lists], part)
-        tau, color = _tau_codes(vdi.optical_depth[part]), packed_color(vdi.color[part])
-        words[part] = _words(front, back, tau, color)
-    return Packed8(step, origins, strides, words)
+        # Whole steps, exactly: a division by a power of two; what is before the eye stays there
+        faces = np.stack([arrays.front[part], arrays.back[part]], axis=1).astype(np.float64) / step
+        np.maximum(faces, np.ceil(max(nearest / step, -(2.0**30))), out=faces)
+        origins[lists], strides[lists], front, back = _depth_codes(faces, counts[lists])
+        # Round optical depths to eight significant bits, ties to even, between 2^-18 and 16256
+        tau = arrays.optical_depth[part]
+        bits = tau.view(np.uint32).astype(np.int64)
+        upper = (bits + 0x7FFF + (bits >> 16 & 1)) >> 16
+        codes = np.where(tau < _LEAST_TAU, 0, np.clip(upper - TAU_BASE + 1, 1, TAU_CODES))
+        packed = packed_color(arrays.color[part])
+        words[part] = Codes(front, back, codes.astype(np.uint32), packed).words()
+    return Packed8(step, arrays.offsets, origins, strides, words)
 
 
 def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
@@ -176,19 +179,6 @@ def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
         last = int(ends[last_list - 1])
         yield slice(first_list, last_list), slice(first, last)
         first_list, first = last_list, last
-
-
-def _words(
-    front: NDArray[np.uint32],
-    back: NDArray[np.uint32],
-    tau: NDArray[np.uint32],
-    color: NDArray[np.uint32],
-) -> NDArray[np.uint32]:
-    """Return the two words of each supersegment, colours in bits 8 to 31: see :class:`Packed8`."""
-    words = np.empty((len(front), 2), np.uint32)
-    words[:, 0] = front | back << np.uint32(14) | tau << np.uint32(28)
-    words[:, 1] = tau >> np.uint32(4) | color
-    return words
 
 
 def packed_color(color: NDArray[np.float32]) -> NDArray[np.uint32]:
@@ -203,37 +193,21 @@ def packed_color(color: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 def unpacked_color(packed: NDArray[np.uint32]) -> NDArray[np.float32]:
     """Return straight RGB, float32 (n, 3); one multiplication, which every device rounds alike."""
-    color = aligned_empty((len(packed), 3), np.float32)
-    for channel, first_bit in enumerate(_COLOR_BITS):
-        code = packed >> np.uint32(first_bit) & np.uint32(_COLOR_STEPS)
-        color[:, channel] = code.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
-    return color
+    code = packed[:, np.newaxis] >> np.array(_COLOR_BITS, np.uint32) & np.uint32(_COLOR_STEPS)
+    return code.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
 
 
-def _tau_codes(tau: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """Round optical depths to eight significant bits, ties to even, between 2^-18 and 16256."""
-    bits = tau.view(np.uint32).astype(np.int64)
-    upper = (bits + 0x7FFF + (bits >> 16 & 1)) >> 16
-    codes = np.clip(upper - TAU_BASE + 1, 1, TAU_CODES)
-    return np.where(tau < _LEAST_TAU, 0, codes).astype(np.uint32)
-
-
-def _depths(
-    vdi: Lists, step: float, counts: NDArray[np.int64], part: slice
+def _depth_codes(
+    faces: NDArray[np.float64], counts: NDArray[np.int64]
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.uint32]]:
     """Return some lists' origins, strides and codes of fronts and backs.
 
-    ``counts`` are their lengths, and ``part`` their supersegments.
+    ``faces`` are fronts and backs in steps, (n, 2), and ``counts`` the lists' lengths.
     """
     origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
     occupied = np.flatnonzero(counts)
     lengths = counts[occupied]
     first = np.cumsum(lengths) - lengths
-    # Whole steps, exactly: a division by a power of two
-    faces = np.stack([vdi.front[part], vdi.back[part]], axis=1).astype(np.float64) / step
-    if not vdi.camera.parallel_projection:
-        # What is in front of the eye stays there
-        np.maximum(faces, np.ceil(max(-vdi.depth_origin / step, -(2.0**30))), out=faces)
     origin = np.rint(faces[first, 0])
     span = np.rint(faces[first + lengths - 1, 1]) - origin
     stride = np.maximum(1, np.ceil(span / DEPTH_CODES))
@@ -254,20 +228,72 @@ def _depths(
     return origins, strides, front, back
 
 
-def gaps_and_thicknesses(
-    packed: Packed8, offsets: NDArray[np.uint64], first: int, last: int
-) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
-    """Return how far each front is behind the back before it, and each back behind its front.
+def stored_rows(packed: Packed8, name: str, first: int, last: int) -> NDArray[Any]:
+    """Return rows of an array as files store it: see :func:`packed_of_stored`.
 
-    In codes, of the supersegments ``first:last``. The first gap of a list is 0, as its code is;
-    that of ``first`` is its front's code.
+    Of ``front`` how far it is behind the back before it, in codes, and of ``back`` how far it is
+    behind its front. The first gap of a list is 0, as its code is; that of row ``first`` is its
+    front's code.
     """
-    front, back = packed.depth_codes(first, last)
-    gaps = front.copy()
-    gaps[1:] -= back[:-1]
-    begin, end = np.searchsorted(offsets, [first, last])
-    gaps[offsets[begin:end].astype(np.int64) - first] = 0
-    return gaps.astype(np.uint16), (back - front).astype(np.uint16)
+    if name in ("origin", "stride"):
+        return (packed.origins if name == "origin" else packed.strides)[first:last]
+    front, back, tau, color = packed.codes(slice(first, last))
+    if name == "back":
+        return back - front
+    if name == "optical_depth":
+        return tau
+    if name == "color":
+        return color.astype("<u4").view(np.uint8).reshape(-1, 4)[:, 1:]
+    gaps = np.append(front[:1], front[1:] - back[:-1])
+    begin, end = np.searchsorted(packed.offsets, [first, last])
+    gaps[packed.offsets[begin:end].astype(np.int64) - first] = 0
+    return gaps
+
+
+def packed_of_stored(
+    step: float,
+    offsets: NDArray[np.uint64],
+    stored: Mapping[str, NDArray[Any]],
+    chunk_rows: int,
+) -> Packed8:
+    """Return the 8-byte form of what a file stores, checked.
+
+    ``step``: of the depth grid. ``stored``: what :func:`stored_rows` gives of every ``chunk_rows``
+    rows, by its name. Raises InvalidVDIError if packing gives no such codes.
+    """
+    if (offsets[1:] < offsets[:-1]).any():
+        raise InvalidVDIError("offsets must not decrease")
+    counts = np.diff(offsets).astype(np.int64)
+    mantissa, exponent = math.frexp(step)
+    if not (mantissa == 0.5 and _LEAST_STEP_EXPONENT < exponent <= 105):
+        raise InvalidVDIError(f"the step of depths must be a power of two; got {step}")
+    origins, strides = stored["origin"].astype(np.int64), stored["stride"].astype(np.int64)
+    last = origins + strides * DEPTH_CODES
+    if (np.abs(origins) > GRID).any() or (last > GRID + DEPTH_CODES + 1).any():
+        raise InvalidVDIError("a list's depths lie beyond the VDI's grid")
+    occupied = counts > 0
+    if ((strides > 0) != occupied).any() or origins[~occupied].any():
+        raise InvalidVDIError("the lists with a stride are not those with supersegments")
+    # Add up the codes, which begin anew with every list and every chunk
+    gaps, thicknesses = stored["front"].astype(np.int64), stored["back"].astype(np.int64)
+    n, tau = len(gaps), stored["optical_depth"].astype(np.uint32)
+    begins = np.zeros(n, bool)
+    begins[offsets[:-1][occupied].astype(np.int64)] = True
+    begins[::chunk_rows] = True
+    runs, starts = np.cumsum(gaps + thicknesses), np.flatnonzero(begins)
+    before = runs[starts] - gaps[starts] - thicknesses[starts]
+    back = runs - np.repeat(before, np.diff(np.append(starts, n)))
+    if n and not (thicknesses.min() > 0 and back.max() <= DEPTH_CODES and tau.max() <= TAU_CODES):
+        raise InvalidVDIError("a supersegment has no thickness, or a code beyond its largest")
+    color = np.pad(stored["color"], ((0, 0), (1, 0))).view("<u4").reshape(-1)
+    codes = (back - thicknesses, back, tau, color)
+    return Packed8(
+        step,
+        offsets,
+        origins.astype(np.int32),
+        strides.astype(np.uint16),
+        Codes(*(code.astype(np.uint32, copy=False) for code in codes)).words(),
+    )
 
 
 def channel_differences(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -283,61 +309,3 @@ def colors_of_differences(differences: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return what :func:`channel_differences` was given."""
     blue, green, red = differences.T
     return np.stack([red + blue, green + blue, blue], axis=1)
-
-
-def packed_8(
-    step: float,
-    offsets: NDArray[np.uint64],
-    stored: Mapping[str, NDArray[Any]],
-    chunk_rows: int,
-) -> Packed8:
-    """Return the 8-byte form of what a file holds, checked.
-
-    ``step``: of the depth grid. ``offsets``: the lists'. ``stored``: ``origin``, ``stride``,
-    ``front`` and ``back`` as :func:`gaps_and_thicknesses` gives them for every ``chunk_rows``
-    supersegments, ``color`` and ``optical_depth``. ``chunk_rows``: see above. Raises
-    InvalidVDIError if packing gives no such codes.
-    """
-    if (offsets[1:] < offsets[:-1]).any():
-        raise InvalidVDIError("offsets must not decrease")
-    counts = np.diff(offsets).astype(np.int64)
-    check_grid(step, stored["origin"], stored["stride"], counts)
-    gaps, thicknesses = stored["front"].astype(np.int64), stored["back"].astype(np.int64)
-    tau = stored["optical_depth"].astype(np.uint32)
-    # Codes begin anew with every list and every chunk
-    n = len(gaps)
-    begins = np.zeros(n, bool)
-    begins[offsets[:-1][counts > 0].astype(np.int64)] = True
-    begins[::chunk_rows] = True
-    runs = np.cumsum(gaps + thicknesses)
-    starts = np.flatnonzero(begins)
-    before = runs[starts] - gaps[starts] - thicknesses[starts]
-    back = runs - np.repeat(before, np.diff(np.append(starts, n)))
-    if n and not (thicknesses.min() > 0 and back.max() <= DEPTH_CODES and tau.max() <= TAU_CODES):
-        raise InvalidVDIError("a supersegment has no thickness, or a code beyond its largest")
-    color = np.zeros((n, 4), np.uint8)
-    color[:, 1:] = stored["color"]
-    colors = color.view("<u4").reshape(-1).astype(np.uint32, copy=False)
-    front = (back - thicknesses).astype(np.uint32)
-    return Packed8(
-        step,
-        stored["origin"].astype(np.int32, copy=False),
-        stored["stride"].astype(np.uint16, copy=False),
-        _words(front, back.astype(np.uint32), tau, colors),
-    )
-
-
-def check_grid(
-    step: float, origins: NDArray[Any], strides: NDArray[Any], counts: NDArray[Any]
-) -> None:
-    """Raise InvalidVDIError where lists' depths are on no grid that packing makes."""
-    mantissa, exponent = math.frexp(step)
-    if not (mantissa == 0.5 and _LEAST_STEP_EXPONENT < exponent <= 105):
-        raise InvalidVDIError(f"the step of depths must be a power of two; got {step}")
-    first = origins.astype(np.int64)
-    last = first + strides.astype(np.int64) * DEPTH_CODES
-    if (np.abs(first) > GRID).any() or (last > GRID + DEPTH_CODES + 1).any():
-        raise InvalidVDIError("a list's depths lie beyond the VDI's grid")
-    occupied = counts > 0
-    if ((strides > 0) != occupied).any() or origins[~occupied].any():
-        raise InvalidVDIError("the lists with a stride are not those with supersegments")

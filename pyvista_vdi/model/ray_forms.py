@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.host_memory import aligned_empty
 
@@ -39,6 +40,11 @@ class Rectangle(NamedTuple):
     x1: int
     y0: int
     y1: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows."""
+        return self.x1 - self.x0, self.y1 - self.y0
 
     @property
     def pixels(self) -> int:
@@ -66,12 +72,6 @@ class PixelRays:
         form = np.concatenate([self.origin @ normal, self.direction @ normal])
         form[0] += offset
         return form
-
-
-def corners(bounds: Sequence[float]) -> Floats:
-    """Return the eight corners of axis-aligned bounds, float64 (8, 3)."""
-    x, y, z = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
-    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(8, 3)
 
 
 def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
@@ -198,17 +198,16 @@ def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float])
     """Return how the rays through a box are cropped."""
     if cropping is None:
         return CroppedRays([], [], 0)
-    within = cropping.within(bounds)
-    if within.box is None:
+    cuts, box = cropping.within(bounds)
+    if box is None:
         normals = np.repeat(cropping.normals, 2, axis=0)
-        offsets = within.cuts.ravel()
-        forms = [rays.form(normal, -at) for normal, at in zip(normals, offsets, strict=True)]
+        forms = [rays.form(normal, -at) for normal, at in zip(normals, cuts.ravel(), strict=True)]
         return CroppedRays([], forms, cropping.regions)
-    if np.isnan(within.box).any():
+    if np.isnan(box).any():
         return CroppedRays([np.array([-1.0, 0, 0, 0, 0, 0])], [], 0)  # a plane that keeps nothing
-    if np.array_equal(within.box, cropping.reach(bounds)):
+    if np.array_equal(box, cropping.reach(bounds)):
         return CroppedRays([], [], 0)
-    return CroppedRays(box_planes(rays, within.box.ravel().tolist(), cropping.normals), [], 0)
+    return CroppedRays(box_planes(rays, box.ravel().tolist(), cropping.normals), [], 0)
 
 
 def direction_forms(
@@ -264,7 +263,7 @@ def largest_value(
     low, high = np.array([-width / 2, -height / 2]), np.array([width / 2, height / 2])
     if camera.parallel_projection or near > 0:  # the bounds have a place in the window
         matrix = camera.viewport_matrix((width, height)) @ camera.model_to_view
-        x, y, _, d = matrix @ np.vstack([corners(bounds).T, np.ones(8)])
+        x, y, _, d = matrix @ np.vstack([bounds_corners(bounds).T, np.ones(8)])
         at = np.array([x / d * width / 2, y / d * height / 2])
         low, high = np.clip(at.min(axis=1), low, high), np.clip(at.max(axis=1), low, high)
     pixels = np.array([[1, a, b] for a in (low[0], high[0]) for b in (low[1], high[1])])

@@ -68,8 +68,7 @@ def check_digests(digests: Digests) -> None:
             wrong = f"cannot be read there ({error.strerror})"
         if wrong:
             raise InvalidVolumeError(
-                f"{file} {wrong}: mount or copy the whole store to the same path for all "
-                "processes, and leave it as it is while it is read"
+                f"{file} {wrong}: copy the whole store to the same path for all, and leave it as is"
             )
 
 

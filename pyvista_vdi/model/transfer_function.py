@@ -135,18 +135,14 @@ class TransferFunction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON: the whole table and its range."""
-        state = {
-            "colors": self.colors.tolist(),
-            "opacities": self.opacities.tolist(),
-            "scalar_range": list(self.scalar_range),
-            "unit_distance": self.unit_distance,
-            "interpolation": self.interpolation,
-        }
-        if self.shading is not None:
-            state["shading"] = asdict(self.shading)
-        if self.gradient_opacities is not None and self.gradient_range is not None:
-            state["gradient_opacities"] = self.gradient_opacities.tolist()
-            state["gradient_range"] = list(self.gradient_range)
+        state: dict[str, Any] = {}
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                state[name] = value.tolist()
+            elif isinstance(value, Shading):
+                state[name] = asdict(value)
+            elif value is not None or name == "unit_distance":
+                state[name] = list(value) if isinstance(value, tuple) else value
         return state
 
     @classmethod
@@ -171,16 +167,9 @@ class TransferFunction:
             ) from error
 
     def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, TransferFunction)
-            and np.array_equal(self.colors, other.colors)
-            and np.array_equal(self.opacities, other.opacities)
-            and self.scalar_range == other.scalar_range
-            and self.unit_distance == other.unit_distance
-            and self.interpolation == other.interpolation
-            and self.shading == other.shading
-            and np.array_equal(self.gradient_opacities, other.gradient_opacities)  # type: ignore[arg-type]
-            and self.gradient_range == other.gradient_range
+        return isinstance(other, TransferFunction) and all(
+            np.array_equal(own, others)
+            for own, others in zip(vars(self).values(), vars(other).values(), strict=True)
         )
 
     def __hash__(self) -> int:

@@ -38,7 +38,7 @@ class ColorMap(Protocol):
     N: int
 
 
-class Device(Protocol):
+class DeviceInUse(Protocol):
     """An OpenCL device in use."""
 
     @property
@@ -72,7 +72,7 @@ OcclusionLike: TypeAlias = Union[bool, float, "AmbientOcclusion"]
 #: Bytes, or a text such as ``"2 GiB"``.
 MemoryLike: TypeAlias = float | str
 #: A name or an index of the list of devices, or a device in use.
-DeviceLike: TypeAlias = str | int | Device
+DeviceLike: TypeAlias = str | int | DeviceInUse
 #: A client of a Dask cluster, or the address of its scheduler.
 ClientLike: TypeAlias = str | DaskClient
 

@@ -15,30 +15,97 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
-from pyvista_vdi.model.packing import Packed8, check_precision, packing_of
+from pyvista_vdi.model.packing import Arrays, Packed8, check_precision, lengths_of_lists, packing_of
 
 if TYPE_CHECKING:
     import os
 
+Bounds = tuple[float, float, float, float, float, float]
 
-#: The arrays of supersegments.
-_MEDIA = ("front", "back", "color", "optical_depth")
 #: What of a camera differs between a view on the screen and one that covers all of a volume.
 _LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
 
 
-class ClassifiedValues(Protocol):
-    """Values and a transfer function (``model/classify_values.py``)."""
+class LateArrays(Protocol):
+    """What arrays are made of when they are asked for.
+
+    Lists on the device that made them (``generation/list_arrays.py``), 8-byte supersegments
+    (``model/packing.py``), or values and a transfer function (``model/classify_values.py``).
+    """
+
+    def arrays(self) -> Arrays:
+        """Return the arrays, valid."""
+
+
+class Lists:
+    """A view, and sorted lists of disjoint supersegments along its rays."""
+
+    #: The generating view V_O.
+    camera: Camera
+    #: Lists along each edge of the viewport.
+    window_size: tuple[int, int]
+    #: Axis-aligned bounds in the model frame.
+    bounds: Bounds
+    #: World units, added to every front and back.
+    depth_origin: float
+    #: How it was made.
+    metadata: dict[str, Any]
 
     @property
-    def lists(self) -> VDI:
-        """Lists of all that is kept, transparent or not."""
+    def arrays(self) -> Arrays:
+        """All arrays, not public."""
+        raise NotImplementedError
 
-    def made(self) -> VDI:
-        """Return the arrays, checked."""
+    @property
+    def offsets(self) -> NDArray[np.uint64]:
+        """Where each list begins, uint64 (W * H + 1,); the last entry is their number n."""
+        return self.arrays.offsets
+
+    @property
+    def front(self) -> NDArray[np.float32]:
+        """View depth of the front faces less ``depth_origin``, world units, float32 (n,)."""
+        return self.arrays.front
+
+    @property
+    def back(self) -> NDArray[np.float32]:
+        """View depth of the back faces less ``depth_origin``, world units, float32 (n,)."""
+        return self.arrays.back
+
+    @property
+    def n_supersegments(self) -> int:
+        """Number of supersegments in all lists."""
+        return int(self.offsets[-1])
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Supersegments per list, int64 (H, W), bottom row first."""
+        return lengths_of_lists(self.offsets).reshape(self.window_size[::-1])
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """Width and height of the pictures that it was made for, pixels.
+
+        The plotter's or the window's that was asked for, where lists cover more or a dial has
+        chosen them; else :attr:`window_size`.
+        """
+        return picture_size(self.window_size, self.metadata)
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a file that `pyvista_vdi.read` opens: ``.vdi``, ``.html``, or ``.exr``.
+
+        The options are those of :func:`pyvista_vdi.io.write`. A page of a :class:`DeferredVDI`
+        has an editor of its transfer function, which begins with what is given here:
+        ``kept.save("brain.html", cmap="bone", opacity="sigmoid")``. An ``.exr`` holds colours.
+        """
+        return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
+        """Return what a notebook shows: a viewer, or a picture."""
+        forms = registry.method("VDI._repr_mimebundle_", lambda vdi, *_: {"text/plain": repr(vdi)})
+        return forms(self, include, exclude)
 
 
-class VDI:
+class VDI(Lists):
     """A view-dependent, piecewise constant stand-in for a classified volume.
 
     Pixel (x, y) of the generating view V_O, y = 0 at the bottom, owns list ``i = y * W + x``: the
@@ -74,20 +141,9 @@ class VDI:
         If an element breaks a rule; the message names the element and the rule.
     """
 
-    camera: Camera
-    window_size: tuple[int, int]
-    offsets: NDArray[np.uint64]
-    front: NDArray[np.float32]
-    back: NDArray[np.float32]
-    color: NDArray[np.float32]
-    optical_depth: NDArray[np.float32]
-    bounds: tuple[float, float, float, float, float, float]
-    depth_origin: float
-    metadata: dict[str, Any]
-    #: The packed form of the arrays, not public; ``None`` where they are exact.
-    packing: Packed8 | None
-    #: What a classified deferred VDI is made of, not public: its arrays are made when asked for.
-    values: ClassifiedValues | None = None
+    #: What makes the arrays when they are asked for, if they were not given; not public.
+    late: LateArrays | None = None
+    _arrays: Arrays | None
 
     def __init__(
         self,
@@ -105,49 +161,6 @@ class VDI:
     ) -> None:
         self.camera = Camera.from_any(camera)
         self.window_size = check_window_size(window_size)
-        self._set_frame(bounds, depth_origin, metadata)
-        self.offsets = _array("offsets", offsets, np.uint64, ())
-        self.front = _array("front", front, np.float32, ())
-        self.back = _array("back", back, np.float32, ())
-        self.color = _array("color", color, np.float32, (3,))
-        self.optical_depth = _array("optical_depth", optical_depth, np.float32, ())
-        self.packing = None
-        # Check that the lists' offsets and the arrays' lengths fit together
-        width, height = self.window_size
-        n_lists, n = width * height, len(self.front)
-        if len(self.offsets) != n_lists + 1:
-            raise InvalidVDIError(
-                f"offsets must have W * H + 1 = {n_lists + 1} entries for {width} x {height} "
-                f"lists; got {len(self.offsets)}"
-            )
-        if self.offsets[0] != 0:
-            raise InvalidVDIError(f"offsets[0] must be 0; got {self.offsets[0]}")
-        falls = self.offsets[1:] < self.offsets[:-1]
-        if falls.any():
-            i = int(np.argmax(falls))
-            raise InvalidVDIError(
-                f"offsets must not decrease; offsets[{i}] = {self.offsets[i]} is followed by "
-                f"{self.offsets[i + 1]}"
-            )
-        for name in _MEDIA:
-            if len(getattr(self, name)) != n or self.offsets[-1] != n:
-                lengths = [f"{each} has {len(getattr(self, each))}" for each in _MEDIA]
-                raise InvalidVDIError(
-                    f"offsets[-1] = {self.offsets[-1]} supersegments, but {', '.join(lengths)} "
-                    "entries: give each as many"
-                )
-        self._check_media()
-
-    @classmethod
-    def _of_values(cls, values: ClassifiedValues, metadata: Mapping[str, Any]) -> VDI:
-        """Return the VDI that a transfer function makes of values; arrays are made later."""
-        vdi, lists = cls.__new__(cls), values.lists
-        vdi.camera, vdi.window_size = lists.camera, lists.window_size
-        vdi._set_frame(lists.bounds, lists.depth_origin, metadata)
-        vdi.packing, vdi.values = None, values
-        return vdi
-
-    def _set_frame(self, bounds: ArrayLike, depth_origin: Any, metadata: Any) -> None:
         origin, box = as_number(depth_origin), as_floats(bounds)
         if not math.isfinite(origin):
             raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
@@ -160,54 +173,65 @@ class VDI:
         x0, x1, y0, y1, z0, z1 = box.tolist()
         self.bounds, self.depth_origin = (x0, x1, y0, y1, z0, z1), origin
         self.metadata = dict(metadata or {})
-
-    def __getattr__(self, name: str) -> Any:
-        """Make the arrays of a classified VDI."""
-        if name not in ("offsets", *_MEDIA) or self.values is None:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        made = self.values.made()
-        for array in ("offsets", *_MEDIA):
-            setattr(self, array, getattr(made, array))
-        return vars(self)[name]
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and other processes are given: arrays, not what they are made of."""
-        arrays = {} if self.values is None else {"offsets": self.offsets}
-        return {**vars(self), **arrays, "values": None}
+        arrays = Arrays(
+            _array("offsets", offsets, np.uint64, ()),
+            _array("front", front, np.float32, ()),
+            _array("back", back, np.float32, ()),
+            _array("color", color, np.float32, (3,)),
+            _array("optical_depth", optical_depth, np.float32, ()),
+        )
+        _check(arrays, self.window_size, self.nearest, origin)
+        self._arrays = _read_only(arrays)
 
     @property
-    def n_supersegments(self) -> int:
-        """Number of supersegments in all lists."""
-        return int(self.offsets[-1])
+    def arrays(self) -> Arrays:
+        """All arrays, made now if they are wanted late; not public."""
+        if self._arrays is None:
+            assert self.late is not None
+            self._arrays = _read_only(self.late.arrays())
+        return self._arrays
 
     @property
-    def counts(self) -> NDArray[np.int64]:
-        """Supersegments per list, int64 (H, W), bottom row first."""
-        width, height = self.window_size
-        starts = self.offsets.view(np.int64)
-        counts = starts[1:] - starts[:-1]
-        return counts.reshape(height, width)
+    def offsets(self) -> NDArray[np.uint64]:
+        """Where each list begins, uint64 (W * H + 1,); the last entry is their number n."""
+        known = getattr(self.late, "offsets", None)
+        return self.arrays.offsets if known is None else known
+
+    @property
+    def color(self) -> NDArray[np.float32]:
+        """Straight RGB, 0 to 1, float32 (n, 3)."""
+        return self.arrays.color
+
+    @property
+    def optical_depth(self) -> NDArray[np.float32]:
+        """From front to back along the list's centre ray, float32 (n,)."""
+        return self.arrays.optical_depth
+
+    @property
+    def nearest(self) -> float:
+        """Least front that is before the eye, not public."""
+        return -math.inf if self.camera.parallel_projection else -self.depth_origin
+
+    @property
+    def packing(self) -> Packed8 | None:
+        """The 8-byte form of the arrays, not public; ``None`` where they are exact."""
+        return self.late if isinstance(self.late, Packed8) else None
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays in memory, with those of the packed form where there is one."""
-        arrays = [vars(self)[name] for name in ("offsets", *_MEDIA) if name in vars(self)]
-        packed = 0 if self.packing is None else self.packing.nbytes
-        return sum(array.nbytes for array in arrays) + packed
-
-    @property
-    def picture_size(self) -> tuple[int, int]:
-        """Width and height of the pictures that it was made for, pixels.
-
-        The plotter's or the window's that was asked for, where lists cover more or a dial has
-        chosen them; else :attr:`window_size`.
-        """
-        return picture_size(self.window_size, self.metadata)
+        """Bytes of the arrays and of what makes them, as far as these are in memory."""
+        arrays = self._arrays or ()
+        return sum(array.nbytes for array in arrays) + getattr(self.late, "nbytes", 0)
 
     @property
     def precision(self) -> str:
         """What a supersegment takes on a device and in a file: see :meth:`with_precision`."""
         return "exact" if self.packing is None else self.packing.precision
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and other processes are given: words of 8 bytes, or arrays."""
+        arrays = None if self.packing else self.arrays
+        return {**vars(self), "_arrays": arrays, "late": self.packing}
 
     def list_at(self, x: int, y: int) -> slice:
         """Return the supersegments of pixel (x, y), y = 0 at the bottom, as a slice."""
@@ -221,23 +245,21 @@ class VDI:
 
     def equals(self, other: VDI) -> bool:
         """Whether all arrays, the view and the bounds are the same to the last bit."""
-        names = ("offsets", *_MEDIA)
         return (
             isinstance(other, VDI)
             and self.camera == other.camera
             and self.window_size == other.window_size
             and self.bounds == other.bounds
             and self.depth_origin == other.depth_origin
-            and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in names)
+            and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in Arrays._fields)
         )
 
     def with_precision(self, precision: str) -> VDI:
         """Return the VDI with supersegments of fewer bytes, on devices and in ``.vdi`` files.
 
         With 8 bytes each list that is not empty takes 16 more, so that lists of one supersegment
-        save nothing; in this process's memory the packed form lies beside the arrays. These hold
-        what it gives back, so that whatever reads them sees what is drawn. docs/conventions.md
-        ("Packed supersegments") has the bounds.
+        save nothing. The arrays hold what the packed form gives back, so that whatever reads them
+        sees what is drawn. docs/conventions.md ("Packed supersegments") has the bounds.
 
         Parameters
         ----------
@@ -258,29 +280,12 @@ class VDI:
         """
         if check_precision(precision) == self.precision:
             return self
-        if precision == "exact":
-            return self._with_media(None, {})
-        packing = packing_of(self)
-        return self._with_media(packing, packing.media(self.counts.reshape(-1)))
-
-    def _with_media(self, packing: Packed8 | None, media: Mapping[str, Any]) -> VDI:
-        arrays: dict[str, Any] = {name: media.get(name, getattr(self, name)) for name in _MEDIA}
-        about = {"depth_origin": self.depth_origin, "metadata": self.metadata}
-        arrays |= {"offsets": self.offsets, "bounds": self.bounds, **about}
-        vdi = VDI(self.camera, self.window_size, **arrays)
-        vdi.packing = packing
-        return vdi
-
-    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a ``.vdi``, ``.exr`` or ``.html`` file that `pyvista_vdi.read` opens.
-
-        The options are those of :func:`pyvista_vdi.io.write`.
-        """
-        return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
+        exact = precision == "exact"
+        return with_arrays(self, self.arrays if exact else packing_of(self.arrays, self.nearest))
 
     def __repr__(self) -> str:
         width, height = self.window_size
-        occupied = int(np.count_nonzero(np.diff(self.offsets)))
+        occupied = int(np.count_nonzero(self.counts))
         return (
             f"VDI({width} x {height} lists, {occupied} not empty, "
             f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
@@ -321,46 +326,31 @@ class VDI:
         form = registry.method("VDI._repr_html_", lambda vdi: None)
         return form(self)  # type: ignore[no-any-return]
 
-    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
-        """Return what a notebook shows: a viewer, or a picture."""
-        forms = registry.method("VDI._repr_mimebundle_", lambda vdi, *_: {"text/plain": repr(vdi)})
-        return forms(self, include, exclude)
 
-    def _check_media(self) -> None:
-        if len(self.front) == 0:
-            return
-        front, back, color, tau = self.front, self.back, self.color, self.optical_depth
-        # Extremes need no array in between. Comparisons are written so that NaN fails each
-        if not (-np.inf < front.min() and back.max() < np.inf):
-            self._require(np.isfinite(front) & np.isfinite(back), "front and back finite")
-        self._require(front < back, "front < back")
-        if not (color.min() >= 0 and color.max() <= 1):
-            inside = (color >= 0) & (color <= 1)
-            self._require(inside[:, 0] & inside[:, 1] & inside[:, 2], "0 <= color <= 1")
-        if not (tau.min() >= 0 and tau.max() < np.inf):
-            self._require((tau >= 0) & np.isfinite(tau), "optical_depth >= 0 and finite")
-        # Exact comparison: depth in front of the eye is front + depth_origin > 0
-        nearest = np.float64(-self.depth_origin)
-        if not self.camera.parallel_projection and not front.min() >= nearest:
-            self._require(front >= nearest, "in front of the eye (depth >= 0)")
-        ordered = np.ones(len(front), dtype=bool)
-        np.less_equal(back[:-1], front[1:], out=ordered[1:])
-        # None is before a list's first. As int64, which NumPy takes as indices without a copy
-        starts = self.offsets[:-1].view(np.int64)
-        ordered[starts[: np.searchsorted(starts, len(front))]] = True
-        self._require(ordered, "sorted within its list and not overlapping")
+def made_vdi(
+    camera: Camera,
+    window_size: tuple[int, int],
+    arrays: Arrays | LateArrays,
+    bounds: Bounds,
+    *,
+    depth_origin: float = 0.0,
+    metadata: Mapping[str, Any] | None = None,
+) -> VDI:
+    """Return a VDI of arrays that this package made, or of what makes them; nothing is checked."""
+    vdi = VDI.__new__(VDI)
+    vdi.camera, vdi.window_size, vdi.bounds = camera, window_size, bounds
+    vdi.depth_origin, vdi.metadata, vdi._arrays = depth_origin, dict(metadata or {}), None
+    if isinstance(arrays, Arrays):
+        vdi._arrays = _read_only(arrays)
+    else:
+        vdi.late = arrays
+    return vdi
 
-    def _require(self, good: NDArray[np.bool_], rule: str) -> None:
-        if good.all():
-            return
-        k = int(np.argmin(good))
-        i = int(np.searchsorted(self.offsets, k, side="right")) - 1
-        width = self.window_size[0]
-        raise InvalidVDIError(
-            f"supersegment {k} (list {i}: pixel x={i % width}, y={i // width}) breaks the rule "
-            f"'{rule}': front {self.front[k]}, back {self.back[k]}, color {self.color[k]}, "
-            f"optical_depth {self.optical_depth[k]}, depth_origin {self.depth_origin}"
-        )
+
+def with_arrays(vdi: Lists, arrays: Arrays | LateArrays, **changes: Any) -> VDI:
+    """Return a VDI that is like another but for its arrays, and changes of :func:`made_vdi`."""
+    names = ("camera", "window_size", "bounds", "depth_origin", "metadata")
+    return made_vdi(arrays=arrays, **{name: getattr(vdi, name) for name in names} | changes)
 
 
 def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
@@ -387,9 +377,75 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
     if array.ndim != 1 + len(item) or array.shape[1:] != item:
         wanted = f"(n, {item[0]})" if item else "(n,)"
         raise InvalidVDIError(f"{name} must have shape {wanted}; got {array.shape}")
-    view = array.view()  # the caller's own array stays writable
-    view.setflags(write=False)
-    return view
+    return array
+
+
+def _read_only(arrays: Arrays) -> Arrays:
+    views: Any = Arrays(*(array.view() for array in arrays))  # type: ignore[arg-type]
+    for view in views:
+        view.setflags(write=False)  # the caller's own stay writable
+    return views  # type: ignore[no-any-return]
+
+
+def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: float) -> None:
+    """Raise InvalidVDIError for the first rule that an element breaks.
+
+    ``nearest`` is the least front that is before the eye.
+    """
+    offsets, front, back, color, tau = arrays
+    # Check that the lists' offsets and the arrays' lengths fit together
+    (width, height), n = size, len(front)
+    if len(offsets) != width * height + 1:
+        raise InvalidVDIError(
+            f"offsets must have W * H + 1 = {width * height + 1} entries for {width} x {height} "
+            f"lists; got {len(offsets)}"
+        )
+    if offsets[0] != 0:
+        raise InvalidVDIError(f"offsets[0] must be 0; got {offsets[0]}")
+    falls = offsets[1:] < offsets[:-1]
+    if falls.any():
+        i = int(np.argmax(falls))
+        raise InvalidVDIError(
+            f"offsets must not decrease; offsets[{i}] = {offsets[i]} is followed by "
+            f"{offsets[i + 1]}"
+        )
+    if {offsets[-1], *map(len, arrays[1:])} != {n}:
+        lengths = zip(Arrays._fields[1:], arrays[1:], strict=True)
+        raise InvalidVDIError(
+            f"offsets[-1] = {offsets[-1]} supersegments, but "
+            f"{', '.join(f'{name} has {len(array)}' for name, array in lengths)} "
+            "entries: give each as many"
+        )
+
+    def require(good: Any, rule: str) -> None:
+        if good.all():
+            return
+        k = int(np.argmin(good))
+        i = int(np.searchsorted(offsets, k, side="right")) - 1
+        raise InvalidVDIError(
+            f"supersegment {k} (list {i}: pixel x={i % width}, y={i // width}) breaks the rule "
+            f"'{rule}': front {front[k]}, back {back[k]}, color {color[k]}, "
+            f"optical_depth {tau[k]}, depth_origin {depth_origin}"
+        )
+
+    if n == 0:
+        return
+    # Extremes need no array in between. Comparisons are written so that NaN fails each
+    if not (-np.inf < front.min() and back.max() < np.inf):
+        require(np.isfinite(front) & np.isfinite(back), "front and back finite")
+    require(front < back, "front < back")
+    if not (color.min() >= 0 and color.max() <= 1):
+        require(((color >= 0) & (color <= 1)).all(axis=1), "0 <= color <= 1")
+    if not (tau.min() >= 0 and tau.max() < np.inf):
+        require((tau >= 0) & np.isfinite(tau), "optical_depth >= 0 and finite")
+    if not front.min() >= np.float64(nearest):  # compared exactly
+        require(front >= np.float64(nearest), "in front of the eye (depth >= 0)")
+    ordered = np.ones(n, dtype=bool)
+    np.less_equal(back[:-1], front[1:], out=ordered[1:])
+    # None is before a list's first. As int64, which NumPy takes as indices without a copy
+    starts = offsets[:-1].view(np.int64)
+    ordered[starts[: np.searchsorted(starts, n)]] = True
+    require(ordered, "sorted within its list and not overlapping")
 
 
 def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> tuple[int, int]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
@@ -192,6 +193,35 @@ class Volume(Geometry):
                 "camera with it, towards 0"
             )
 
+    @staticmethod
+    def from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
+        """Make a volume of a VTK image, to be drawn again and again.
+
+        Parameters
+        ----------
+        image : vtkImageData or pyvista.ImageData
+            Its origin, spacing, direction matrix and ghost arrays are honoured.
+        scalars : str, optional
+            Name of the array; the active scalars by default, else the only array there is.
+        preference : {"point", "cell"}
+            Which array, where points and cells both have one of that name.
+
+        Returns
+        -------
+        Volume
+            It shares memory with the point array where that is contiguous and of a type that
+            kernels read; cell data become point data.
+
+        Raises
+        ------
+        InvalidVolumeError
+            If there are no such scalars, or not a grid of at least 2 x 2 x 2 points.
+        UnsupportedError
+            If it is another kind of grid, or the scalars have several components.
+        """
+        from_vtk = registry.method("Volume.from_vtk")
+        return from_vtk(image, scalars, preference)  # type: ignore[no-any-return]
+
     @property
     def rgba(self) -> bool:
         """Whether every point has a colour of its own; the scalar is the fourth component then."""
@@ -296,18 +326,9 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     if isinstance(array, ChunkedArray):
         return array
     packing: Any = packing_of(array)
-    stored = array.dtype if packing is None else packing.dtype
-    kind = np.dtype(stored).newbyteorder("=").name
-    long = kind in ("int64", "uint64")
-    kind = "float64" if long else _WIDENED.get(kind, kind)
-    if kind not in VOXEL_TYPES:
-        raise InvalidVolumeError(_unsupported(array.dtype))
-    found = ChunkedArray(
-        array,
-        index=index,
-        checked=_from_long_integers if long else packing,
-        dtype=kind,
-    )
+    kind, long = _voxel_type(array.dtype if packing is None else packing.dtype)
+    checked = _from_long_integers if long else packing
+    found = ChunkedArray(array, index=index, checked=checked, dtype=kind)
     _check_planes(found.shape)
     return found
 
@@ -320,8 +341,18 @@ def _check_planes(shape: tuple[int, ...]) -> None:
         )
 
 
-def _unsupported(dtype: Any) -> str:
-    return f"voxels of type {dtype} are not supported: convert to one of {', '.join(VOXEL_TYPES)}"
+def _voxel_type(dtype: Any) -> tuple[str, bool]:
+    """Return the type that voxels of a type are held as, and whether those are 64-bit integers."""
+    kind = np.dtype(dtype).newbyteorder("=").name
+    if kind in ("int64", "uint64"):
+        return "float64", True
+    kind = _WIDENED.get(kind, kind)
+    if kind not in VOXEL_TYPES:
+        known = ", ".join(VOXEL_TYPES)
+        raise InvalidVolumeError(
+            f"voxels of type {dtype} are not supported: convert to one of {known}"
+        )
+    return kind, False
 
 
 def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
@@ -342,13 +373,8 @@ def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
     if array.size == 0:
         raise InvalidVolumeError(f"the volume is empty: its shape is {array.shape}")
     _check_planes(array.shape)
-    kind = array.dtype.newbyteorder("=").name
-    if kind in ("int64", "uint64"):
-        return _from_long_integers(array)
-    kind = _WIDENED.get(kind, kind)
-    if kind not in VOXEL_TYPES:
-        raise InvalidVolumeError(_unsupported(array.dtype))
-    return np.ascontiguousarray(array, dtype=kind)
+    kind, long = _voxel_type(array.dtype)
+    return _from_long_integers(array) if long else np.ascontiguousarray(array, dtype=kind)
 
 
 def _from_long_integers(array: NDArray[np.generic]) -> NDArray[np.generic]:

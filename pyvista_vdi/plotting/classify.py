@@ -37,6 +37,12 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
 #: Most entries of a table: building it takes PyVista time by the square, some seconds here.
 _MAX_COLORS = 16384
 
+#: Arguments whose whole effect is a lookup table.
+_IN_TABLES = {"clim", "n_colors", "opacity", "cmap", "flip_scalars", "log_scale", "theme"}
+#: Transfer functions by what they were made of, so many at most.
+_made: dict[tuple[Any, ...], TransferFunction] = {}
+_MOST_MADE = 64
+
 #: ``add_volume``'s names of VTK's mappers.
 _MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
 
@@ -152,20 +158,29 @@ def transfer_function_from_arguments(
 ) -> TransferFunction:
     """Return the transfer function that ``Plotter.add_volume`` would draw with.
 
-    ``scalars`` are the volume's values, of any shape, ``rgba`` says whether they are RGBA, and the
-    arguments are those of :class:`Looks`. The table has ``n_colors`` entries. PyVista stores
-    opacities as bytes and cuts them at 0.998; so does this. What cannot be used is refused by name.
+    ``scalars`` are the volume's values or their ends, of any shape, ``rgba`` says whether they are
+    RGBA, and the arguments are those of :class:`Looks`. The table has ``n_colors`` entries. PyVista
+    stores opacities as bytes and cuts them at 0.998; so does this. What cannot be used is refused
+    by name. Of the same table and arguments it is the same object.
     """
     looks = Looks(**arguments)
     if rgba:
         looks = looks.of_rgba()
-    prop = looks.volume_property(looks.lookup_table(scalars), rgba=rgba)
-    if looks.shade:
-        looks.light(prop)
-    function = transfer_function_from_property(prop, rgba=rgba)
-    if rgba or looks.opacity_unit_distance is not None:
-        return function
-    return function.replace(unit_distance=None)
+    table = looks.lookup_table(scalars)
+    others = [value for name, value in arguments.items() if name not in _IN_TABLES]
+    made_of = (table.values.tobytes(), table.scalar_range, table.log_scale, rgba, repr(others))
+    made = None if table is looks.cmap else _made.get(made_of)
+    if made is None:
+        prop = looks.volume_property(table, rgba=rgba)
+        if looks.shade:
+            looks.light(prop)
+        made = transfer_function_from_property(prop, rgba=rgba)
+        if not (rgba or looks.opacity_unit_distance is not None):
+            made = made.replace(unit_distance=None)
+        if len(_made) >= _MOST_MADE:
+            _made.clear()
+        _made[made_of] = made
+    return made
 
 
 def note_mapper(mapper: str) -> None:

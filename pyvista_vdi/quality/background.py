@@ -97,7 +97,7 @@ class Worker:
                 self._thread.start()
 
     def pause(self, seconds: float) -> None:
-        """Let the thread rest for so long from now on; 0: it goes on."""
+        """Pause the thread for so long from now on; 0: it continues."""
         self._paused_until = time.monotonic() + seconds if seconds else 0.0
 
     def clear(self) -> None:

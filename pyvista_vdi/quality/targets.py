@@ -25,8 +25,8 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_WINDOW
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, QualityTarget
 from pyvista_vdi.model.packing import Precision
@@ -444,7 +444,7 @@ def measure(request: GenerationRequest, angle: float) -> Measurement:
     # What no VDI does better: the volume where the view covers it, lit as the view has it
     sides = viewport_planes(request.camera, size)
     world = request.camera.model_transform
-    corners = rays.corners(volume.bounds) @ world[:3, :3].T + world[:3, 3]
+    corners = bounds_corners(volume.bounds) @ world[:3, :3].T + world[:3, 3]
     covered = all(((corners - side[:3]) @ side[3:]).min() >= 0 for side in sides)
     if not covered or look.shading is not None:
         shown = view.replace(options=RenderOptions(clipping_planes=None if covered else sides))

@@ -21,6 +21,7 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_whole
+from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -498,7 +499,7 @@ def seen_region(
     The whole picture where a box reaches behind the eye. SSIM is not told within five pixels of
     the picture's border.
     """
-    corners = np.concatenate([rays.corners(box) for box in boxes])
+    corners = np.concatenate([bounds_corners(box) for box in boxes])
     points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
     depth, edges = points[:, 2], np.asarray(size)
     if not camera.parallel_projection and depth.max() <= 0:

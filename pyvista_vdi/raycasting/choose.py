@@ -38,14 +38,14 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     asked for   where                                                  kernel
     ==========  =====================================================  ========================
     a preview   everywhere                                             ``preview``
-    segments    CPU; lists suit blocks                                 ``segments_of_blocks``
+    segments    CPU; lists suit blocks                                 ``segments``, LANES=16
     segments    elsewhere                                              ``segments``
     first hits  everywhere                                             ``first_hits``
     a picture   CPU; V_O's view, a list for each pixel; not cropped    ``raycast_aligned_view``
     a picture   V_O's view, but for cropped ones that blocks can draw  ``raycast``, ONE_LIST=1
     a picture   CPU; rays have many lists in common; not cropped       ``raycast_packets``
-    a picture   CPU; lists suit blocks                                 ``raycast_blocks``
-    a picture   all else                                               ``raycast``, ONE_LIST=0
+    a picture   CPU; lists suit blocks                                 ``raycast``, LANES=16
+    a picture   all else                                               ``raycast``
     ==========  =====================================================  ========================
 
     Lists *suit blocks* that have offsets of 32 bits, and rays in float32. Of pictures, *CPU* also
@@ -54,7 +54,6 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     """
     prepared, options = scene.prepared, scene.options
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
-    short = {"DEPTH": lists["DEPTH"], "PACKED": lists["PACKED"]}
     compensated = summation(options.preview_samples or prepared.most_media)
     sums = {"COMPENSATED": compensated}
     walk = {
@@ -71,12 +70,10 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         return Variant(kernels.PREVIEW, switches, items, GROUP, counts, whole=True)
 
     # What rays cross of one of several VDIs
-    if scene.segments and device.is_cpu and suit_blocks:
-        blocks = kernels.SEGMENTS_OF_BLOCKS
-        return Variant(blocks, {**short, **walk}, 0, GROUP // LANES, {}, LANES)
     if scene.segments:
-        switches = {**lists, **walk, "SEGMENT_ROWS": int(device.is_cpu)}
-        return Variant(kernels.SEGMENTS, switches, 0, GROUP, {})
+        lanes = LANES if device.is_cpu and suit_blocks else 1
+        switches = {**lists, **walk, "SEGMENT_ROWS": int(device.is_cpu), "LANES": lanes}
+        return Variant(kernels.SEGMENTS, switches, 0, GROUP // lanes, {}, lanes)
 
     def by_columns(
         kernel: KernelDeclaration, switches: Mapping[str, int | str], rays: int = 1, **own: Any
@@ -115,15 +112,15 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         switches = {**lists, **sums, **ways, "SKIP_EMPTY": walk["SKIP_EMPTY"]}
         across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
         return Variant(kernels.RAYCAST_PACKETS, switches, packets.items, LANES, across, LANES)
-    if in_blocks:
-        return by_columns(kernels.RAYCAST_BLOCKS, {**short, **walk, **sums}, LANES)
-    return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 0})
+    lanes = LANES if in_blocks else 1
+    switches = {**lists, **walk, **sums, "ONE_LIST": 0, "LANES": lanes}
+    return by_columns(kernels.RAYCAST, switches, lanes)
 
 
 def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> Variant:
     """Return the variant that merges what rays cross of several VDIs."""
     compensated = summation(sum(scene.prepared.most_media for scene in scenes))
+    lanes = LANES if device.is_cpu and compensated < 2 else 1
     switches = {"STREAMS": len(scenes), "COMPENSATED": compensated}
-    if device.is_cpu and compensated < 2:
-        return Variant(kernels.MERGE_BLOCKS, switches, 0, GROUP // LANES, {}, LANES)
-    return Variant(kernels.MERGE, {**switches, "SEGMENT_ROWS": int(device.is_cpu)}, 0, GROUP, {})
+    switches |= {"SEGMENT_ROWS": int(device.is_cpu), "LANES": lanes}
+    return Variant(kernels.MERGE, switches, 0, GROUP // lanes, {}, lanes)

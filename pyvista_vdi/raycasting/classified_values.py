@@ -1,29 +1,15 @@
 """Classify deferred VDIs on a device, in one pass over their supersegments."""
 
-import threading
-import weakref
-
-import numpy as np
-from numpy.typing import NDArray
-
-from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime, padded
+from pyvista_vdi.device import get_runtime, padded
 from pyvista_vdi.device.constants import GROUP
 from pyvista_vdi.errors import NoDeviceError
-from pyvista_vdi.model.classify_values import CELLS, Media, classify
-from pyvista_vdi.model.deferred import DeferredVDI, Floats
+from pyvista_vdi.model.classify_values import CELLS, Media, ValuesLook, classify
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import DeviceLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.kernels import CLASSIFY_VALUES
-
-#: Whole numbers of this stand for opacities: sums over all cells stay below 2^63.
-_UNITS = 2.0**40
-
-#: What is on devices of a deferred VDI: means, spreads and steps, which no look changes.
-_uploads: weakref.WeakKeyDictionary[DeferredVDI, dict[Runtime, dict[str, DeviceBuffer]]] = (
-    weakref.WeakKeyDictionary()
-)
-_lock = threading.Lock()
+from pyvista_vdi.raycasting.prepared import kept_values
 
 
 def classify_on_device(
@@ -43,15 +29,15 @@ def classify_on_device(
     if n == 0 or 12 * n > runtime.info.max_allocation:
         return classify(deferred, transfer_function)
 
-    def on_device(deferred: DeferredVDI, of_cells: Floats) -> Media:
+    def on_device(look: ValuesLook) -> Media:
         with (
-            runtime.upload(integrals(of_cells), "integrals of a transfer function") as table,
-            runtime.buffer((n, 3), name="supersegment colours") as colors,
-            runtime.buffer((n,), name="optical depths") as optical_depths,
+            runtime.upload(look.integrals(), "integrals of a transfer function") as table,
+            runtime.result((n, 3), name="supersegment colours") as colors,
+            runtime.result((n,), name="optical depths") as optical_depths,
         ):
             launch = runtime.bind(
                 CLASSIFY_VALUES,
-                **values_on_device(runtime, deferred),
+                **kept_values(runtime, deferred).values,
                 integrals=table,
                 colors=colors,
                 optical_depths=optical_depths,
@@ -60,39 +46,3 @@ def classify_on_device(
             return runtime.download(colors), runtime.download(optical_depths)
 
     return classify(deferred, transfer_function, on_device)
-
-
-def release_values(deferred: DeferredVDI) -> None:
-    """Release a deferred VDI's values from devices; they are uploaded when used again."""
-    with _lock:
-        gone = _uploads.pop(deferred, None)
-    del gone  # without the lock
-
-
-def integrals(of_cells: Floats) -> NDArray[np.float32]:
-    """Return what kernels take of a transfer function, float32 (CELLS + 2, 2, 4).
-
-    The low end of the range, then the integrals over cells up to each. Pairs of a large part and
-    what it leaves. Where nothing is added, nothing changes: sums are of whole numbers.
-    """
-    units = np.rint(of_cells * _UNITS).astype(np.int64)
-    table = np.zeros((CELLS + 2, 4), np.int64)
-    table[0] = units[0]
-    np.cumsum(units[1:], axis=0, out=table[2:])
-    whole = table / _UNITS
-    large = whole.astype(np.float32)
-    return np.stack([large, (whole - large).astype(np.float32)], axis=1)
-
-
-def values_on_device(runtime: Runtime, deferred: DeferredVDI) -> dict[str, DeviceBuffer]:
-    """Return means, spreads and steps on a device, made once for a deferred VDI."""
-    with runtime.holding(_lock):
-        kept = _uploads.setdefault(deferred, {})
-        if runtime not in kept:
-            arrays = {"means": deferred.mean, "spreads": deferred.spread, "steps": deferred.steps}
-            kept[runtime] = {
-                name: runtime.upload(np.ascontiguousarray(array), f"{name} of values")
-                for name, array in arrays.items()
-            }
-            runtime.finish()  # a thread with another queue may use them next
-        return kept[runtime]

@@ -1,4 +1,4 @@
-"""The arguments of the kernels of ``opencl/raycasting/``, ``cpu16/`` and ``multi_vdi/``."""
+"""The arguments of the kernels of ``opencl/raycasting/`` and ``opencl/multi_vdi/``."""
 
 from pyvista_vdi.device import KernelDeclaration, Struct
 
@@ -10,7 +10,6 @@ FRAME = Struct(
     width="int",
     height="int",
     planes="int",
-    has_opaque_depth="int",
     depth_origin="float",
     cutoff="float",
     first_depth="float",
@@ -40,36 +39,6 @@ _DRAWN: dict[str, str | Struct] = {
     "masks": "ulong*",
     "frame": FRAME,
 }
-_PICTURE: dict[str, str | Struct] = {"part": "int4", "image": "float4*"}
-_SEGMENTS: dict[str, str | Struct] = {
-    "cells": "int2*",
-    "first_cell": "int",
-    "number": "int",
-    "band_rays": "int",
-    "depth_shift": "float",
-    "margin": "float",
-    "capacity": "int",
-    "pool": "float*",
-    "ends": "int*",
-    "contributes": "uchar*",
-    "dark": "float*",
-}
-_MERGE: dict[str, str | Struct] = {
-    "pool": "float*",
-    "capacity": "int",
-    "ends": "int*",
-    "contributes": "uchar*",
-    "rays": "int",
-    "cells": "int2*",
-    "first_cell": "int",
-    "width": "int",
-    "height": "int",
-    "transmittance_cutoff": "float",
-    "streams_of": "int*",
-    "needed": "int*",
-    "image": "float4*",
-    "owner": "short*",
-}
 _CELLS: dict[str, str | Struct] = {
     "alone": "short*",
     "vdi": "int",
@@ -80,8 +49,46 @@ _CELLS: dict[str, str | Struct] = {
 _CLEARED: dict[str, str | Struct] = {"pixels": "ulong"}
 _COUNTS: dict[str, str | Struct] = {"grid": COUNTED, "changes": "uint*"}
 
-# One ray in a work-item
-RAYCAST = KernelDeclaration("raycasting/raycast.cl", "raycast", **_DRAWN, **_PICTURE)
+# A ray in a work-item, or sixteen
+RAYCAST = KernelDeclaration(
+    "raycasting/raycast.cl", "raycast", **_DRAWN, part="int4", image="float4*"
+)
+SEGMENTS = KernelDeclaration(
+    "multi_vdi/segments.cl",
+    "segments",
+    **_DRAWN,
+    cells="int2*",
+    first_cell="int",
+    number="int",
+    band_rays="int",
+    depth_shift="float",
+    margin="float",
+    capacity="int",
+    pool="float*",
+    ends="int*",
+    contributes="uchar*",
+    dark="float*",
+)
+MERGE = KernelDeclaration(
+    "multi_vdi/merge.cl",
+    "merge",
+    pool="float*",
+    capacity="int",
+    ends="int*",
+    contributes="uchar*",
+    rays="int",
+    cells="int2*",
+    first_cell="int",
+    width="int",
+    height="int",
+    transmittance_cutoff="float",
+    streams_of="int*",
+    needed="int*",
+    image="float4*",
+    owner="short*",
+)
+
+# A ray in a work-item
 FIRST_HITS = KernelDeclaration(
     "raycasting/first_hits.cl",
     "first_hits",
@@ -94,21 +101,19 @@ FIRST_HITS = KernelDeclaration(
 PREVIEW = KernelDeclaration(
     "raycasting/preview.cl", "preview", **_DRAWN, counts="uint*", samples="int", image="float4*"
 )
-SEGMENTS = KernelDeclaration("multi_vdi/segments.cl", "segments", **_DRAWN, **_SEGMENTS)
-MERGE = KernelDeclaration("multi_vdi/merge.cl", "merge", **_MERGE)
 
 # Sixteen rays in a work-item, on CPUs
-RAYCAST_BLOCKS = KernelDeclaration("cpu16/raycast.cl", "raycast_blocks", **_DRAWN, **_PICTURE)
 RAYCAST_PACKETS = KernelDeclaration(
-    "cpu16/packets.cl", "raycast_packets", **_DRAWN, epipole="float4", **_PICTURE
+    "raycasting/packets.cl",
+    "raycast_packets",
+    **_DRAWN,
+    epipole="float4",
+    part="int4",
+    image="float4*",
 )
 RAYCAST_ALIGNED_VIEW = KernelDeclaration(
-    "cpu16/aligned_view.cl", "raycast_aligned_view", **_DRAWN, origin="int2", image="float4*"
+    "raycasting/aligned_view.cl", "raycast_aligned_view", **_DRAWN, origin="int2", image="float4*"
 )
-SEGMENTS_OF_BLOCKS = KernelDeclaration(
-    "cpu16/segments.cl", "segments_of_blocks", **_DRAWN, **_SEGMENTS
-)
-MERGE_BLOCKS = KernelDeclaration("cpu16/merge.cl", "merge_blocks", **_MERGE)
 
 # What is made of a VDI and of a picture before
 CLEAR_IMAGE = KernelDeclaration("raycasting/clear.cl", "clear_image", **_CLEARED, image="float4*")
@@ -116,7 +121,7 @@ CLEAR_HITS = KernelDeclaration("raycasting/clear.cl", "clear_hits", **_CLEARED, 
 PREPARE_LISTS = KernelDeclaration(
     "raycasting/prepare.cl",
     "prepare_lists",
-    starts="OFFSET_T*",
+    starts="ulong*",
     headers="HEADER_T*",
     fronts="float*",
     backs="float*",
@@ -133,7 +138,7 @@ PREPARE_LISTS = KernelDeclaration(
 PREPARE_PACKED = KernelDeclaration(
     "raycasting/prepare_packed.cl",
     "prepare_packed",
-    starts="OFFSET_T*",
+    starts="ulong*",
     headers="OFFSET_T*",
     origins="int*",
     strides="ushort*",
@@ -159,7 +164,7 @@ CLASSIFY_VALUES = KernelDeclaration(
 PREPARE_VALUES = KernelDeclaration(
     "raycasting/prepare_values.cl",
     "prepare_values",
-    starts="OFFSET_T*",
+    starts="ulong*",
     places="ulong*",
     fronts="float*",
     backs="float*",
@@ -179,7 +184,7 @@ PREPARE_VALUES = KernelDeclaration(
 COUNT_SUPERSEGMENTS = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_supersegments",
-    offsets="OFFSET_T*",
+    starts="ulong*",
     fronts="float*",
     backs="float*",
     **_COUNTS,
@@ -187,12 +192,21 @@ COUNT_SUPERSEGMENTS = KernelDeclaration(
 COUNT_PACKED = KernelDeclaration(
     "raycasting/occupancy.cl",
     "count_packed",
-    offsets="OFFSET_T*",
+    starts="ulong*",
     origins="int*",
     strides="ushort*",
     words="uint2*",
     step="float",
     **_COUNTS,
+)
+ENDS_OF_LISTS = KernelDeclaration(
+    "raycasting/occupancy.cl",
+    "ends_of_lists",
+    starts="ulong*",
+    fronts="float*",
+    backs="float*",
+    lists="uint",
+    ends="float2*",
 )
 OCCUPIED_SLABS = KernelDeclaration(
     "raycasting/occupancy.cl", "occupied_slabs", counts="uint*", stacks="uint", masks="ulong*"
@@ -202,7 +216,6 @@ ALONE_ENDS = KernelDeclaration(
     "alone_ends",
     **_CELLS,
     opaque_depth="float*",
-    has_opaque_depth="int",
     ends="float*",
 )
 TAKE_CELLS = KernelDeclaration(

@@ -301,12 +301,9 @@ def _draw_alone(
                 ends = stack.enter_context(runtime.result(size[::-1], name="ends of rays"))
             elif picture is image:
                 picture = stack.enter_context(runtime.result(image.shape, name="one's picture"))
-            has_ends = int(scene.ends is not None)
-            end_rays(
-                items, group, vdi=number, opaque_depth=opaque, has_opaque_depth=has_ends, ends=ends
-            )
+            end_rays(items, group, vdi=number, opaque_depth=opaque, ends=ends)
             scene = replace(scene, segments=False, only=part)
-            enqueue(scene, scene.arguments(forms, ends, has_ends=True), picture)
+            enqueue(scene, scene.arguments(forms, ends), picture)
             take(items, group, vdi=number, picture=picture)
         if (cells.alone == cells.NOBODY).any():
             take(items, group, vdi=cells.NOBODY, picture=image)
@@ -337,7 +334,7 @@ class _MergedCells:
             launch = runtime.bind(
                 variant.kernel,
                 variant.switches,
-                **scene.arguments(*on_device[i], has_ends=scene.ends is not None),
+                **scene.arguments(*on_device[i]),
                 number=number,
                 depth_shift=scene.reference_depth - nearest,
                 margin=margin,

@@ -10,7 +10,7 @@ from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.ray_forms import reference_depth
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, with_arrays
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.kernels import CLEAR_HITS, CLEAR_IMAGE
 from pyvista_vdi.raycasting.picking import FirstHit
@@ -67,7 +67,7 @@ def draw(
     scene = Scene.of(prepared, request, hit)
     # Buffers that are host memory in use are waited for when they are released
     with scene.on_device() as (forms, ends):
-        enqueue(scene, scene.arguments(forms, ends, has_ends=scene.ends is not None), image)
+        enqueue(scene, scene.arguments(forms, ends), image)
 
 
 def enqueue(scene: Scene, arguments: dict[str, Any], image: DeviceBuffer) -> None:
@@ -126,17 +126,12 @@ def band(vdi: VDI, y0: int, y1: int) -> VDI:
     """Return the lists in rows y0 to y1 - 1, from the bottom, as a VDI."""
     width, height = vdi.window_size
     first, last = (int(vdi.offsets[y * width]) for y in (y0, y1))
-    part = slice(first, last)
-    return VDI(
-        vdi.camera.tile((width, height), (0, height - y1), (width, y1 - y0)),
-        (width, y1 - y0),
-        vdi.offsets[y0 * width : y1 * width + 1] - np.uint64(first),
-        vdi.front[part],
-        vdi.back[part],
-        vdi.color[part],
-        vdi.optical_depth[part],
-        vdi.bounds,
-        depth_origin=vdi.depth_origin,
+    offsets = vdi.offsets[y0 * width : y1 * width + 1] - np.uint64(first)
+    return with_arrays(
+        vdi,
+        vdi.arrays.take(offsets, slice(first, last)),
+        camera=vdi.camera.tile((width, height), (0, height - y1), (width, y1 - y0)),
+        window_size=(width, y1 - y0),
     )
 
 

@@ -87,7 +87,7 @@ _COORDINATE_FORMS = 4
 _MOST_DRAWN = 0.9
 
 #: A frame's forms and the ends of its rays, on the device.
-OnDevice: TypeAlias = tuple[DeviceBuffer, DeviceBuffer]
+OnDevice: TypeAlias = tuple[DeviceBuffer, DeviceBuffer | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,16 +204,13 @@ class Scene:
     def on_device(self) -> Iterator[OnDevice]:
         """Upload the forms and the ends of rays for a ``with`` block."""
         runtime = self.prepared.runtime
-        ends = np.zeros(1, np.float32) if self.ends is None else self.ends
-        with (
-            runtime.upload(self.forms, "rays") as forms,
-            runtime.upload(ends, "opaque depth") as depth,
-        ):
-            yield forms, depth
+        with runtime.upload(self.forms, "rays") as forms, contextlib.ExitStack() as stack:
+            ends = None
+            if self.ends is not None:
+                ends = stack.enter_context(runtime.upload(self.ends, "opaque depth"))
+            yield forms, ends
 
-    def arguments(
-        self, forms: DeviceBuffer, ends: DeviceBuffer, *, has_ends: bool
-    ) -> dict[str, Any]:
+    def arguments(self, forms: DeviceBuffer, ends: DeviceBuffer | None) -> dict[str, Any]:
         """Return the arguments that every kernel takes which draws a frame."""
         prepared, cutoff = self.prepared, self.options.transmittance_cutoff
         occupancy = prepared.occupancy
@@ -230,7 +227,6 @@ class Scene:
                 width=self.size[0],
                 height=self.size[1],
                 planes=self.planes,
-                has_opaque_depth=has_ends,
                 depth_origin=prepared.depth_origin,
                 cutoff=-math.log(cutoff) if self.segments else cutoff,
                 first_depth=occupancy.first_depth,

@@ -117,15 +117,10 @@ class DeviceVolume:
         voxels = held_voxels(runtime, volume, transfer_function, room)
         scale = voxels.scale
         self.zero, self.unit = (0.0, 1.0) if scale is None else (scale.low, scale.unit)
-        table = _table(runtime, transfer_function, native=scale is None)
-        self._visible = _visibility(runtime, volume, voxels, table, transfer_function)
-        distances = _distances(runtime, volume, voxels, self._visible) if skip_empty else None
+        classes = _Classes.of(runtime, volume, voxels, transfer_function, by_scalar)
+        table, self._visible = classes.table, classes.visible
+        distances = classes.distances if skip_empty else None
         nearest = transfer_function.interpolation == "nearest"
-        ends = None
-        if nearest and by_scalar and scale is None:
-            ends = integer_ends(runtime, volume, voxels.ranges)
-        if ends is not None:
-            table = _media_of_scalars(runtime, table, *ends)
 
         # What samples are shaded by
         scalars = volume.finite_range if part is None else lambda: part.scalar_range
@@ -135,7 +130,7 @@ class DeviceVolume:
         self.variant: Variant = replace(
             voxels.variant,
             nearest=nearest,
-            by_scalar=ends is not None,
+            by_scalar=table.by_scalar,
             part=part is not None,
             compensated=summation(media),
             **shading,
@@ -251,6 +246,47 @@ class _Table:
     entries: int
     low: float
     per_scalar: float  # entries per scalar; a huge number where the range is a single one
+    by_scalar: bool = False  # whether it has the media
+
+
+@dataclass(frozen=True)
+class _Classes:
+    """What a transfer function makes of a volume: its table, and which macrocells are visible.
+
+    ``distances``: of the macrocells from visible ones; None where too few are transparent.
+    """
+
+    table: _Table
+    visible: DeviceBuffer
+    distances: DeviceBuffer | None
+
+    @classmethod
+    def of(
+        cls,
+        runtime: Runtime,
+        volume: Volume,
+        voxels: HeldVoxels,
+        transfer_function: TransferFunction,
+        by_scalar: bool,
+    ) -> "_Classes":
+        """Return them, made once for a volume's last classification on a device."""
+        uploads, key = uploads_of(volume), (transfer_function, voxels.scale, by_scalar)
+        with runtime.holding(uploads.lock):
+            kept = uploads.classified.get(runtime)
+            if kept is not None and kept[0] == key:
+                return kept[1]  # type: ignore[no-any-return]
+            table = _table(runtime, transfer_function, native=voxels.scale is None)
+            visible = _visibility(runtime, volume, voxels, table, transfer_function)
+            distances = _distances(runtime, volume, voxels, visible)
+            ends = None
+            if by_scalar and voxels.scale is None and transfer_function.interpolation == "nearest":
+                ends = integer_ends(runtime, volume, voxels.ranges)
+            if ends is not None:
+                table = _media_of_scalars(runtime, table, *ends)
+            made = cls(table, visible, distances)
+            runtime.finish()  # a thread with another queue may use them next
+            uploads.classified[runtime] = key, made
+            return made
 
 
 def _table(runtime: Runtime, transfer_function: TransferFunction, *, native: bool) -> _Table:
@@ -275,7 +311,7 @@ def _media_of_scalars(runtime: Runtime, table: _Table, first: int, last: int) ->
         numbers = {"entries": table.entries, "low": table.low, "per_scalar": table.per_scalar}
         launch(padded(n, GROUP), GROUP, **numbers, first=first, count=n)
         runtime.finish()  # the table may be host memory in use
-    return _Table(media, n, float(first), 1.0)
+    return _Table(media, n, float(first), 1.0, by_scalar=True)
 
 
 def _gradient(

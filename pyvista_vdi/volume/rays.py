@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -155,7 +156,7 @@ class Variant:
     cropped: bool = False
     sharp: bool = False
 
-    @property
+    @cached_property
     def defines(self) -> dict[str, Define]:
         """The ``-D`` options, all of them in every program."""
         return {

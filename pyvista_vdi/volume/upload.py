@@ -149,8 +149,8 @@ def release_voxels(volume: Volume) -> None:
 class _Uploads:
     """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
 
-    Voxels and the scalar range of each macrocell, by device and scaling; the last classification's
-    ambient occlusion, by device, with what it was computed from.
+    Voxels and the scalar range of each macrocell, by device and scaling; the last classification,
+    and its ambient occlusion, by device, with what they were computed from.
     """
 
     def __init__(self) -> None:
@@ -163,6 +163,7 @@ class _Uploads:
         #: The least and the largest voxel of 16 bits; None before anyone has asked.
         self.ends: tuple[int, int] | None = None
         self.blanked: dict[Runtime, DeviceBuffer] = {}
+        self.classified: dict[Runtime, tuple[Any, Any]] = {}
         self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
 
 

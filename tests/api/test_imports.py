@@ -81,7 +81,8 @@ LEVELS_WITHIN = {
 
 #: Rooms that need VTK or PyVista in order to be imported.
 WITH_VTK = (
-    *("vtk_pipeline", "plotting", "extensions.paraview", "extensions.web.scenes"),
+    *("vtk_pipeline", "plotting", "extensions.paraview", "extensions.web.scene"),
+    "extensions.web.plotter_widget",
     *("extensions.series.shown", "extensions.sets.shown"),
     "extensions.paraview.parts",
 )

@@ -22,7 +22,6 @@ from pyvista_vdi.cli import main
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import declared
-from pyvista_vdi.model.volume import Grid
 
 PACKAGE = Path(pvdi.__file__).parent
 ARRAY = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)
@@ -149,12 +148,6 @@ ENTRIES = {
         | {"every": 1, "values": ARRAY, "first": (0, 0, 0), "at": 0.0, "overwrite": True}
         | {"comm": OneRank(), "transfer_function": TABLE},
         ["spacing", "origin", "append", "device", "max_supersegments"],
-    ),
-    "generate_on_mpi": lambda vdi: (
-        importlib.import_module("pyvista_vdi.extensions.large.on_mpi").generate_on_mpi,
-        {"values": ARRAY, "first": (0, 0, 0), "grid": Grid.of(VOLUME), "camera": CAMERA}
-        | {"window_size": SIZE, "transfer_function": TABLE, "comm": OneRank()},
-        ["options", "device", "name", "metadata", "tolerance"],
     ),
     "Volume": lambda vdi: (pvdi.Volume, {"array": ARRAY}, None),
     "Camera": lambda vdi: (

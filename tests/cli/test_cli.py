@@ -19,6 +19,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io, registry
 from pyvista_vdi.cli import inputs, parser
 from pyvista_vdi.io.volumes import read_volume
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
 
 NAMES = """
@@ -95,8 +96,11 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("generat", "there is no verb 'generat': did you mean 'generate'?"),
-        ("zzz", "there is no verb 'zzz': known are devices, generate, render, view, turntable"),
+        ("generat", "there is no subcommand 'generat': did you mean 'generate'?"),
+        (
+            "zzz",
+            "there is no subcommand 'zzz': known are devices, generate, render, view, turntable",
+        ),
         ("info", "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
         # Not "argument VOLUME: not allowed with argument --example" for the value behind it
         (
@@ -119,14 +123,14 @@ def test_version(capsys):
         ("generate a -o b --quality best", "invalid choice: 'best'"),
         ("generate a -o b --position 1 2", "expected 3 arguments"),
         ("compare a --angles '0;5'", "got '0;5'"),
-        ("serve a --port 65536", "a port is a number up to 65535; got '65536'"),
+        ("serve a --port 65536", "a port's number, up to 65535; got '65536'"),
         ("serve", "one of the arguments VOLUME --example is required"),
         (
             "benchmark --profile full",
-            "no verb 'benchmark': the paper's tables .* benchmarks/paper.py",
+            "no subcommand 'benchmark': the paper's tables .* benchmarks/paper.py",
         ),
         ("compare a --repeats 0", "a whole number above 0; got '0'"),
-        ("view a --rate nan", "frames per second, 0 or above; got 'nan'"),
+        ("view a --rate nan", "frames per second, above 0 and up to 1000; got 'nan'"),
         ("render a -o b --background pinkish", "'pinkish' is no colour"),
         ("render a -o b --background 0,0,2", "R,G,B from 0 to 1"),
     ],
@@ -142,8 +146,8 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
     cases(
         ("info none.vdi", "none.vdi cannot be read: No such file or directory"),
         ("info no.vdi", "is not a VDI file"),
-        ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing is for volumes"),
-        ("view a.vdi --scalars x --screenshot b.png", "--scalars is for volumes"),
+        ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing 1 1 2 is for volumes"),
+        ("view a.vdi --scalars x --screenshot b.png", "--scalars x is for volumes"),
         ("view a.vdi --cmap bone --screenshot b.png", "a.vdi has its look, and --cmap bone"),
         ("info none.nrrd", "none.nrrd does not exist"),
         ("render a.vdi -o a.gif", "the name must end in .png"),
@@ -192,7 +196,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ("view no.html --screenshot b.png", "no.html is not a page with a VDI"),
         ("view cut.html --screenshot b.png", "cut.html is damaged: .*copy it from its"),
         ("render cut.html -o b.png", "cut.html is damaged"),
-        ("info a.html --spacing 1 1 2", "a.html is a VDI: --spacing is for vol"),
+        ("info a.html --spacing 1 1 2", "a.html is a VDI: --spacing 1 1 2 is for vol"),
     ),
 )
 def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkeypatch):
@@ -522,18 +526,18 @@ def test_camera_options(folder):
 def test_looks_and_their_changes(asked, looks, occlusion):
     options = parser.parse(f"generate a -o b.vdi {asked}".split())
     assert inputs.classification(options) == looks
-    assert inputs.ambient_occlusion(options) == occlusion
+    assert inputs.given(options, GenerationOptions).get("ambient_occlusion") == occlusion
 
 
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        ("-o b.vdi --cmap bone --n-colors 9", "give --n-colors, --cmap to 'pyvista-vdi render'"),
-        ("-o b.vdi --tf soft", "give --tf to 'pyvista-vdi render'"),
-        ("-o b.vdi --shade", "--shade needs the volume's gradients"),
-        ("-o b.vdi --quality high", "give --max-supersegments"),
-        ("-o b.vdi --occlusion-radius 3", "--occlusion-radius: ambient occlusion"),
-        ("-o b.exr", ".exr files hold colours: write a .vdi file"),
+        ("-o b.vdi --cmap bone --n-colors 9", "--n-colors 9 is for 'pyvista-vdi render'"),
+        ("-o b.vdi --tf soft", "--tf soft is for 'pyvista-vdi render'"),
+        ("-o b.vdi --shade", "--shade is for VDIs that have colours"),
+        ("-o b.vdi --quality high", "--quality high is for VDIs that have colours"),
+        ("-o b.vdi --occlusion-radius 3", "--occlusion-radius 3 is for VDIs that have colours"),
+        ("-o b.exr", "no colours yet: write a .vdi file in place of .exr"),
     ],
 )
 def test_what_values_cannot_have_is_refused_by_options_names(
@@ -543,7 +547,7 @@ def test_what_values_cannot_have_is_refused_by_options_names(
     words = f"generate none.nrrd {asked} --classification deferred".split()
     assert says in complaint(capsys, *words)  # before the volume is looked for
     message = complaint(capsys, "generate", "none.nrrd", "-o", "b.vdi", "--importance", "1,2")
-    assert message.startswith("--importance 1,2 says what is kept")
+    assert message.startswith("--importance 1 2 is for --classification deferred")
     assert not list(tmp_path.iterdir())
 
 
@@ -563,4 +567,4 @@ def test_the_module_is_the_command():
         [sys.executable, "-m", "pyvista_vdi", "generat"], capture_output=True, text=True
     )
     assert result.returncode == 2
-    assert result.stderr.startswith("pyvista-vdi: error: there is no verb 'generat'")
+    assert result.stderr.startswith("pyvista-vdi: error: there is no subcommand 'generat'")

@@ -136,7 +136,7 @@ def test_a_film_has_its_frames(saved, capsys, tmp_path, suffix):
         ("movie v.vdi -o v.gif", "nothing moves"),
         ("movie v.vdi -o v.gif --path a.json", "a.json cannot be read"),
         ("movie v.vdi -o absent/v.gif --turn 9", "absent"),
-        ("movie v.vdi -o v.gif --path a b --azimuth 9", "--azimuth is"),
+        ("movie v.vdi -o v.gif --path a b --azimuth 9", "--azimuth 9 is"),
         ("turntable v.vdi -o v.gif --cmap bone", "--cmap bone is for VDIs that keep values"),
         ("turntable v.vdi -o v.gif --fps 0", "above 0"),
     ],

@@ -94,12 +94,12 @@ def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("--example brain --level 0", "--level is for files that hold several volumes"),
-        ("--example brain --time-index 0", "--time-index is for files that hold several"),
+        ("--example brain --level 0", "--level 0 is for files that hold several volumes"),
+        ("--example brain --time-index 0", "--time-index 0 is for files that hold several"),
         ("--example brain --scheduler x", "--scheduler is for stores"),
         ("none.ome.zarr", "none.ome.zarr cannot be read as zarr"),
         ("x.zarr --level best", "auto, or a level's number"),
-        ("x.ome.zarr --spacing 1 1 1", "--spacing is for one level of a store"),
+        ("x.ome.zarr --spacing 1 1 1", "--spacing 1 1 1 is for one level of a store"),
     ],
 )
 def test_mistakes_are_named(arguments, message, image, tmp_path, capsys, monkeypatch):

@@ -141,7 +141,7 @@ def test_a_frame_and_background_work_go_on_after_a_loss(runtime, driver):
         ("generate", "generation/march_lists.cl"),
         ("render", "raycasting/prepare.cl"),
         ("render", "raycasting/occupancy.cl"),
-        ("render", "raycasting/raycast.cl cpu16/raycast.cl cpu16/packets.cl"),
+        ("render", "raycasting/raycast.cl raycasting/packets.cl"),
         ("render_volume", "volume/render_volume.cl"),
     ],
 )

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from drawing import generate_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
-from pyvista_vdi import Camera
+from pyvista_vdi import Camera, render
 from pyvista_vdi.device import GrowingArray, Runtime
-from pyvista_vdi.generation.list_arrays import growing_lists
 from pyvista_vdi.generation.march import March
 from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.options import GenerationOptions
@@ -51,14 +50,11 @@ def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, make, camer
     assert memory in ("as it is", "copied") or len(grown) >= 2
 
 
-@pytest.mark.parametrize("copied", [False, True], ids=["in place", "copied"])
 def test_a_slice_is_marched_before_the_sum_of_the_one_before_is_waited_for(
-    monkeypatch, runtime, make, copied
+    monkeypatch, runtime, make
 ):
-    if copied:
-        monkeypatch.setattr(Runtime, "in_place_alignment", None)
-    elif runtime.in_place_alignment is None:
-        pytest.skip("the device copies")
+    if runtime.in_place_alignment is None:
+        pytest.skip("the device has room for all lists")
     done = []
     chunks, later = March.chunks, Runtime.download_later
 
@@ -82,20 +78,29 @@ def test_a_slice_is_marched_before_the_sum_of_the_one_before_is_waited_for(
     assert done == ["march", *["march", "wait"] * (n - 1), "wait"]
 
 
-def test_offsets_that_no_buffer_holds_are_copied(monkeypatch, runtime):
-    in_place, target = [], Runtime.target
+@pytest.mark.parametrize("camera", [CAMERA, HALF_BESIDE], ids=["inside", "half beside"])
+def test_lists_stay_in_a_devices_own_memory_until_somebody_wants_them(
+    monkeypatch, runtime, make, camera
+):
+    wanted = make(camera)
+    monkeypatch.setattr(runtime, "is_cpu", False)  # so that it has memory of its own
+    picture = render(wanted, camera, WINDOW, device=runtime)
+    uploaded, upload = set(), Runtime.upload
 
-    def noted(self, array, name):
-        in_place.append(name)
-        return target(self, array, name)
+    def noted(self, array, name="array"):
+        uploaded.add(name)
+        return upload(self, array, name)
 
-    monkeypatch.setattr(Runtime, "target", noted)
-    for most in (80007, 80008):  # of 8 bytes for each of 10001
-        monkeypatch.setattr(runtime, "info", replace(runtime.info, max_allocation=most))
-        in_place.clear()
-        with growing_lists(runtime, (1000, 10), 2, 16):
-            holds = most == 80008 and runtime.in_place_alignment is not None
-            assert ("list offsets" in in_place) == holds
+    vdi = make(camera)
+    monkeypatch.setattr(Runtime, "upload", noted)
+    assert np.array_equal(render(vdi, camera, WINDOW, device=runtime), picture)
+    assert vdi.nbytes == 0
+    assert not uploaded & {"list offsets", "front depths", "supersegment colours"}
+    before = runtime.allocated
+    make(camera)  # the device has the lists of one VDI
+    assert runtime.allocated < before
+    assert vdi.equals(wanted)
+    assert vdi.with_precision("8-byte").equals(wanted.with_precision("8-byte"))
 
 
 def test_a_gpu_makes_larger_slices():

@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from drawing import generate_chunked
+from drawing import generate_in_blocks
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, InvalidVolumeError, TransferFunction, Volume
@@ -156,6 +156,9 @@ def test_colours_and_uneven_chunks_are_refused_by_name(source, tmp_path):
     assert Volume(np.asarray(array)).rgba
     with pytest.raises(InvalidVolumeError, match="different lengths.*rechunk"):
         Volume(dask.from_array(VALUES, chunks=((8, 12, 10), 9, 10)))
+    lazy = dask.from_array(VALUES)
+    with pytest.raises(InvalidVolumeError, match="compute_chunk_sizes"):
+        Volume(lazy[lazy[:, 0, 0] < 200])
 
 
 @pytest.mark.extension("large")
@@ -165,7 +168,9 @@ def test_generate_makes_it_block_by_block(default_runtime):
     vdi = pvdi.generate(volume, camera, (32, 18), opacity="linear", device=default_runtime.info)
     function = TransferFunction.from_dict(vdi.metadata["transfer_function"])
     whole = Volume(VALUES, (1, 2, 3))
-    expected = generate_chunked(whole, camera, (32, 18), function, chunks=CHUNKS)
+    expected = generate_in_blocks(
+        whole, camera, (32, 18), function, chunks=CHUNKS, block_bytes=2**24
+    )
     assert vdi.n_supersegments > 500
     np.testing.assert_array_equal(vdi.front, expected.front)
     np.testing.assert_array_equal(vdi.color, expected.color)

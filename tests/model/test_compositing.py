@@ -16,7 +16,6 @@ from pyvista_vdi.model.compositing import (
     composite,
     merge,
     opacity,
-    over,
     split,
     transmittance,
 )
@@ -25,13 +24,6 @@ EPS = np.finfo(np.float64).eps
 
 #: A handful of operations, each rounded once, on values up to 1.
 FEW = 16 * EPS
-
-
-@st.composite
-def pixels(draw):
-    """Premultiplied RGBA."""
-    alpha = draw(st.floats(0, 1, allow_subnormal=False))
-    return np.append(draw(colors()) * alpha, alpha)
 
 
 @st.composite
@@ -80,23 +72,12 @@ def test_beer_lambert_over_lengths(tau, whole, first, second):
     assert compositing.optical_depth_over_length(tau, whole, whole) == tau
 
 
-@given(pixels(), pixels(), pixels())
-def test_over(a, b, c):
-    """It is associative, nothing is neutral, what is opaque hides, and images are pixels."""
-    np.testing.assert_allclose(over(over(a, b), c), over(a, over(b, c)), rtol=0, atol=FEW)
-    nothing, opaque = np.zeros(4), np.append(b[:3], 1.0)
-    np.testing.assert_array_equal(over(a, nothing), a)
-    np.testing.assert_array_equal(over(nothing, a), a)
-    np.testing.assert_array_equal(over(opaque, a), opaque)
-    np.testing.assert_array_equal(over([[a, b]], [[b, c]]), [[over(a, b), over(b, c)]])
-
-
 @given(st.lists(st.tuples(colors(), optical_depths(20)), max_size=8))
 def test_composite_is_repeated_over(media):
     expected = np.zeros(4)
     for color, tau in reversed(media):
         alpha = float(opacity(tau))
-        expected = over(np.append(color * alpha, alpha), expected)
+        expected = np.append(color * alpha, alpha) + (1 - alpha) * expected
     result = composite(
         np.array([color for color, _ in media]).reshape(-1, 3), [t for _, t in media]
     )

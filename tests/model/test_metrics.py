@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from pyvista_vdi import Camera, InvalidArgumentError
 from pyvista_vdi.model.metrics import (
-    SSIM_ARGUMENTS,
     ListEdges,
     compare_images,
     list_edges,
@@ -131,22 +130,6 @@ def test_premultiplied_images_are_blended_over_the_background():
     flat = np.broadcast_to(np.float32([0.2, 0.1, 0.0]), (12, 12, 3))
     assert compare_images(image, flat).worst_pixel == 0
     assert compare_images(image, flat, background=(1, 1, 1)).worst_pixel == pytest.approx(127.5)
-
-
-def test_ssim_leaves_out_no_window_of_a_difference():
-    """Only where pictures differ it is filtered: against scikit-image's of the whole pictures."""
-    from skimage.metrics import structural_similarity
-
-    rng = np.random.default_rng(5)
-    for case in range(40):
-        image = rng.random((*rng.integers(11, 60, size=2), 3))
-        other = image.copy()
-        first = [rng.integers(0, edge) for edge in image.shape[:2]]
-        patch = tuple(slice(k, k + rng.integers(1, 30)) for k in first)
-        other[patch] = rng.random(other[patch].shape)
-        expected = structural_similarity(image, other, **SSIM_ARGUMENTS)
-        found = compare_images(image, other).ssim
-        assert found == pytest.approx(expected, abs=1e-12), (case, image.shape, patch)
 
 
 def test_a_pixel_that_is_not_finite_is_named():

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from oracle import assert_explained, total
 
 from pyvista_vdi import VDI, Camera, render
-from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, gaps_and_thicknesses, packed_8
+from pyvista_vdi.model.packing import DEPTH_CODES, Packed8, packed_of_stored, stored_rows
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 BOUNDS = (-1, 1, -1, 1, -1, 1)
@@ -127,21 +127,14 @@ def test_the_8_byte_form_is_within_its_bounds(rng):
 def test_gaps_and_thicknesses_give_the_codes_back(rng, rows):
     vdi = hard_vdi(rng).with_precision("8-byte")
     packed, n = vdi.packing, vdi.n_supersegments
-    parts = [
-        gaps_and_thicknesses(packed, vdi.offsets, first, min(first + rows, n))
-        for first in range(0, n, rows)
-    ]
-    none = np.zeros((2, 0), np.uint16)
-    gaps, thick = (np.concatenate(p) for p in zip(none, *parts, strict=True))
     stored = {
-        "origin": packed.origins,
-        "stride": packed.strides,
-        "front": gaps,
-        "back": thick,
-        "color": packed.colors(),
-        "optical_depth": packed.tau_codes(),
+        name: np.concatenate(
+            [stored_rows(packed, name, k, min(k + rows, n)) for k in range(0, max(n, 1), rows)]
+        )
+        for name in ("front", "back", "color", "optical_depth")
     }
-    again = packed_8(packed.step, vdi.offsets, stored, rows)
+    stored |= {"origin": packed.origins, "stride": packed.strides}
+    again = packed_of_stored(packed.step, vdi.offsets, stored, rows)
     assert np.array_equal(again.words, packed.words)
 
 
@@ -158,8 +151,8 @@ def test_long_lists_and_one_ulp_each(count):
     # All but the last are thinner than a code
     touching[-1, 1] = 1e6
     wide = slabs_vdi(CAMERA, touching, 1.0, bounds=BOUNDS)
-    codes = np.diff(wide.with_precision("8-byte").packing.depth_codes(), axis=0)
-    assert codes.min() == 1
+    codes = wide.with_precision("8-byte").packing.codes(slice(None))
+    assert (codes.back - codes.front).min() == 1
 
 
 @pytest.mark.every(11)

@@ -68,7 +68,7 @@ def points_on_rays(made, a, b, depth):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_depth_range_is_that_of_the_corners(seed):
     _, bounds, camera, *_ = scene(seed)
-    corners = rays.corners(bounds)
+    corners = rays.bounds_corners(bounds)
     sides = np.reshape(bounds, (3, 2))
     assert {tuple(c) for c in corners} == set(itertools.product(*sides))
     depths = direct_pixels(camera, WINDOW, corners)[2]
@@ -233,7 +233,7 @@ def test_box_planes_keep_what_is_inside(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_pixels_of_points_hold_what_the_points_surround(seed):
     rng, bounds, camera, *_ = scene(seed)
-    points = rays.corners(bounds)
+    points = rays.bounds_corners(bounds)
     part = rays.pixels_of_points(camera, WINDOW, points)
     inside = np.dot(rng.dirichlet(np.ones(8), 200), points)
     a, b, _ = direct_pixels(camera, WINDOW, np.vstack([points, inside]))

@@ -184,7 +184,10 @@ def test_rungs_are_in_order_and_in_range_whatever_was_measured(losses):
         ({"quality": "reference", "max_bytes": 10}, "'reference' is what is made without a dial"),
         ({"quality": "reference", "full_fps": 10}, "'reference' is what is made without a dial"),
         ({"quality": "fast", "max_supersegments": 7}, "'fast' chooses .* max_supersegments=7"),
-        ({"max_bytes": 9, "settings": pvdi.Settings(tolerance=0.1)}, "max_bytes=9 chooses .* tolerance=0.1"),
+        (
+            {"max_bytes": 9, "settings": pvdi.Settings(tolerance=0.1)},
+            "max_bytes=9 chooses .* tolerance=0.1",
+        ),
         ({"target_ssim": 0.9, "precision": "8-byte"}, "=0.9 chooses .* precision='8-byte'"),
         ({"precision": "float16"}, "precision must be .exact. or .8-byte."),
         ({"target_ssim": 0.9, "window": (160, 10)}, "160 x 10 pixels has no SSIM"),

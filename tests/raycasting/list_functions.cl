@@ -15,15 +15,15 @@ __kernel void counts_passing(int count, __global const ulong *faces, __global co
     if (i >= count)
         return;
     const Lists all = {0, faces, faces, 0, 0, 0.0f, 0.0f};
-    const List list = {lists[i].x * LISTS_PER_BUNDLE, lists[i].y, 0, 0, 0.0f};
+    const ListMet list = {lists[i].x * LISTS_PER_BUNDLE, lists[i].y, 0, 0, 0.0f};
     const bool away = how[i].x != 0;
     const int guess = min(how[i].y, list.count);
     const float depth = away ? depths[i] : -depths[i];
     Search search = begin_search(away ? how[i].y : list.count - guess);
     Faces face;
     int left = list.count + 3; // comparisons; more than any search takes
-    while (!first_supersegment(&search, &all, list, depth, away, 0.0f, &face) && --left > 0)
-        ;
+    while (!first_supersegment(&search, &all, list, depth, true, away, 0.0f, &face) && --left > 0)
+        guess_again(&search, list, false);
     results[i] = left == 0 ? -1 : away ? search.p : list.count - search.p;
 }
 
@@ -40,8 +40,8 @@ __kernel void frame_layout(int count, __global int *result)
 {
     Frame frame;
     const int found[] = {OFFSET(lists_wide), OFFSET(lists_high), OFFSET(width), OFFSET(height), OFFSET(planes),
-                         OFFSET(has_opaque_depth), OFFSET(depth_origin), OFFSET(cutoff), OFFSET(first_depth),
-                         OFFSET(slabs_per_depth), OFFSET(depth_step), OFFSET(nearest_offset), OFFSET(regions),
+                         OFFSET(depth_origin), OFFSET(cutoff), OFFSET(first_depth), OFFSET(slabs_per_depth),
+                         OFFSET(depth_step), OFFSET(nearest_offset), OFFSET(regions),
                          sizeof(Frame)};
     if (get_global_id(0) == 0) {
         for (int n = 0; n < count; ++n)

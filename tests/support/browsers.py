@@ -281,14 +281,14 @@ class Page:
 
 
 def show_scene(page, scene):
-    """Show a scene of web/scenes/scene.py, and its VDI, in a page's viewer."""
+    """Show a scene of web/scene.py, and its VDI, in a page's viewer."""
     page.evaluate(
         """async ([scene, data]) => {
           const { Scene } = await import("./scene.js");
           viewer.scene = new Scene(bytesOf(scene));
           await viewer.load(bytesOf(data));
         }""",
-        [in_base64(part) for part in (scene.data, file_of(scene.vdi))],
+        [in_base64(part) for part in (scene.data, file_of(scene.shown))],
     )
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pyvista_vdi.generation import generate
+from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting import multi_vdi, picking, raycast
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 from pyvista_vdi.volume import render
@@ -29,20 +31,25 @@ def generate_vdi(*arguments, **options):
     return generate.generate_vdi(request(*arguments, **options))
 
 
-def generate_chunked(*arguments, chunks=None, block_bytes=None, **options):
-    """A VDI of a volume in blocks, on this device."""
-    from pyvista_vdi.extensions.large.generate import generate_chunked
+class InChunks:
+    """An array in memory with the manners of one of zarr."""
 
-    asked = request(*arguments, **options)
-    return generate_chunked(asked, chunks=chunks, block_bytes=block_bytes)
+    def __init__(self, array, chunks):
+        self.array, self.shape, self.dtype, self.chunks = array, array.shape, array.dtype, chunks
+
+    def __getitem__(self, box):
+        return self.array[box]
 
 
-def generate_on_dask(*arguments, client, workers=None, chunks=None, block_bytes=None, **options):
-    """A VDI of a volume in blocks, on the workers of a cluster."""
-    from pyvista_vdi.extensions.large.on_dask import generate_on_dask
+def generate_in_blocks(volume, *arguments, chunks=None, client=None, block_bytes=1, **options):
+    """A VDI of a volume in blocks of a chunk each; of one in memory, in such chunks."""
+    from pyvista_vdi.extensions.large.generate import generate_in_blocks
 
-    cuts = {"chunks": chunks, "block_bytes": block_bytes}
-    return generate_on_dask(request(*arguments, **options), client=client, workers=workers, **cuts)
+    if chunks is not None:
+        array = ChunkedArray(InChunks(volume.array, chunks))
+        volume = Volume(array, volume.spacing, volume.origin, volume.direction, name=volume.name)
+    asked = request(volume, *arguments, **options)
+    return generate_in_blocks(asked, client, block_bytes=block_bytes)
 
 
 def frame(vdi, camera, size=None, **options):

@@ -14,7 +14,7 @@ BROUGHT_BY = {
     r"\.vdiset\b|\bset\b|VDISet|generate_set": "sets",
     r"\bparaview\b": "paraview",
     r"InSitu": "insitu",
-    r"generate_on_mpi|--scheduler|\bchunks\b": "large",
+    r"--scheduler|\bchunks\b": "large",
 }
 
 

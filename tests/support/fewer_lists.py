@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.io.vdi_file.coarse import of_rows, rows_of
+from pyvista_vdi.io.vdi_file.coarse import rows_of
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, with_arrays
 
 #: Share of the way to the middle of the bounds at which their corners are looked at.
 _INNER = 0.5
@@ -38,16 +38,18 @@ def subsampled_lists(vdi: VDI, along_x: int, along_y: int) -> VDI:
 
     taken = (y[:, np.newaxis] * vdi.window_size[0] + x).ravel()
     offsets, rows = rows_of(vdi, taken, vdi.counts.reshape(-1)[taken])
-    result = of_rows(vdi, view, window, offsets, rows, vdi.optical_depth[rows])
     packing = vdi.packing
-    if packing is not None:
-        result.packing = replace(
+    if packing is None:
+        arrays: Any = vdi.arrays.take(offsets, rows)
+    else:
+        arrays = replace(
             packing,
+            offsets=offsets.astype(np.uint64),
             origins=packing.origins[taken],
             strides=packing.strides[taken],
             words=packing.words[rows],
         )
-    return result
+    return with_arrays(vdi, arrays, camera=view, window_size=window, metadata={})
 
 
 def lists_crossed(vdi: VDI, camera: Camera) -> NDArray[np.float64]:

@@ -10,17 +10,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pyvista_vdi import TransferFunction
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    NoDeviceError,
-    VDIError,
-    VDIFileError,
-)
+from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError, VDIFileError
 from pyvista_vdi.extensions.insitu import InSitu
-from pyvista_vdi.extensions.large.on_mpi import generate_on_mpi
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.model.volume import Grid
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support import moving_field
@@ -28,7 +20,7 @@ from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 COMM = MPI.COMM_WORLD
 #: Where the volume's 47 x 41 x 50 points (z, y, x) are cut for four ranks.
-CUTS = ((0, 20, 47), (0, 41), (0, 27, 50))
+CUTS = ((0, 24, 47), (0, 41), (0, 27, 50))
 
 
 def own_block(volume, rank):
@@ -46,34 +38,31 @@ def own_block(volume, rank):
 def same(folder):
     """Write the VDI of four blocks, with gradients and occlusion, which need others' points."""
     volume = volume_of("uint8")
-    values, first = own_block(volume, (COMM.rank + 3) % 4)
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
-    vdi = generate_on_mpi(
-        values,
-        first,
-        Grid.of(volume),
-        VIEWS["all of it"](volume),
-        WINDOW,
-        function,
-        max_supersegments=8,
-        ambient_occlusion=8.0,
-        comm=COMM,
-    )
-    assert (vdi is None) == (COMM.rank > 0)
-    if vdi is not None:
-        vdi.save(folder / "mpi.vdi")
+    options = {"max_supersegments": 8, "ambient_occlusion": 8.0, "precision": "exact"}
+    options |= {"transfer_function": function, "comm": COMM}
+    camera = VIEWS["all of it"](volume)
+    with InSitu(folder / "mpi.vdis", camera, WINDOW, volume.dimensions, **options) as show:
+        show(*own_block(volume, (COMM.rank + 3) % 4), 0.0)
 
 
-def failing(_folder):
+def failing(folder):
     """One rank has no device: all must say so, and nobody waits."""
     volume = volume_of("uint8")
     values, first = own_block(volume, COMM.rank)
+    scene = VIEWS["all of it"](volume), WINDOW, volume.dimensions
+    options = {"clim": (0, 200), "comm": COMM, "overwrite": True}
     device = "nobody" if COMM.rank == 2 else None
-    arguments = (Grid.of(volume), VIEWS["all of it"](volume), WINDOW, transfer_for(volume))
-    with pytest.raises(NoDeviceError, match="rank 2: .*nobody"):
-        generate_on_mpi(values, first, *arguments, comm=COMM, device=device)
-    with pytest.raises(InvalidArgumentError, match="one grid of blocks"):
-        generate_on_mpi(values[:, :, 1:], first, *arguments, comm=COMM)
+    with (
+        InSitu(folder / "f.vdis", *scene, device=device, **options) as show,
+        pytest.raises(NoDeviceError, match="rank 2: .*nobody"),
+    ):
+        show(values, first, 0.0)
+    with InSitu(folder / "f.vdis", *scene, **options) as show:
+        with pytest.raises(InvalidArgumentError, match="one grid of blocks"):
+            show(values[:, :, 1:], first, 0.0)
+        with pytest.raises(InvalidArgumentError, match="values must be the same on all ranks"):
+            show(values.astype("u1" if COMM.rank else "f4"), first, 0.0)
 
 
 #: What a mistake gives to an argument, and what happens to be right of some.
@@ -97,17 +86,14 @@ def mistakes(folder, every=4):
     """
     signal.alarm(240)
     camera = VIEWS["all of it"](volume_of("uint8"))
-    table = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 1))
     right = np.random.default_rng(0).random((8, 16, 16), dtype=np.float32)
     at = (0, 0, 8 * COMM.rank)
     making = {"path": folder / "m.vdis", "camera": camera, "window_size": (8, 6)}
     making |= {"dimensions": (16,) * 3, "comm": COMM, "overwrite": True, "clim": (0, 1)}
     others = ("spacing", "origin", "every", "device", "append", "cmap", "opacity", "nobody")
     others += ("max_supersegments", "precision", "ambient_occlusion", "sample_distance", "lights")
+    others += ("transfer_function", "tolerance", "classification")
     showing = {"values": right, "first": at, "at": 0.0}
-    grid = Grid((16,) * 3, (1.0,) * 3, (0.0,) * 3, np.eye(3))
-    one = {"values": right, "first": at, "grid": grid, "camera": camera, "window_size": (8, 6)}
-    one |= {"transfer_function": table, "comm": COMM}
 
     def show(making, showing):
         with InSitu(**making) as writer:
@@ -115,21 +101,14 @@ def mistakes(folder, every=4):
 
     cases = [(f"InSitu({name})", making, name) for name in (*making, *others)]
     cases += [(f"show({name})", showing, name) for name in showing]
-    cases += [
-        (f"generate({name})", one, name)
-        for name in (*one, "options", "device", "name", "metadata", "tolerance")
-    ]
     for number, (what, given, name) in enumerate(cases):
         for k, wrong in list(enumerate(WRONG))[number % every :: every]:
             changed = {**given, name: wrong} if COMM.rank == 1 else given
             try:
-                if given is one:
-                    generate_on_mpi(**changed)
-                else:
-                    show(
-                        changed if given is making else making,
-                        changed if given is showing else showing,
-                    )
+                show(
+                    changed if given is making else making,
+                    changed if given is showing else showing,
+                )
                 said = ""
             except VDIError as error:
                 said = f"{type(error).__name__}: {error}"
@@ -148,26 +127,17 @@ def mistakes(folder, every=4):
             writer(**showing)
     signal.alarm(0)
 
-    signal.alarm(0)
-
 
 def series(folder):
-    """Write a series of four steps, of which every second is left out, and single files."""
+    """Write a series of four steps, of which every second is left out."""
     volume = volume_of("float32")
     volume.array[np.isnan(volume.array)] = 0
     values, first = own_block(volume, COMM.rank)
     camera = VIEWS["all of it"](volume)
-    options = {"clim": (0, 200), "every": 2, "max_supersegments": 6}
-    dimensions = volume.dimensions
-    with (
-        InSitu(folder / "run.vdis", camera, WINDOW, dimensions, comm=COMM, **options) as show,
-        InSitu(
-            str(folder / "s{:02d}.vdi"), camera, WINDOW, dimensions, comm=COMM, **options
-        ) as one,
-    ):
+    options = {"clim": (0, 200), "every": 2, "max_supersegments": 6, "comm": COMM}
+    with InSitu(folder / "run.vdis", camera, WINDOW, volume.dimensions, **options) as show:
         for step in range(4):
-            for writer in (show, one):
-                writer(values * (1 - 0.1 * step), first, 0.5 * step)
+            show(values * (1 - 0.1 * step), first, 0.5 * step)
         assert len(show.seconds) == 2
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import reference
-from drawing import generate_chunked, generate_vdi, raycast_volume
+from drawing import generate_vdi, raycast_volume
 from march_ways import VIEWS, WINDOW, both_ways, transfer_for, volume_of
 
 from pyvista_vdi import AmbientOcclusion, InvalidVolumeError, Volume, render_volume
@@ -76,11 +76,3 @@ def test_what_cannot_have_blank_octants_says_so():
     chunked = ChunkedArray(np.zeros(shape))
     with pytest.raises(UnsupportedError, match="load it"):
         Volume(chunked, blanked=np.zeros(shape, np.uint8))
-
-
-@pytest.mark.extension("large")
-def test_volumes_in_blocks_cannot_have_blank_octants():
-    volume = blanked("uint8", 8)
-    scene = (volume, VIEWS["all of it"](volume), (4, 3), transfer_for(volume))
-    with pytest.raises(UnsupportedError, match="volumes in blocks"):
-        generate_chunked(*scene, chunks=(4, 4, 4))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, TransferFunction, UnsupportedError, Volume
@@ -67,7 +68,7 @@ def shown(volume, blending, device, **options):
     """By four steps a slice, of the table above."""
     options = {"transfer_function": table(), "sample_distance": 0.25, **options}
     return pvdi.render_volume(
-        volume, from_above(), (NX, NY), blending=blending, device=device, **options
+        volume, from_above(), (NX, NY), blending=blending, device=device, **with_settings(**options)
     )
 
 

@@ -3,56 +3,50 @@
 from __future__ import annotations
 
 import os
-import re
 import time
 from collections.abc import Sequence
-from pathlib import Path
-from string import Formatter
-from types import SimpleNamespace
+from dataclasses import asdict, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.extensions.large.blocks import ends_of
 from pyvista_vdi.extensions.large.on_mpi import (
-    checked_ranks,
+    SharedGrid,
     generate_on_mpi,
-    mpi,
+    ranks_of,
     require_same,
     together,
 )
 from pyvista_vdi.extensions.series.series import checked_time
-from pyvista_vdi.extensions.series.writer import (
-    SeriesWriter,
-    check_goes_on,
-    checked_way,
-    refused,
-)
+from pyvista_vdi.extensions.series.writer import SeriesWriter, checked_way
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
-from pyvista_vdi.io import read as read_vdi
 from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_range, as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.deferred import importance_points
+from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Grid, Volume
 
 _RECORDS = (Deferral, GenerationOptions)
 
 
 class InSitu:
-    """Writes VDIs of a simulation while it runs. All ranks make one, and call it together.
+    """Writes a series of VDIs of a simulation while it runs. All ranks call it together.
 
     Parameters
     ----------
     path : path-like
-        ``x.vdis``, a series that others read while it grows, or a name with a place for the number
-        of the step, ``"step_{:04d}.vdi"``. Rank 0 alone writes.
+        ``x.vdis``, the folder of a series, which others read while it grows: as of
+        :class:`~pyvista_vdi.SeriesWriter`. Rank 0 alone writes.
     camera : pyvista.Camera or vtkCamera or Camera
         The generating view V_O.
     window_size : (int, int)
@@ -66,9 +60,8 @@ class InSitu:
     every : int
         Steps from one that is written to the next.
     append : bool, default: False
-        Go on with what an earlier run has written, for a simulation that is started again: times
+        Continue what an earlier run has written, for a simulation that is started again: times
         must be above that of the last step, camera, window size and classification the same.
-        Numbers of single files go on, too.
     overwrite : bool, default: False
         Replace what an earlier run has written.
     device : optional
@@ -91,14 +84,14 @@ class InSitu:
     InvalidArgumentError
         If an argument is out of its range.
     VDIFileError
-        If a file cannot be written, or is there already and neither ``append`` nor ``overwrite`` is
-        given.
+        If the series cannot be written, or is there already and neither ``append`` nor
+        ``overwrite`` is given.
     TypeError
         If a keyword is unknown.
 
     Notes
     -----
-    Errors are raised on all ranks, whichever was given what is wrong.
+    Errors are raised on all ranks, whichever was given what is wrong, and name it.
 
     Examples
     --------
@@ -125,43 +118,45 @@ class InSitu:
         device: DeviceLike | None = None,
         **options: Any,
     ) -> None:
-        self._comm = comm = mpi().COMM_WORLD if comm is None else checked_ranks(comm)
-        self._device, self._closed, self._step = device, False, 0
+        self._comm = comm = ranks_of(comm)
+        self._path, self._device, self._closed, self._step = path, device, False, 0
+        self._grid: dict[str, Any] = {}
         self._function: TransferFunction | None = None
         self._writer: SeriesWriter | None = None
-        self._before: VDI | None = None  # of single files: what the run goes on behind
         self.seconds: list[float] = []
         with together(comm, "InSitu", InvalidArgumentError):
-            self._path = _checked_path(path)
-            self._every = _checked_every(every)
-            self._check(camera, window_size, dimensions, spacing, origin, dict(options))
+            self._every = as_whole(every)
+            if not self._every >= 1:
+                text = f"every must be a whole number of steps from 1; got {every!r}"
+                raise not_taken(every)(text)
+            self._camera = Camera.from_any(camera)
+            self._size = check_window_size(window_size)
+            points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
+            of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
+            self._grid = asdict(Grid(points, of.spacing, of.origin, of.direction))
+            self._check(options)
             append, overwrite = checked_way(append, overwrite)
-        require_same(comm, every=self._every, kind_of_file=self._series)
+        require_same(
+            comm,
+            every=self._every,
+            camera=self._camera.to_dict(),
+            window_size=self._size,
+            grid=self._grid,
+            deferral=self._deferral,
+            # What devices may take differs, and lights are those of the first rank
+            options=replace(self._options, memory_limit=None, lights=Lights()),
+        )
         with together(comm, "InSitu"):
             if comm.rank == 0:
-                self._begin(append, overwrite)
-        self._step = max(comm.allgather(self._step))
+                precision = self._options.precision
+                self._writer = SeriesWriter(
+                    path, precision=precision, append=append, overwrite=overwrite
+                )
 
-    @property
-    def _series(self) -> bool:
-        return self._path.lower().endswith(".vdis")
-
-    def _check(
-        self,
-        camera: Any,
-        window_size: Sequence[int],
-        dimensions: Sequence[int],
-        spacing: Sequence[float],
-        origin: Sequence[float],
-        options: dict[str, Any],
-    ) -> None:
-        """Take what is asked for, or raise."""
-        self._camera = Camera.from_any(camera)
-        self._size = check_window_size(window_size)
-        others = names_of(*_RECORDS)
-        looks = {name: value for name, value in options.items() if name not in others}
+    def _check(self, looks: dict[str, Any]) -> None:
+        """Take what generate takes, or raise."""
         self._deferral, self._options = records_of(
-            options, "InSitu", *_RECORDS, defaults={"precision": "8-byte"}
+            looks, "InSitu", *_RECORDS, defaults={"precision": "8-byte"}
         )
         missing = looks.get("clim") is None and "transfer_function" not in looks
         if self._deferral.deferred:
@@ -171,31 +166,12 @@ class InSitu:
                 f"{'value_range' if self._deferral.deferred else 'clim'}=(low, high) is missing: "
                 "no step knows the range of the others"
             )
-        self._looks = Classification.composited(looks, "InSitu", others)
+        self._looks = Classification.composited(looks, "InSitu", names_of(*_RECORDS))
         if self._deferral.deferred:
             self._looks.require_no_look()
             ends = as_range(self._deferral.value_range)  # what cannot be is refused before the run
             importance_points(self._deferral.importance, ends)
             self._function = unclassified(self._looks.interpolation)
-        points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
-        of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
-        self._grid = Grid(points, of.spacing, of.origin, of.direction)
-
-    def _begin(self, append: bool, overwrite: bool) -> None:
-        """Begin the file, or find where single files go on; on the first rank."""
-        if self._series:
-            self._writer = SeriesWriter(
-                self._path, precision=self._options.precision, append=append, overwrite=overwrite
-            )
-            return
-        numbers = [] if overwrite else _numbers(self._path)
-        if not numbers:
-            return
-        last = Path(self._path.format(numbers[-1]))
-        if not append:
-            raise refused(last, f", and {len(numbers) - 1} others of its kind")
-        self._before = read_vdi(last)
-        self._step = (numbers[-1] // self._every + 1) * self._every
 
     def __call__(self, values: NDArray[Any], first: Sequence[int], at: float) -> None:
         """Write a step, unless it is one that is left out.
@@ -203,7 +179,8 @@ class InSitu:
         Parameters
         ----------
         values : numpy.ndarray, shape (nz, ny, nx)
-            This rank's own points, without ghosts.
+            This rank's own points, without ghosts. Blocks are those of a grid of blocks: all
+            ranks' cuts along an axis are the same, and each has four points at least.
         first : (int, int, int)
             Index x, y, z of the first of them in the whole grid.
         at : float
@@ -217,10 +194,6 @@ class InSitu:
             If it is closed, or the step cannot be written.
         DeviceError
             If one of the ranks fails.
-
-        Notes
-        -----
-        Errors are raised on all ranks, and name the one that they come from.
         """
         number, self._step = self._step, self._step + 1
         if number % self._every:
@@ -232,72 +205,40 @@ class InSitu:
                     f"{self._path} is closed: no step can be written; make another InSitu with "
                     "append=True to go on"
                 )
-            at = self._checked_time(at)
-            own: Any = None  # read where something follows from all of it
-            ends = (np.nan, np.nan)
-            if self._function is None or self._deferral.deferred:
-                own = Volume(values, self._grid.spacing, self._grid.origin).load()
+            at = checked_time(at)
+            own = Volume(values, self._grid["spacing"], self._grid["origin"]).load()
+            what = "first must be the index x, y, z of the block's first point in the whole grid"
+            first = three_wholes(first, what, 0)
+            get_runtime(self._device)
             if self._function is None:
                 self._function = self._looks.transfer_function_of(own)
-            if self._deferral.deferred and np.isfinite(own.array).any():
-                ends = own.finite_range()
+            ends = ends_of(own.array)
         assert self._function is not None
-        if self._deferral.deferred:
-            low, high = zip(*self._comm.allgather(ends), strict=True)
-            ends = (float(np.fmin.reduce(low)), float(np.fmax.reduce(high)))
-
-        def make(asked: GenerationRequest) -> Any:
-            return generate_on_mpi(
-                values,
-                first,
-                self._grid,
-                self._camera,
-                self._size,
-                asked.transfer_function,
-                asked.options,
-                comm=self._comm,
-                device=self._device,
-                metadata=asked.metadata,
-            )
-
-        whole: Any = SimpleNamespace(
-            spacing=self._grid.spacing,
-            default_unit_distance=self._grid.default_unit_distance,
-            rgba=own is not None and own.rgba,
-            chunks=None,
-            finite_range=lambda: ends,
+        require_same(
+            self._comm,
+            values=(f"of type {own.array.dtype}", own.array.shape[3:]),
+            transfer_function=self._function.to_dict(),
         )
+        low, high = zip(*self._comm.allgather(ends), strict=True)
+        ends = float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
+        grid: Any = SharedGrid(**self._grid, array=own.array, rgba=own.rgba, first=first, ends=ends)
         request = GenerationRequest(
-            whole,
+            grid,
             self._function,
             self._camera,
             self._size,
             self._options,
+            self._device,
             metadata={"classification": self._looks.describe(), "time": at},
         )
         with together(self._comm, f"step {number}"):
+            make = partial(generate_on_mpi, comm=self._comm)
             deferred = self._deferral.deferred
             vdi = generate_deferred(request, self._deferral, make) if deferred else make(request)
         with together(self._comm, f"writing step {number}"):  # or the others would wait for ever
-            if vdi is not None and self._writer is not None:
+            if self._writer is not None:
                 self._writer.append(vdi, at)
-            elif vdi is not None:
-                if self._before is not None:
-                    check_goes_on(self._path, self._before, vdi)
-                vdi.save(Path(self._path.format(number)))
-                self._before = None
         self.seconds.append(time.perf_counter() - start)
-
-    def _checked_time(self, at: Any) -> float:
-        """Return the time of the next step, or raise InvalidArgumentError."""
-        if self._writer is not None and at is not None:
-            return self._writer.checked_time(at)
-        time, before = checked_time(at), self._before and self._before.metadata.get("time")
-        if isinstance(before, int | float) and not time > before:
-            raise InvalidArgumentError(
-                f"times must ascend; got {time} after {before}, that of the last step"
-            )
-        return time
 
     def close(self) -> None:
         """End the run: no step comes after, and others may write."""
@@ -314,38 +255,3 @@ class InSitu:
             return
         with together(self._comm, "closing the file"):
             self.close()
-
-
-def _checked_path(path: Any) -> str:
-    """Return the name of a series, or one with a place for the number of the step."""
-    name = str(path) if isinstance(path, str | os.PathLike) else ""
-    try:
-        numbered = name.format(0) != name.format(1)
-    except (AttributeError, IndexError, KeyError, ValueError):  # no braces, or more than one
-        numbered = False
-    if not numbered and not name.lower().endswith(".vdis"):
-        raise InvalidArgumentError(
-            f"{path!r} is neither a series (x.vdis) nor has it a place for the step's "
-            "number: step_{:04d}.vdi"
-        )
-    return name
-
-
-def _checked_every(every: Any) -> int:
-    number = as_whole(every)
-    if not number >= 1:
-        raise not_taken(every)(f"every must be a whole number of steps from 1; got {every!r}")
-    return int(number)
-
-
-def _numbers(path: str) -> list[int]:
-    """Return the numbers of the files that are there of a name with a place for a number."""
-    folder, name = Path(path).parent, Path(path).name
-    texts = [text for text, *_ in Formatter().parse(name)]
-    before, after = (re.escape(text) for text in (texts[0], "".join(texts[1:])))
-    found = (
-        re.fullmatch(rf"{before}0*(\d+){after}", file.name)
-        for file in (folder.iterdir() if folder.is_dir() else ())
-    )
-    numbers = sorted(int(match[1]) for match in found if match)
-    return [number for number in numbers if Path(path.format(number)).is_file()]

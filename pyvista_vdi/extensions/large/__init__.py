@@ -5,9 +5,5 @@ from __future__ import annotations
 from pyvista_vdi.registry import Extension
 
 EXTENSION = Extension(
-    generators={
-        "blocks": "pyvista_vdi.extensions.large.entrance:generate_in_blocks",
-        "clients": "pyvista_vdi.extensions.large.entrance:connected",
-        "ranks": "pyvista_vdi.extensions.large.on_mpi:generate_on_mpi",
-    }
+    generators={"blocks": "pyvista_vdi.extensions.large.generate:generate_in_blocks"}
 )

@@ -1,151 +1,188 @@
-"""A chunked volume to a VDI on the local device, block by block."""
+"""A chunked volume to a VDI block by block, on the local device or on the workers of a cluster."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
+from functools import partial
+from itertools import pairwise, zip_longest
+from operator import attrgetter, getitem
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, Indices, Read
-from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task, light_entering
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    MissingDependencyError,
+    with_article,
+)
+from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, cuts_of
+from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task
 from pyvista_vdi.generation.generate import made_from, report
 from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.model.options import GenerationRequest
-from pyvista_vdi.model.ray_forms import Rectangle
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.model.packing import Arrays
+from pyvista_vdi.model.types import ClientLike
+from pyvista_vdi.model.vdi import VDI, made_vdi
+from pyvista_vdi.model.volume import Grid
 
 #: Blocks that would fit into a limit of memory: beside one there are lists, and its halo.
 _BLOCKS_IN_LIMIT = 4
-#: Where a block is of which V_O sees nothing.
-NOWHERE = Rectangle(0, 0, 0, 0)
+#: Rows of lists are shared out in multiples of this.
+_ROWS = 4
 
 
-def task_of(
-    request: GenerationRequest, chunks: Sequence[int], block_bytes: int | None = None
-) -> Task:
-    """Return a VDI's task."""
-    volume, options = request.volume, request.options
-    width, height = request.window_size
-    require_room(0, (width, height))
-    if volume.blanked is not None:
-        raise UnsupportedError(
-            f"the volume {volume.name!r} has blank points or cells, which volumes in blocks "
-            "cannot have: write NaN there, or leave client out"
-        )
-    point_bytes = volume.array.dtype.itemsize * (4 if volume.rgba else 1)
-    most = block_bytes or BLOCK_BYTES
-    if options.memory_limit is not None:
-        most = min(most, options.memory_limit // _BLOCKS_IN_LIMIT)
-    blocks = Blocks.of(volume, chunks, point_bytes, most)
+def generate_in_blocks(
+    request: GenerationRequest,
+    client: ClientLike | None = None,
+    *,
+    block_bytes: int = BLOCK_BYTES,
+) -> VDI:
+    """Make a VDI of a chunked volume block by block, each of which is read twice.
+
+    ``client``: a ``distributed.Client``, or the address of a Dask scheduler, whose workers make it;
+    the local device by default. ``block_bytes``: most bytes of a block that has more than one
+    chunk.
+    """
+    volume, limit = request.volume, request.options.memory_limit
+    require_room(0, request.window_size)
+    if limit is not None:
+        block_bytes = min(block_bytes, limit // _BLOCKS_IN_LIMIT)
+    array: Any = volume.array
+    cuts = cuts_of(array.shape, array.chunks, array.dtype.itemsize, block_bytes)
+    blocks = Blocks.of(Grid.of(volume), cuts, request.transfer_function)
     gradients = request.transfer_function.gradient_opacities is not None
     scalars = volume.finite_range() if gradients else (np.nan, np.nan)  # nothing else asks
-    return Task.of(blocks, request, scalars)
+    task = Task.of(blocks, request, scalars)
+    if client is None:
+        return _generated(request, task, _Here(request))
+    try:
+        from distributed import Client
+
+        from pyvista_vdi.extensions.large.on_dask import Cluster
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"a cluster needs dask.distributed ({error}): pip install 'pyvista-vdi[dask]'"
+        ) from error
+    if not isinstance(client, str | Client):
+        raise InvalidArgumentTypeError(
+            f"client must be a distributed.Client or the address of a scheduler; got "
+            f"{with_article(type(client).__name__)}: give distributed.Client(cluster) for a cluster"
+        )
+    try:
+        connection = Client(client) if isinstance(client, str) else nullcontext(client)
+    except (OSError, ValueError) as error:
+        raise InvalidArgumentError(
+            f"no Dask scheduler answers at {client!r} ({error}): `dask scheduler` starts one and "
+            "says its address"
+        ) from error
+    with connection as connected, Cluster(connected, request, task) as workers:
+        return _generated(request, task, workers)
 
 
-def vdi_of(
-    task: Task,
-    request: GenerationRequest,
-    rows: Sequence[Rows],
-    device_name: str,
-    counted: Mapping[str, int],
-) -> VDI:
-    """Return the VDI of finished rows, from the lowest to the highest.
+def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
+    """Make a VDI by a :class:`_Here` or a :class:`~.on_dask.Cluster`."""
+    report(request.progress, 0.0)
+    blocks = task.blocks
+    windows = {block: task.window(block) for block in blocks}
 
-    ``counted``: the points that were read of the volume, again where they were, and the runs of
-    all blocks together.
-    """
-    offsets = np.zeros(task.size[0] * task.size[1] + 1, np.uint64)
-    np.cumsum(np.concatenate([part.lengths for part in rows]), out=offsets[1:])
-    front, back, color, optical_depth = (
-        np.concatenate([part[k] for part in rows]) for k in range(1, len(Rows._fields))
+    # Find how much light each block lets through, and so how much enters those behind it
+    order = task.to_read(windows)
+    values = dict(zip(order, workers.values(map(blocks.own, order)), strict=True))
+    first = workers.map("first-pass", task.first_pass, order, order, values.values(), share=0.4)
+    seen = workers.results(workers.map("seen", Seen.without_faces, order, first.values()))
+    entering = task.light_entering(windows, seen)
+    ambient = None
+    if task.occlusion is not None:
+        parts = workers.map("opacities", attrgetter("opacities"), order, first.values())
+        ambient = workers.map("ambient", task.ambient, [()], *([part] for part in parts.values()))
+        ambient = ambient[()]
+
+    # Make the lists of each block in which something may be seen
+    visible = list(entering)
+    around = [blocks.neighbours(block) for block in visible]
+    pieces = workers.map(
+        "second-pass",
+        task.second_pass,
+        visible,
+        visible,
+        [values[block] for block in visible],
+        entering.values(),
+        [ambient] * len(visible),
+        *([first.get(found.get(at)) for found in around] for at in blocks.offsets),
+        share=0.4,
     )
-    rays = task.rays()
-    depth_origin = rays.forms(task.camera, task.size).rays.reference_depth
-    made_by = made_from(
-        request.replace(transfer_function=task.transfer_function, options=task.options),
-        rays,
-        device_name,
-    )
-    return VDI(
+    del values, first
+
+    # Merge those of all blocks, some rows at a time
+    ranges = ranges_of(task.size[1], workers.ranges)
+    rows = []
+    for y0, y1 in ranges:
+        met = [at for at in visible if windows[at].y0 < y1 and windows[at].y1 > y0]
+        columns = [pieces[at] for at in met], [y0] * len(met), [y1] * len(met)
+        rows.append(workers.map("rows", Piece.rows, [(*at, y0) for at in met], *columns).values())
+    of_ranges = *zip(*ranges, strict=True), *zip_longest(*rows)
+    merged = workers.results(workers.map("merge", task.merge, ranges, *of_ranges, share=0.2))
+    return vdi_of(task, request, [merged[at] for at in ranges], workers.device_name)
+
+
+def vdi_of(task: Task, request: GenerationRequest, rows: Sequence[Rows], device_name: str) -> VDI:
+    """Return the VDI of finished rows, from the lowest to the highest."""
+    lengths, front, back, color, depth = map(np.concatenate, zip(*rows, strict=True))
+    offsets = np.zeros(len(lengths) + 1, np.uint64)
+    np.cumsum(lengths, out=offsets[1:])
+    asked = request.replace(transfer_function=task.transfer_function, options=task.options)
+    made_by = made_from(asked, task.rays, device_name)
+    return made_vdi(
         task.camera,
         task.size,
-        offsets,
-        front,
-        back,
-        color,
-        optical_depth,
+        Arrays(offsets, front, back, color, depth),
         task.blocks.grid.bounds,
-        depth_origin=depth_origin,
-        metadata={**made_by, "blocks": list(task.blocks.counts), **counted, **request.metadata},
+        depth_origin=task.rays.forms(task.camera, task.size).rays.reference_depth,
+        metadata={**made_by, "blocks": list(task.blocks.counts), **request.metadata},
     ).with_precision(task.options.precision)
 
 
-def chunks_of(volume: Volume, chunks: Sequence[int] | None) -> Sequence[int]:
-    """Return where blocks of a volume may be cut."""
-    if chunks is not None:
-        return chunks
-    if volume.chunks is not None:
-        return volume.chunks.chunks
-    raise InvalidArgumentError(f"the volume {volume.name!r} is not chunked: give chunks")
+def ranges_of(rows: int, parts: int) -> list[tuple[int, int]]:
+    """Cut rows into so many ranges at most, each of whole groups of four rows but the last."""
+    groups = -(-rows // _ROWS)
+    cuts = np.unique(np.linspace(0, groups, parts + 1).astype(int)) * _ROWS
+    return list(pairwise(np.minimum(cuts, rows).tolist()))
 
 
-def generate_chunked(
-    request: GenerationRequest,
-    *,
-    chunks: Sequence[int] | None = None,
-    block_bytes: int | None = None,
-) -> VDI:
-    """Make a VDI of a volume block by block, each of which is read twice.
+class _Here:
+    """Does all parts of a task in this process, one after the other."""
 
-    ``chunks``: where blocks may be cut, points along z, y and x; the array's own by default.
-    ``block_bytes``: most bytes of a block that has more than one chunk.
-    """
-    volume, device, progress = request.volume, request.device, request.progress
-    task = task_of(request, chunks_of(volume, chunks), block_bytes)
-    blocks, halo = task.blocks, task.halo
-    windows = blocks.windows(task.camera, task.size)
-    report(progress, 0.0)
-    seen: dict[Indices, Seen] = {}
-    order = task.to_read(windows)
-    for k, block in enumerate(order):
-        window = windows.get(block, NOWHERE)
-        seen[block] = task.first_pass(block, volume.array[blocks.own(block)], window, device)
-        report(progress, 0.4 * (k + 1) / len(order))
-    ambient = (
-        task.ambient([each.opacities for each in seen.values()], device) if task.occlusion else None
-    )
-    pieces: list[Piece] = []
-    entering = light_entering(task, windows, seen)
-    for k, (block, light) in enumerate(entering.items()):
-        parts = {
-            offset: halo.from_slabs(seen[other].slabs, offset)
-            for offset, other in blocks.neighbours(block, halo).items()
-        }
-        values = blocks.with_halo(volume.array[blocks.own(block)], parts, halo)
-        pieces.append(task.second_pass(block, values, windows[block], light, device, ambient))
-        report(progress, 0.4 + 0.5 * (k + 1) / len(entering))
-    rows = task.merge(0, task.size[1], pieces, device)
-    report(progress, 1.0)
-    counted = {
-        "points_read": sum(Read(volume.array, blocks.own(b)).points for b in [*order, *entering]),
-        "runs_merged": sum(len(piece.runs) for piece in pieces),
-    }
-    return vdi_of(task, request, [rows], get_runtime(device).info.name, counted)
+    #: Ranges of rows that are merged apart from each other
+    ranges = 1
 
+    def __init__(self, request: GenerationRequest) -> None:
+        self._array, self._progress, self._done = request.volume.array, request.progress, 0.0
+        self.device_name = get_runtime(request.device).info.name
 
-#: Rows of lists are shared out in multiples of this.
-ROWS = 4
+    def values(self, boxes: Iterable[tuple[slice, ...]]) -> list[Any]:
+        """Return what reads the volume's values in boxes."""
+        return [partial(getitem, self._array, box) for box in boxes]
 
+    def map(
+        self,
+        _name: str,
+        function: Callable[..., Any],
+        places: Sequence[tuple[int, ...]],
+        *columns: Iterable[Any],
+        share: float = 0.0,
+    ) -> dict[Any, Any]:
+        """Return what a function returns for each place, of its arguments; ``share`` of all."""
+        found = {}
+        for at, *arguments in zip(places, *columns, strict=True):
+            found[at] = function(*arguments)
+            if share:
+                self._done = min(self._done + share / len(places), 1.0)
+                report(self._progress, self._done)
+        return found
 
-def balanced(weights: NDArray[np.int64], parts: int) -> Iterator[tuple[int, int]]:
-    """Cut rows into ranges of like weight, each of whole groups of four rows but the last."""
-    groups = -(-len(weights) // ROWS)
-    sums = np.add.reduceat(weights, np.arange(0, len(weights), ROWS)).cumsum()
-    wanted = np.arange(1, parts) * (sums[-1] / parts)
-    cuts = np.unique([0, *np.searchsorted(sums, wanted, side="right"), groups])
-    for first, last in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
-        yield first * ROWS, min(last * ROWS, len(weights))
+    def results(self, found: dict[Any, Any]) -> dict[Any, Any]:
+        """Return what :meth:`map` has found: it is here."""
+        return found

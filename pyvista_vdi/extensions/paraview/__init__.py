@@ -10,7 +10,7 @@ EXTENSION = Extension(
             "paraview",
             "print the path of the plugin for ParaView",
             "pyvista-vdi paraview --environment",
-            "pyvista_vdi.extensions.paraview.cli:add_options",
+            "pyvista_vdi.extensions.paraview.cli:OPTIONS",
             "pyvista_vdi.extensions.paraview.cli:paraview",
         ),
     ),

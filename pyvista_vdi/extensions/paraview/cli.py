@@ -9,7 +9,6 @@ import subprocess
 import sysconfig
 from pathlib import Path
 
-from pyvista_vdi.cli import declare
 from pyvista_vdi.errors import MissingDependencyError, NoDeviceError, UnsupportedError
 
 #: The package, and the plugin in it.
@@ -30,19 +29,10 @@ os._exit(0 if any(device.usable for device in list_devices()) else 3)
 _NO_DEVICE = 3
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of the verb ``paraview``."""
-    declare.switch(
-        parser,
-        "--environment",
-        "print, for a shell's eval, the variables that make ParaView find this package and "
-        "load the plugin",
-    )
-    check = (
-        "start ParaView's Python, see that it loads the plugin, and list the devices that it "
-        "finds; PVPYTHON: where that is, if not on the PATH"
-    )
-    declare.option(parser, "--check", check, "PVPYTHON", nargs="?", const="pvpython")
+OPTIONS = """
+environment    -         print the variables by which ParaView finds plugin and package
+check=pvpython  [PVPYTHON]  start ParaView's Python, see that it loads the plugin and finds devices
+"""
 
 
 def paraview(options: argparse.Namespace) -> int:

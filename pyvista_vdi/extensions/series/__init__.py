@@ -16,7 +16,6 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.series.files",
             holds="series",
             head="series.json",
-            verbs="pyvista_vdi.extensions.series.cli",
         ),
     ),
     shown={
@@ -27,9 +26,9 @@ EXTENSION = Extension(
     verbs=(
         Verb(
             "series",
-            "write VDIs, or those of volumes, that are time steps to a series",
+            "write VDIs, or those of volumes, that are time steps",
             "pyvista-vdi series density_*.nrrd -o run.vdis --cmap bone --clim 0 255",
-            "pyvista_vdi.extensions.series.cli:add_options",
+            "pyvista_vdi.extensions.series.cli:OPTIONS",
             "pyvista_vdi.extensions.series.cli:series",
         ),
     ),

@@ -7,13 +7,14 @@ import os
 import weakref
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.extensions.series import EXTENSION
 from pyvista_vdi.io.files import format_named, opened
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader, writer
@@ -23,47 +24,23 @@ from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.classification import IN_PLACE, Look
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
+from pyvista_vdi.registry import FileFormat
 
 #: Version of the JSON.
 VERSION = 1
 #: VDIs that are kept of those that were read: the last ones.
 _KEPT = 6
-#: What the files of an earlier format begin with: steps by differences, and sets of them.
-_EARLIER = (b"\x89VDIS\r\n\x1a", b"\x89VDIV\r\n\x1a")
-#: What is said of them.
-_REMEDY = (
-    "is of an earlier format, which is not read any more: make it anew, or have the version that "
-    "wrote it write .vdi files (pyvista-vdi convert), and join these by 'pyvista-vdi series'"
-)
-
-
-@dataclass(frozen=True)
-class Kind:
-    """What distinguishes a stored series from a stored set."""
-
-    name: str
-    suffix: str
-    listed: str  # the JSON's entry that has one item for each VDI
-
-    @property
-    def head(self) -> str:
-        """Name of the JSON."""
-        return f"{self.name}.json"
-
-
-SERIES = Kind("series", ".vdis", "times")
-SET = Kind("set", ".vdiset", "views")
+SERIES = EXTENSION.formats[0]
 
 
 class Archive(Sequence[Any]):
     """The VDIs of a folder, a ZIP or a page: each is read when it is asked for, from any thread.
 
-    It is pickled as its path and kind. ``about`` is what the JSON says.
+    It is pickled as its path and format. ``about`` is what the JSON says.
     """
 
-    def __init__(self, path: str | os.PathLike[str], kind: Kind) -> None:
+    def __init__(self, path: str | os.PathLike[str], kind: FileFormat) -> None:
         self.path, self._kind = as_path(path).absolute(), kind
         self._root: Any = self.path if self.path.is_dir() else zipfile.Path(self._opened())
         self._read = lru_cache(_KEPT)(lambda i: self._file(i, reader.read))
@@ -71,14 +48,14 @@ class Archive(Sequence[Any]):
         try:
             self.about: dict[str, Any] = from_json(content)
             form, version = self.about["format"], self.about["version"]
-            self._length = len(self.about[kind.listed])
+            self._length = len(self.about["times" if kind == SERIES else "views"])
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             self.refuse(f"its {kind.head} is incomplete ({error!r})")
-        if (form, version) != (f"pyvista-vdi-{kind.name}", VERSION):
+        if (form, version) != (f"pyvista-vdi-{kind.holds}", VERSION):
             raise VDIFileError(
-                f"{path} is of the format {form!r}, version {version!r}; this is pyvista-vdi "
-                f"{__version__}, which reads 'pyvista-vdi-{kind.name}', version {VERSION}: upgrade "
-                "by pip install -U pyvista-vdi"
+                f"{path} is of the format {form!r}, version {version!r}; pyvista-vdi {__version__} "
+                f"reads 'pyvista-vdi-{kind.holds}', version {VERSION}: upgrade by pip install -U "
+                "pyvista-vdi"
             )
 
     def __reduce__(self) -> Any:
@@ -111,11 +88,11 @@ class Archive(Sequence[Any]):
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
-        if begin in _EARLIER:
-            raise VDIFileError(f"{self.path} {_REMEDY}")
         if not begin.startswith(b"PK"):
-            name = self._kind.name
-            raise VDIFileError(f"{self.path} is not a {name} of VDIs: it begins with {begin!r}")
+            raise VDIFileError(
+                f"{self.path} is not a {self._kind.holds} of VDIs, or of an earlier format, which is "
+                f"not read any more: it begins with {begin!r}; make it anew"
+            )
         try:
             archive = zipfile.ZipFile(stream)
         except reader.ARCHIVE_ERRORS as error:
@@ -146,14 +123,14 @@ def name_of(i: int) -> str:
     return f"{i:06}.vdi"
 
 
-def head_bytes(kind: Kind, about: Mapping[str, Any]) -> bytes:
+def head_bytes(kind: FileFormat, about: Mapping[str, Any]) -> bytes:
     """Return the JSON."""
-    head = {"format": f"pyvista-vdi-{kind.name}", "version": VERSION}
+    head = {"format": f"pyvista-vdi-{kind.holds}", "version": VERSION}
     return to_json({**head, "written_by": f"pyvista-vdi {__version__}", **about}).encode()
 
 
 def save(
-    vdis: Sequence[Any], path: str | os.PathLike[str], kind: Kind, about: Any, **options: Any
+    vdis: Sequence[Any], path: str | os.PathLike[str], kind: FileFormat, about: Any, **options: Any
 ) -> Path:
     """Write one file, or a page that shows it, whole or not at all; it replaces what was there.
 
@@ -166,16 +143,12 @@ def save(
         )
     found = format_named(path)
     if found is not None and found.page:
-        as_vdi(vdis[0])  # refuses what has no colours
-        write_page = getattr(found.load(), f"write_{kind.name}")
-        return write_page(vdis, path, **options)  # type: ignore[no-any-return]
-    target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.name}"))
-    if target.exists():
-        with target.open("rb") as stream:
-            if stream.read(8) in _EARLIER:
-                raise VDIFileError(f"{target} {_REMEDY}; choose another name for this one")
+        return found.load().write(vdis, path, **options)  # type: ignore[no-any-return]
+    target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.holds}"))
+    if target.exists() and not zipfile.is_zipfile(target):
+        raise VDIFileError(f"{target} holds something else: choose another name, or remove it")
     if options.get("precision") is None:
-        options["precision"] = vdis[0].precision if kind is SERIES else "8-byte"
+        options["precision"] = vdis[0].precision if kind == SERIES else "8-byte"
     with whole_file(target) as out:
         write_to(out, kind, about, vdis, **options)
     return target
@@ -183,7 +156,7 @@ def save(
 
 def write_to(
     stream: IO[bytes],
-    kind: Kind,
+    kind: FileFormat,
     about: Mapping[str, Any],
     vdis: Sequence[Any],
     *,

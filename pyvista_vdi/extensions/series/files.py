@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +12,11 @@ from pyvista_vdi.extensions.series.archive import SERIES, Archive
 from pyvista_vdi.extensions.series.series import VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.model.vdi import VDI
 
 
 def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Path:
     """Write one file with a series, or a page that plays it: see :meth:`VDISeries.save`."""
     return archive.save(series, path, SERIES, {"times": series.times}, **options)
-
-
-def write_steps(vdis: Sequence[VDI], times: Sequence[float], path: str, **options: Any) -> Path:
-    """Write the VDIs of several times as a series."""
-    return save(VDISeries(vdis, times), path, **options)
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:

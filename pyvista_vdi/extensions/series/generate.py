@@ -203,15 +203,14 @@ def _steps(
                 "volumes is a function of the step's index: pass times, one for each step"
             )
         volumes = Called(volumes, range(len(known)))
-    elif isinstance(volumes, Volume) or hasattr(volumes, "GetClassName"):
-        raise InvalidArgumentError(
-            "volumes are the steps of a series, got one volume: pass a list, or call generate"
-        )
-    elif isinstance(volumes, str | bytes | os.PathLike) or not np.iterable(volumes):
+    elif (
+        isinstance(volumes, Volume | str | bytes | os.PathLike)
+        or hasattr(volumes, "GetClassName")
+        or not np.iterable(volumes)
+    ):
         raise InvalidArgumentTypeError(
-            "volumes must be an iterable of volumes, or a function; got "
-            f"{with_article(type(volumes).__name__)}: open files by pyvista.read or "
-            "pyvista_vdi.open_volume, one step after the other"
+            f"volumes must be an iterable of volumes, or a function; got "
+            f"{with_article(type(volumes).__name__)}: pass a list of them, or call generate"
         )
     if known is not None and isinstance(volumes, Sized) and len(volumes) != len(known):
         raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")

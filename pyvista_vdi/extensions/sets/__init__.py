@@ -15,7 +15,6 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.sets.files",
             holds="set",
             head="set.json",
-            verbs="pyvista_vdi.extensions.sets.cli",
         ),
     ),
     shown={
@@ -24,9 +23,9 @@ EXTENSION = Extension(
     verbs=(
         Verb(
             "set",
-            "write VDIs of a volume from several sides, of which the nearest is drawn",
+            "write VDIs of a volume from several sides",
             "pyvista-vdi set knee.nrrd -o knee.vdiset --cmap bone --opacity sigmoid_6",
-            "pyvista_vdi.extensions.sets.cli:add_options",
+            "pyvista_vdi.extensions.sets.cli:OPTIONS",
             "pyvista_vdi.extensions.sets.cli:generate",
         ),
     ),

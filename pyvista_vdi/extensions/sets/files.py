@@ -8,11 +8,14 @@ from typing import Any
 
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.extensions.series import archive
-from pyvista_vdi.extensions.series.archive import SET, Archive
+from pyvista_vdi.extensions.series.archive import Archive
+from pyvista_vdi.extensions.sets import EXTENSION
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
+
+SET = EXTENSION.formats[0]
 
 
 def save(vdi_set: VDISet, path: str | os.PathLike[str], **options: Any) -> Path:

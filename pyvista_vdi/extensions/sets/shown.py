@@ -7,7 +7,7 @@ from typing import Any
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.extensions.series.player import MEMORY, ON_DEVICE, Decoding, bring
+from pyvista_vdi.extensions.series.shown import MEMORY, ON_DEVICE, Decoding, bring
 from pyvista_vdi.extensions.sets.vdi_set import MOST_BLENDED, VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI

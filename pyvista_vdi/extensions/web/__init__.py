@@ -36,9 +36,9 @@ EXTENSION = Extension(
     verbs=(
         Verb(
             "serve",
-            "serve VDIs of a volume to web pages, in which it is turned while it stays here",
+            "serve VDIs of a volume to web pages that turn it",
             "pyvista-vdi serve knee.nrrd --cmap bone --opacity sigmoid_6",
-            "pyvista_vdi.extensions.web.cli:add_options",
+            "pyvista_vdi.extensions.web.cli:OPTIONS",
             "pyvista_vdi.extensions.web.cli:serve",
         ),
     ),
@@ -47,7 +47,7 @@ EXTENSION = Extension(
         "VDI._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
         "VDISeries._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
         "VDISet._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
-        "plotter.vdi.export_html": "pyvista_vdi.extensions.web.scenes.export:export_html",
+        "plotter.vdi.export_html": "pyvista_vdi.extensions.web.scene:export_html",
     },
     requires=("series", "sets"),  # which pages show as well
 )

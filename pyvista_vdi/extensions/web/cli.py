@@ -7,11 +7,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from pyvista_vdi.cli import declare
-from pyvista_vdi.cli.inputs import ambient_occlusion, classification, read_volume
+from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.errors import naming
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.volume import Volume
 
 
@@ -43,12 +43,9 @@ def serve(options: argparse.Namespace) -> int:
         host=options.host,
         port=options.port,
         token=options.token,
-        hosts=options.allow_host,
+        hosts=options.allow_host or (),
         lists=math.prod(options.lists),
-        max_supersegments=options.max_supersegments,
-        sample_distance=options.sample_distance,
-        ambient_occlusion=ambient_occlusion(options),
-        memory_limit=options.memory_limit,
+        **given(options, GenerationOptions, flat=True),
         device=options.device,
         announce=lambda line: print(line, flush=True),
         **arguments,
@@ -57,24 +54,15 @@ def serve(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of the verb ``serve``."""
-    declare.volumes(parser)
-    group = parser.add_argument_group("server")
-    host = "address to listen at (default: 127.0.0.1, this machine alone)"
-    declare.option(group, "--host", host, "ADDRESS", default="127.0.0.1")
-    port = "(default: 8765; 0: one that is free)"
-    declare.option(group, "--port", port, "N", declare.parse_port, default=8765)
-    token = "what the URL must carry (default: a random one)"
-    declare.option(group, "--token", token, "TEXT")
-    names = "another name by which browsers may call this server; may be repeated"
-    declare.option(group, "--allow-host", names, "NAME", action="append", default=[])
-    text = "most lists of a VDI (default: 1280x720)"
-    declare.option(group, "--lists", text, "WxH", declare.parse_size, default=(1280, 720))
-    declare.classification(parser)
-    declare.occlusion(parser)
-    group = parser.add_argument_group("limits")
-    declare.longest(group, 8)
-    declare.step(group)
-    declare.memory_limit(group)
-    declare.device(parser)
+OPTIONS = """
+VOLUMES device
+[server]
+host=127.0.0.1  ADDRESS   to listen at, by default this machine's alone
+port=8765       PORT      0: one that is free
+token           TEXT      what the URL must carry (default: a random one)
+allow_host      NAME +    another name by which browsers may call this server
+lists=1280x720  WxH       most lists of a VDI
+table: occlusion:
+[limits]
+max_supersegments=8 sample_distance memory_limit
+"""

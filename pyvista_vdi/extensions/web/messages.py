@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.extensions.web.camera import camera_of
 from pyvista_vdi.model.view import View
 
 #: Most bytes of a client's message.
@@ -51,32 +51,22 @@ def wish_after(text: str, wish: Wish, offer: Mapping[str, Any]) -> Wish:
         if kind == "time":
             return replace(wish, step=_step(offer, **message))
         raise BadMessageError(f"a message is of type view, look or time; got {kind!r:.40}")
-    except BadMessageError:
-        raise
     # No JSON, no object, not the entries of its type, or no camera
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError, VDIError) as error:
         raise BadMessageError(f"the message is none of the protocol's: {error}") from None
 
 
 def _view(camera: Any, size: Any) -> View:
-    width, height = _numbers("size", size, (2,), 1, MAX_PICTURE_EDGE)
-    if (width % 1, height % 1) != (0, 0):
-        raise BadMessageError("size must be whole numbers")
-    view = _camera(**camera)
+    view = camera_of(camera)
     lens = view.parallel_scale if view.parallel_projection else view.view_angle
-    if not 1 / _LARGEST <= lens <= _LARGEST:
-        raise BadMessageError(f"lenses must be from {1 / _LARGEST:g} to {_LARGEST:g}")
-    return View(view, (int(width), int(height)))
+    places = (view.position, view.focal_point, view.view_up, view.window_center)
+    _numbers("a camera", [*sum(places, ()), lens, 1 / lens])
+    width, height = _numbers("size", size, 1, MAX_PICTURE_EDGE, whole=True)
+    return View(view, (width, height))
 
 
-def _camera(position: Any, focal_point: Any, view_up: Any, **lens: Any) -> Camera:
-    for name, point in (("position", position), ("focal_point", focal_point), ("view_up", view_up)):
-        _numbers(name, point, (3,))
-    if not set(lens) <= {"view_angle", "parallel_scale"}:
-        raise BadMessageError("lenses are view_angle and parallel_scale")
-    return Camera(
-        position, focal_point, view_up, **lens, parallel_projection="parallel_scale" in lens
-    )
+def _step(offer: Mapping[str, Any], step: Any) -> int:
+    return _numbers("step", [step], 0, offer["steps"] - 1, whole=True)[0]  # type: ignore[no-any-return]
 
 
 def _look(
@@ -84,32 +74,26 @@ def _look(
 ) -> tuple[tuple[str, Any], ...]:
     if not offer["cmaps"]:
         raise BadMessageError("the look is fixed")
-    if cmap is not None and cmap not in offer["cmaps"]:
-        raise BadMessageError("cmap must be one of the names that hello lists")
-    if isinstance(opacity, list):
-        opacity = _numbers("opacity", opacity, range(2, MAX_OPACITIES + 1), 0, 1)
-    elif opacity is not None and opacity not in offer["opacities"]:
-        raise BadMessageError("opacity must be numbers, or one of the names that hello lists")
+    if isinstance(opacity, list) and 2 <= len(opacity) <= MAX_OPACITIES:
+        opacity = _numbers("opacity", opacity, 0, 1)
+    elif opacity not in (None, *offer["opacities"]):
+        raise BadMessageError(
+            f"opacity is a name that hello lists, or 2 to {MAX_OPACITIES} numbers"
+        )
+    if cmap not in (None, *offer["cmaps"]):
+        raise BadMessageError("cmap is a name that hello lists")
     if clim is not None:
-        clim = _numbers("clim", clim, (2,))
-        if not clim[0] < clim[1]:
+        low, high = clim = _numbers("clim", clim)
+        if not low < high:
             raise BadMessageError("clim must be two numbers, the smaller first")
     said = {"cmap": cmap, "opacity": opacity, "clim": clim}
     return tuple((name, value) for name, value in said.items() if value is not None)
 
 
-def _step(offer: Mapping[str, Any], step: Any) -> int:
-    if type(step) is not int or not 0 <= step < offer["steps"]:
-        raise BadMessageError(f"step must be a whole number from 0 to {offer['steps'] - 1}")
-    return step
-
-
 def _numbers(
-    name: str, values: Any, lengths: Any, low: float = -_LARGEST, high: float = _LARGEST
-) -> tuple[float, ...]:
-    # Neither booleans nor NaN
-    if not isinstance(values, list) or len(values) not in lengths:
-        raise BadMessageError(f"{name} must be a list of {lengths[0]} to {lengths[-1]} numbers")
-    if not all(type(value) in (int, float) and low <= value <= high for value in values):
-        raise BadMessageError(f"{name} must be numbers from {low:g} to {high:g}")
-    return tuple(map(float, values))
+    name: str, values: Any, low: float = -_LARGEST, high: float = _LARGEST, *, whole: bool = False
+) -> tuple[Any, ...]:
+    kinds = (int,) if whole else (int, float)  # neither booleans nor NaN
+    if not all(type(value) in kinds and low <= value <= high for value in values):
+        raise BadMessageError(f"{name} has numbers from {low:g} to {high:g}")
+    return tuple(values) if whole else tuple(map(float, values))

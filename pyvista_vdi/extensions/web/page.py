@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import base64
 import binascii
-import copy
 import html
 import io
 import os
 import re
-import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,16 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi._version import __version__
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.extensions.series.archive import SERIES, SET, write_to
-from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.files import about
+from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
+from pyvista_vdi.extensions.web.shown import Shown, as_shown, file_of, needs_of, seen_of
 from pyvista_vdi.io.progress import Progress
-from pyvista_vdi.io.vdi_file import reader, writer
-from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
+from pyvista_vdi.io.vdi_file import reader
+from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.metrics import check_background, over_background
@@ -37,14 +34,16 @@ from pyvista_vdi.model.whole_file import check_writable, whole_file
 
 #: What the script elements that hold a .vdi file as base64 say of themselves.
 DATA_TYPE = "application/vdi+base64"
+#: The same, of what is beside the VDI: see web/scene.py.
+_SCENE_TYPE = "application/vdi-scene+base64"
 
-#: The same, of what is beside the VDI: see web/scenes/scene.py.
-_SCENE = '<script type="application/vdi-scene+base64">{}</script>\n'
+#: The bar of buttons: there, or not.
+CONTROLS = ("all", "none")
 
 #: Longest edge of the still picture, pixels, and the quality of its JPEG.
 _STILL_EDGE, _STILL_QUALITY = 480, 75
 
-#: Bytes of a part of a series, which a page decodes from base64 at once; a multiple of three.
+#: Bytes of a part of a file, which a page decodes from base64 at once; a multiple of three.
 _PART = 3 << 20
 #: Bytes of a page within which its data begin: behind the still picture.
 _HEAD = 1 << 20
@@ -73,14 +72,14 @@ vdi-viewer {{ width: 100%; height: 100%; aspect-ratio: auto; }}
 vdi-viewer:not(:defined) {{ display: block; text-align: center; }}
 vdi-viewer > img {{ max-width: 100%; max-height: 100%; }}
 p {{ font: 14px sans-serif; text-align: center; }}
-main {{ display: contents; }}
+{style}main {{ display: contents; }}
 h1 {{ position: absolute; width: 1px; height: 1px; margin: 0; overflow: hidden; }}
 </style>
 </head>
 <body>
 <main>
 <h1>{title}</h1>
-{views}</main>
+{body}</main>
 </body>
 </html>
 """
@@ -101,240 +100,120 @@ _NO_SCRIPT = (
 class View:
     """What a viewer in a page shows."""
 
-    vdi: VDI | None  # as it is sent; ``None`` if all is in the scene, or it is a series
+    parts: Sequence[bytes]  # of its file, the first of which gives a first picture; none: a scene
     background: str  # as CSS has it
-    still: NDArray[np.uint8]  # uint8 (H, W, 3), the picture where nothing can be turned
-    still_size: Sequence[int]  # width and height that it is shown as, or smaller
-    #: What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scenes.scene`
+    still: NDArray[np.uint8]  # (H, W, 3), the picture where nothing can be turned
+    size: Sequence[int]  # width and height that it is shown as, or smaller
+    needs: dict[str, bool]  # of the viewer's script
+    #: What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scene`
     scene: bytes | None = None
     attributes: dict[str, str] = field(default_factory=dict)  # of the element
-    #: Parts of the file of a series or a set; the first shows its first VDI
-    series: Sequence[bytes] = ()
-    deferred: Mapping[str, Any] | None = None  # what lists that keep values are about
 
 
 def page(
-    vdi: VDI | DeferredVDI,
+    shown: Shown,
     *,
     title: str = "VDI",
     background: Sequence[float] = (0.0, 0.0, 0.0),
     controls: str = "all",
     precision: str | None = None,
     level: int | None = None,
+    autoplay: bool = False,
     progress: Progress | None = None,
     **look: Any,
 ) -> bytes:
     """Return an HTML page that shows a VDI, as large as the window, behind it an RGB from 0 to 1.
 
+    Or one that plays a series, with ``autoplay`` as soon as it is opened, or shows a set.
     ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6. ``controls="none"`` leaves
     out the bar of buttons. A page of a :class:`DeferredVDI` holds its values, and its transfer
     function is edited there; ``look``: what that begins with, the arguments of
     :meth:`DeferredVDI.classified`.
     """
-    if isinstance(vdi, DeferredVDI):
-        begun = vdi.classified(**look)
-        view = _view_of(begun, background)
-        view.vdi, view.deferred = edited(vdi.with_precision(precision or "8-byte"), begun)
-    else:
-        refuse_look(look)
-        view = _view_of(vdi, background)
-        view.vdi = vdi.with_precision(precision or "8-byte")
-    return assembled([view], title=title, controls=controls, level=level, progress=progress)
-
-
-def edited(kept: DeferredVDI, begun: VDI) -> tuple[VDI, Mapping[str, Any]]:
-    """Return the lists whose transfer function a viewer edits, and what they are about.
-
-    ``begun``: the same with the colours that editing begins with.
-    """
-    lists = copy.copy(kept.lists)
-    told = begun.metadata["transfer_function"]
-    lists.metadata = {**kept.metadata, "transfer_function": told}
-    return lists, kept.about
-
-
-def refuse_look(look: Mapping[str, Any]) -> None:
-    """Raise UnsupportedError if there is one, as what has colours takes none."""
-    if look:
-        raise UnsupportedError(
-            f"a viewer shows a VDI in the colours that it has: leave out {', '.join(look)}, or "
-            "generate with classification='deferred'"
-        )
-
-
-def assembled(
-    views: Sequence[View],
-    *,
-    title: str,
-    controls: str = "all",
-    level: int | None = None,
-    progress: Progress | None = None,
-) -> bytes:
-    """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
-    without = check_controls(controls)
-    title = html.escape(title)
-    parts_of = {
-        "scene": any(view.scene is not None for view in views),
-        "series": any(view.series for view in views),
-        "values": any(view.deferred is not None for view in views),
-    }
-    parts = []
-    for number, view in enumerate(views):
-        files = list(view.series)
-        if view.vdi is not None:
-            stream = io.BytesIO()
-            shown = progress if number == 0 else None
-            writer.write_to(stream, view.vdi, DEFLATE, level, shown, deferred=view.deferred)
-            data = stream.getvalue()
-            cut = _end_of_coarse(stream)
-            files = [data[:cut], data[cut:]]
-        of = f' data-of="{number}"' if number else ""  # read() looks for the first one's
-        texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in files]
-        first, rest = "".join(texts[:1]), "".join(texts[1:])
-        scene = "" if view.scene is None else _SCENE.format(_text(view.scene))
-        viewer = "" if number else viewer_script(**parts_of)
-        script = f"<script>\n{viewer}</script>\n" if viewer else ""
-        width, height = view.still_size
-        shares = {} if number else {"hash": ""}  # what the first one shows is in the address
-        said = {"fit": f"{width}/{height}", **shares, **without, **view.attributes}
-        named = {name: html.escape(value) for name, value in said.items()}
-        parts.append(
-            _VIEW.format(
-                title=title,
-                background=view.background,
-                attributes="".join(f' {name}="{value}"' for name, value in named.items()),
-                still=_text(_jpeg(view.still, view.still_size)),
-                parts=("" if number else _NO_SCRIPT) + first + scene + script + rest,
-            )
-        )
-    text = _PAGE.format(
-        version=__version__,
-        policy=_POLICY,
-        title=title,
-        background=views[0].background,
-        views="".join(parts),
+    one_of(controls, "controls", CONTROLS)
+    shown = as_shown(shown)
+    seen = seen_of(shown, **look)
+    percents = " ".join(f"{100 * channel:g}%" for channel in check_background(background))
+    still = np.rint(over_background(_from_generating_view(seen), background) * 255)
+    # That of the view that it was made for
+    size = seen.window_size if "screen" in seen.metadata else seen.picture_size
+    size = shown.window_size if isinstance(shown, VDISet) else size
+    view = View(
+        in_parts(*file_of(shown, precision or "8-byte", level, seen=seen, progress=progress)),
+        background=f"rgb({percents})",
+        still=still.astype(np.uint8),
+        size=size,
+        needs=needs_of(shown),
+        attributes={"autoplay": ""} if autoplay else {},
     )
-    return text.encode()
+    return assembled([view], title=title, controls=controls)
+
+
+def assembled(views: Sequence[View], *, title: str, controls: str = "all") -> bytes:
+    """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
+    needs = {name: any(view.needs[name] for view in views) for name in views[0].needs}
+    title, body = html.escape(title), ""
+    for number, view in enumerate(views):
+        said = {"fit": "{}/{}".format(*view.size), **view.attributes}
+        said |= {} if controls == "all" else {"controls": controls}
+        before, script, of = "", "", f' data-of="{number}"'  # read() looks for the first one's
+        if number == 0:
+            said["hash"] = ""  # what the first one shows is in the address
+            before, script, of = _NO_SCRIPT, f"<script>\n{viewer_script(**needs)}</script>\n", ""
+        texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in view.parts]
+        if view.scene is not None:
+            script = f'<script type="{_SCENE_TYPE}">{_text(view.scene)}</script>\n{script}'
+        body += _VIEW.format(
+            title=title,
+            background=view.background,
+            attributes="".join(f' {name}="{html.escape(value)}"' for name, value in said.items()),
+            still=_text(_jpeg(view.still, view.size)),
+            parts="".join([before, *texts[:1], script, *texts[1:]]),
+        )
+    return html_page(title, body, views[0].background, _POLICY).encode()
+
+
+def html_page(title: str, body: str, background: str, policy: str, style: str = "") -> str:
+    """Return a page for what is seen, as large as the window."""
+    return _PAGE.format(
+        version=__version__,
+        policy=policy,
+        title=title,
+        background=background,
+        style=style,
+        body=body,
+    )
 
 
 def write(
-    vdi: VDI | DeferredVDI,
+    shown: Shown,
     path: str | os.PathLike[str],
     *,
     compression: str = DEFLATE,
-    level: int | None = None,
-    precision: str | None = None,
     title: str | None = None,
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-    controls: str = "all",
-    progress: Progress | None = None,
-    **look: Any,
+    **options: Any,
 ) -> Path:
-    """Write a page with a VDI: see :func:`pyvista_vdi.io.write`, and :func:`page`.
+    """Write a page with a VDI, a series or a set: see :func:`pyvista_vdi.io.write`, :func:`page`.
 
     ``compression`` is deflate, the one that browsers decode; the title is the file's name by
     default.
     """
-    target = Path(os.path.realpath(path))
-    content = page(
-        vdi,
-        title=target.stem if title is None else title,
-        background=background,
-        controls=controls,
-        precision=precision,
-        level=level,
-        progress=progress,
-        **look,
-    )
+    if compression != DEFLATE:
+        raise InvalidArgumentError(f"pages are compressed by deflate; got {compression!r}")
+    target = check_writable(path)
+    content = page(shown, title=target.stem if title is None else title, **options)
     with whole_file(target) as stream:
         stream.write(content)
     return target
 
 
-def write_series(
-    series: VDISeries,
-    path: str | os.PathLike[str],
-    *,
-    precision: str = "8-byte",
-    compression: str = DEFLATE,
-    level: int | None = None,
-    title: str | None = None,
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-    controls: str = "all",
-    autoplay: bool = False,
-    progress: Progress | None = None,
-) -> Path:
-    """Write a page that plays a series: see :meth:`pyvista_vdi.VDISeries.save`, and :func:`page`.
+def in_parts(data: bytes, first: int) -> list[bytes]:
+    """Return the parts in which a page holds a file: the first has ``first`` bytes, or a few more.
 
-    With ``autoplay`` it plays as soon as it is opened.
+    Base64 text is decoded by threes of bytes.
     """
-    view = _view_of(series[0], background)
-    view.attributes = {"autoplay": ""} if autoplay else {}
-    how = {"precision": precision, "compression": compression, "level": level}
-    return _write_several(view, path, series, title, controls, progress=progress, **how)
-
-
-def write_set(
-    vdi_set: VDISet,
-    path: str | os.PathLike[str],
-    *,
-    precision: str = "8-byte",
-    compression: str = DEFLATE,
-    level: int | None = None,
-    title: str | None = None,
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-    controls: str = "all",
-    progress: Progress | None = None,
-) -> Path:
-    """Write a page that shows a set: see :meth:`pyvista_vdi.VDISet.save`, and :func:`page`."""
-    view = _view_of(vdi_set[vdi_set.nearest(vdi_set.camera)], background)
-    view.still_size = vdi_set.window_size
-    how = {"precision": precision, "compression": compression, "level": level}
-    return _write_several(view, path, vdi_set, title, controls, progress=progress, **how)
-
-
-def _write_several(
-    view: View,
-    path: str | os.PathLike[str],
-    vdis: VDISeries | VDISet,
-    title: str | None,
-    controls: str,
-    **how: Any,
-) -> Path:
-    """Write a page of a series or a set that a viewer shows."""
-    target = Path(os.path.realpath(check_writable(Path(path))))
-    check_controls(controls)
-    view.series = in_parts(*several(vdis, **how))
-    content = assembled([view], title=target.stem if title is None else title, controls=controls)
-    with whole_file(target) as out:
-        out.write(content)
-    return target
-
-
-def several(vdis: VDISeries | VDISet, **how: Any) -> tuple[bytes, int]:
-    """Return the file of a series or a set, and how many bytes of it show its first VDI."""
-    stream = io.BytesIO()
-    if isinstance(vdis, VDISeries):
-        cut = write_to(stream, SERIES, {"times": vdis.times}, vdis, **how)
-    else:
-        cut = write_to(stream, SET, about(vdis), vdis, **how)
-    return stream.getvalue(), cut
-
-
-def check_controls(controls: str) -> dict[str, str]:
-    """Return the attributes of a viewer with "all" controls or "none"."""
-    if controls not in ("all", "none"):
-        raise InvalidArgumentError(f'controls is "all" or "none"; got {controls!r}')
-    return {} if controls == "all" else {"controls": controls}
-
-
-def in_parts(data: bytes, cut: int) -> list[bytes]:
-    """Return the parts in which a page holds a series or a set; the first has ``cut`` bytes.
-
-    Or a few more: base64 text is decoded by threes of bytes.
-    """
-    cut = -(-cut // 3) * 3
-    return [data[:cut], *(data[k : k + _PART] for k in range(cut, len(data), _PART))]
+    first = -(-first // 3) * 3
+    return [data[:first], *(data[k : k + _PART] for k in range(first, len(data), _PART))]
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDI | DeferredVDI:
@@ -384,14 +263,6 @@ def data_in(path: str | os.PathLike[str]) -> BinaryIO:
         ) from error
 
 
-def _end_of_coarse(stream: BinaryIO) -> int:
-    """Return how many bytes of a .vdi file show its coarse level, as a multiple of three."""
-    with zipfile.ZipFile(stream) as archive:
-        members = archive.infolist()
-    behind = 2 if members[1].filename == COARSE else 1
-    return -(-members[behind].header_offset // 3) * 3
-
-
 def _text(data: bytes) -> str:
     return base64.b64encode(data).decode()
 
@@ -405,15 +276,6 @@ def _jpeg(pixels: NDArray[np.uint8], size: Sequence[int]) -> bytes:
     stream = io.BytesIO()
     Image.fromarray(pixels).resize(small).save(stream, format="jpeg", quality=_STILL_QUALITY)
     return stream.getvalue()
-
-
-def _view_of(vdi: VDI, background: Sequence[float]) -> View:
-    """Return what shows a VDI from its generating view, which is still to be added."""
-    behind = check_background(background)
-    percents = " ".join(f"{100 * channel:g}%" for channel in behind)
-    still = np.rint(over_background(_from_generating_view(vdi), background) * 255)
-    size = vdi.window_size if "screen" in vdi.metadata else vdi.picture_size  # of that view
-    return View(None, f"rgb({percents})", still.astype(np.uint8), size)
 
 
 def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:

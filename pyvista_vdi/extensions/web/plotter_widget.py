@@ -13,10 +13,11 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
-from pyvista_vdi.extensions.web.placing import as_shown, look_of, planes_of, several_of
-from pyvista_vdi.extensions.web.still import part_of, png, stand_in
+from pyvista_vdi.extensions.web.camera import viewer_camera
+from pyvista_vdi.extensions.web.scene import Scene, look_of, part_of, scene_of, state_of
+from pyvista_vdi.extensions.web.shown import png, stand_in
 from pyvista_vdi.extensions.web.widget import VDIWidget
+from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.interaction import browser
 
 #: Seconds without a turn from which a view rests.
@@ -34,34 +35,23 @@ class PlotterWidget(VDIWidget):
     """
 
     _has_scene = True
+    _look: Any = None  # what the VDIs that the browser has depend on
 
-    def __init__(self, plotter: Any, renderer: Any, scene: Any, picture: Any) -> None:
+    def __init__(self, plotter: Any, renderer: Any, scene: Scene, picture: Any) -> None:
         self._plotter = weakref.ref(plotter)
         self._renderer = weakref.ref(renderer)  # another one may be active later
-        self._actor = actor = scene.actor
         self._picture = picture
         self._rest: asyncio.TimerHandle | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         with suppress(RuntimeError):  # none runs: then the plotter is rendered by who holds it
             self._loop = asyncio.get_running_loop()
-        self._look = _look_of(actor)
-        super().__init__(
-            _shown_of(actor), camera=renderer.camera, background=renderer.background_color
-        )
-        self._take_planes()
-        self._take_time()
-        self._take(scene)
+        super().__init__(scene.shown, camera=renderer.camera)
         self._picture_size = list(renderer.GetSize())
+        self._take(renderer, scene)
         self.observe(self._turn, "camera")
         self.observe(self._play, "time")
         me = weakref.ref(self)
-
-        def rendered(*_: Any) -> None:
-            widget = me()
-            if widget is not None:
-                widget._follow()
-
-        renderer.AddObserver("EndEvent", rendered)
+        renderer.AddObserver("EndEvent", lambda *_: (widget := me()) and widget._follow())
         browser.follow(self)
 
     @property
@@ -73,22 +63,12 @@ class PlotterWidget(VDIWidget):
     def draw(self) -> None:
         """Render the plotter, if it is there."""
         self._rest = None
-        plotter = self._open_plotter()
-        if plotter is not None:
-            plotter.render()
-
-    def _open_plotter(self) -> Any:
-        """Return the plotter, or ``None`` when it is gone or closed."""
-        plotter = self._plotter()
-        return None if self.window is None else plotter
-
-    def _open_renderer(self) -> Any:
-        """Return what is shown, or ``None`` when the plotter is gone or closed."""
-        return None if self.window is None else self._renderer()
+        if self.window is not None:
+            self._plotter().render()
 
     def _turn(self, change: Any) -> None:
         """Set the renderer's camera to the one that has changed in the browser, or here."""
-        renderer = self._open_renderer()
+        renderer = None if self.window is None else self._renderer()
         if renderer is None or _same(_camera_of(renderer), change.new):
             return
         state, camera = change.new, renderer.camera
@@ -100,64 +80,58 @@ class PlotterWidget(VDIWidget):
             camera.SetUseHorizontalViewAngle(False)
             camera.view_angle = state["view_angle"]
         renderer.ResetCameraClippingRange()
-        if self._loop is not None:  # messages may come in a thread of their own
-            self._loop.call_soon_threadsafe(self._wait_for_rest)
+        self._draw_later()
 
     def _play(self, change: Any) -> None:
         """Set the actor's time to the one that has changed in the browser, or here."""
         series = None if self._actor is None else self._actor.series
-        if series is None or change.new is None or self._open_renderer() is None:
+        if series is None or change.new is None or self.window is None:
             return
         if series.nearest(change.new) != series.nearest(self._actor.time):
             self._actor.time = change.new
-            if self._loop is not None:
-                self._loop.call_soon_threadsafe(self._wait_for_rest)
+            self._draw_later()
 
-    def _wait_for_rest(self) -> None:
-        if self._rest is not None:
-            self._rest.cancel()
-        assert self._loop is not None
-        self._rest = self._loop.call_later(_REST, self.draw)
+    def _draw_later(self) -> None:
+        """Render the plotter when nothing has changed for a while."""
+
+        def wait() -> None:
+            if self._rest is not None:
+                self._rest.cancel()
+            self._rest = loop.call_later(_REST, self.draw)
+
+        if (loop := self._loop) is not None:
+            loop.call_soon_threadsafe(wait)  # messages may come in a thread of their own
 
     def _follow(self) -> None:
         """Take what the renderer has drawn; parts of a larger picture have other cameras."""
-        renderer = self._open_renderer()
+        renderer = None if self.window is None else self._renderer()
         if renderer is None or tuple(self.window.GetTileScale()) != (1, 1):
             return
-        camera = _camera_of(renderer)
-        if not _same(camera, self.camera):
+        if not _same(camera := _camera_of(renderer), self.camera):
             self.camera = camera
-        self.background = renderer.background_color
-        self._take_if_new(renderer)
-        self._take_planes()
-        self._take_time()
-        look = _look_of(self._actor)
-        if look is not None and look != self._look:
-            self._look = look
-            self.vdi = _shown_of(self._actor)
+        if self._known != state_of(renderer):
+            self._take(renderer, scene_of(renderer, follow=True))
+        elif self._actor is not None and self._actor.series is not None:
+            self.time = self._actor.time
 
     def _accept(self, vdi: Any) -> Any:
         return None if vdi is None else super()._accept(vdi)  # subplots may have no VDI
 
-    def _take_time(self) -> None:
-        if self._actor is not None and self._actor.series is not None:
-            self.time = self._actor.time
-
-    def _take_planes(self) -> None:
-        planes = [] if self._actor is None else planes_of(self._actor)
-        self.clipping_planes = planes[:MOST_PLANES]
-
-    def _take_if_new(self, renderer: Any) -> None:
-        from pyvista_vdi.extensions.web.scenes.scene import scene_of, state_of
-
-        if self._known != state_of(renderer):
-            self._take(scene_of(renderer, camera=False, needs_vdi=False))
-
-    def _take(self, scene: Any) -> None:
-        self._known, self._actor = scene.state, scene.actor
+    def _take(self, renderer: Any, scene: Scene) -> None:
+        """Take a scene, and send what of it is another."""
+        self._known, self._actor, actor = state_of(renderer), scene.actor, scene.actor
+        self.background = renderer.background_color
+        self._gradient = scene.background if "gradient" in scene.background else ""
         if scene.data != self._scene:
             self._scene = scene.data
-        self._gradient = scene.background if "gradient" in scene.background else ""
+        if actor is None:
+            return
+        self._placed, self.clipping_planes = as_array(actor.GetMatrix()), scene.planes
+        look, self._look = self._look, look_of(actor)
+        if look not in (None, self._look):
+            self.vdi = scene.shown
+        if actor.series is not None:
+            self.time = actor.time
 
     def _still(self) -> str:
         return png(self._picture)
@@ -201,29 +175,9 @@ class SubplotsWidget(ipywidgets.GridBox):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the view, and a picture for where there can be no view."""
-        data = super()._repr_mimebundle_(**kwargs)
-        shown = png(self._picture)
+        data, shown = super()._repr_mimebundle_(**kwargs), png(self._picture)
         stand_in(shown, self._key, self.model_id)
         return {**data, "image/png": shown}
-
-
-def _look_of(actor: Any) -> Any:
-    """Return what :func:`_shown_of` depends on; ``None`` where there is no VDI."""
-    if actor is None or actor.vdi is None:
-        return None
-    several = actor.series or actor.vdi_set
-    if several is None:
-        return look_of(actor)
-    classified_at = None if several.value_range is None else actor.GetProperty().GetMTime()
-    return several, len(several), actor.opacity_multiplier, classified_at  # sets may grow
-
-
-def _shown_of(actor: Any) -> Any:
-    """Return what the browser is sent of an actor: a VDI, a series or a set; ``None`` for none."""
-    if _look_of(actor) is None:
-        return None
-    several = several_of(actor)
-    return as_shown(actor) if several is None else several
 
 
 def _camera_of(renderer: Any) -> dict[str, Any]:

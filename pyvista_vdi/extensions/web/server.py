@@ -14,6 +14,7 @@ import ipaddress
 import logging
 import secrets
 import threading
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -22,8 +23,8 @@ from urllib.parse import quote, urlsplit
 
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
 from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, Wish, wish_after
-from pyvista_vdi.extensions.web.placing import encoded
 from pyvista_vdi.extensions.web.served_page import served_page
+from pyvista_vdi.extensions.web.shown import bare_file
 from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
@@ -38,23 +39,19 @@ except ImportError as error:
 
 #: Version of what is said on the socket.
 PROTOCOL = 2
-#: Where a server listens unless it is told.
-HOST, PORT = "127.0.0.1", 8765
-#: Most lists of a VDI unless told otherwise.
-LISTS = 1280 * 720
-#: Longest list unless told otherwise. What is sent serves views near its own until the next: on the
-#: brain, 20 degrees away, lists of 20 would bring .004 of SSIM for 2.2 times the bytes.
-LONGEST = 8
-#: Most clients at once; the next is told so.
-MAX_CLIENTS = 256
 #: Bytes of one message of a VDI: a slow line takes it long before a client counts as gone.
 CHUNK = 64 * 1024
-#: Seconds between two signs of life that are asked of a client, and half as many to give one.
-HEARTBEAT = 20.0
 #: Seconds that a client has to answer a goodbye.
 _GOODBYE = 3.0
 #: Threads in which VDIs are made: while one packs and compresses, the device works for the other.
 _THREADS = 2
+#: Of the page, whose address has the token.
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",
+}
 
 _log = logging.getLogger(__name__)
 
@@ -75,7 +72,7 @@ class _Client:
         await self.socket.send_json({"type": kind, **entries})
 
     async def end(self, code: int, reason: str) -> None:
-        """Say goodbye, and go."""
+        """Close the connection with a goodbye."""
         # The protocol has 123 bytes for a reason, none of them a part of a letter
         message = reason.encode("ascii", "replace")[:120]
         await self.socket.close(code=code, message=message, drain=False)
@@ -90,18 +87,23 @@ class Server:
         What a URL must carry.
     host, port : str, int
         Where it listens; the port that was found free, if 0 was asked for.
+
+    Notes
+    -----
+    ``heartbeat``: seconds between two signs of life that are asked of a client, which has half as
+    many to give one.
     """
 
     def __init__(
         self,
         source: Source,
         *,
-        host: str = HOST,
-        port: int = PORT,
+        host: str = "127.0.0.1",
+        port: int = 8765,
         token: str | None = None,
         hosts: Sequence[str] = (),
-        max_clients: int = MAX_CLIENTS,
-        heartbeat: float = HEARTBEAT,
+        max_clients: int = 256,
+        heartbeat: float = 20.0,
     ) -> None:
         if token == "":
             raise InvalidArgumentError(
@@ -142,7 +144,7 @@ class Server:
             self.close()
             why = f"cannot listen at {self.host}, port {self.port}: {error}; choose another"
             if getattr(error, "errno", None) == errno.EADDRINUSE:
-                why = f"port {self.port} of {self.host} is in use: choose another, or 0 for a free one"
+                why = f"port {self.port} of {self.host} is in use: choose another, or 0: a free one"
             raise InvalidArgumentError(why) from error
         return self
 
@@ -154,8 +156,8 @@ class Server:
     def wait(self) -> None:
         """Return when it has ended; Ctrl-C ends it."""
         try:
-            while self._thread.is_alive():
-                self._thread.join(0.5)  # a wait without end would not let Ctrl-C through on Windows
+            while self._loop is not None:
+                time.sleep(0.2)
         finally:
             self.close()
 
@@ -208,17 +210,16 @@ class Server:
 
     def _is_ours(self, host: str) -> bool:
         """Whether a host is called by a name of ours, or by a number, which cannot point here."""
-        try:
+        name = ""
+        with contextlib.suppress(ValueError):
             name = urlsplit(f"//{host}").hostname or ""
-            with contextlib.suppress(ValueError):
-                return bool(ipaddress.ip_address(name))
-            return name in self._hosts
-        except ValueError:
-            return False
+            ipaddress.ip_address(name)
+            return True
+        return name in self._hosts
 
     async def _page(self, request: web.Request) -> web.Response:
-        text, headers = served_page(request.host)
-        return web.Response(text=text, content_type="text/html", headers=headers)
+        text = served_page(request.host)
+        return web.Response(text=text, content_type="text/html", headers=_HEADERS)
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         """Hear a client, and have what it asks for made and sent, until one of these ends."""
@@ -295,22 +296,22 @@ class Server:
 
     def _made(self, wish: Wish, cancelled: Callable[[], bool]) -> tuple[tuple[int, int], bytes]:
         vdi = self._source.make(wish, cancelled)
-        return ((0, 0), b"") if vdi is None else (vdi.window_size, encoded(vdi, coarse=True))
+        return ((0, 0), b"") if vdi is None else (vdi.window_size, bare_file(vdi))
 
 
 def serve(
     volume: VolumeLike | Sequence[VolumeLike],
     *,
-    host: str = HOST,
-    port: int = PORT,
+    host: str = "127.0.0.1",
+    port: int = 8765,
     token: str | None = None,
     hosts: Sequence[str] = (),
-    lists: int = LISTS,
-    max_supersegments: int = LONGEST,
+    lists: int = 1280 * 720,
+    max_supersegments: int = 8,
     sample_distance: float | None = None,
     ambient_occlusion: OcclusionLike | None = None,
     memory_limit: MemoryLike | None = None,
-    max_clients: int = MAX_CLIENTS,
+    max_clients: int = 256,
     device: DeviceLike | None = None,
     announce: Callable[[str], object] | None = print,
     wait: bool = True,
@@ -370,16 +371,13 @@ def serve(
         memory_limit=memory_limit,
         precision="8-byte",
     )
-    steps: Any = volume if _is_sequence(volume) else [volume]
+    # Texts, arrays and VTK's data sets have a length, too
+    single = isinstance(volume, str) or hasattr(volume, "dtype") or hasattr(volume, "GetClassName")
+    several = hasattr(volume, "__len__") and hasattr(volume, "__getitem__") and not single
+    steps: Any = volume if several else [volume]
     source = Source(steps, looks, options, lists=lists, device=device)
-    server = Server(
-        source,
-        host=host,
-        port=port,
-        token=token,
-        hosts=hosts,
-        max_clients=max_clients,
-    ).start()
+    listening = {"host": host, "port": port, "token": token, "hosts": hosts}
+    server = Server(source, max_clients=max_clients, **listening).start()
     if announce is not None:
         announce(f"Serving at {server.url} (Ctrl-C ends it)")
     if wait:
@@ -389,10 +387,3 @@ def serve(
 
 
 _NAMES = tuple(name for name in inspect.signature(serve).parameters if name != "classification")
-
-
-def _is_sequence(volume: Any) -> bool:
-    """Whether it is several volumes: texts, arrays and VTK's data sets have a length, too."""
-    if isinstance(volume, str) or hasattr(volume, "dtype") or hasattr(volume, "GetClassName"):
-        return False
-    return hasattr(volume, "__len__") and hasattr(volume, "__getitem__")

@@ -73,14 +73,17 @@ class Source:
         first, look = self._volume(0), self._transfer_function(0, ())
         checked_sample_distance(first, options.sample_distance)
         free = find_spec("pyvista") is not None and not first.rgba and not looks.in_place
-        begun = {"cmap": looks.cmap, "opacity": looks.opacity}
         self.offer: dict[str, Any] = {
             "bounds": list(first.bounds),
             "camera": viewer_camera(filling_camera(first.bounds, (4, 3))),
             "steps": len(volumes),
-            "cmaps": _names(_CMAPS, looks.cmap) if free else [],
-            "opacities": _names(_OPACITIES, looks.opacity) if free else [],
-            "look": {name: value for name, value in begun.items() if isinstance(value, str)},
+            "cmaps": list(_CMAPS) if free else [],
+            "opacities": list(_OPACITIES) if free else [],
+            "look": {
+                name: value
+                for name in ("cmap", "opacity")
+                if isinstance(value := getattr(looks, name), str)
+            },
             "range": list(look.scalar_range),
         }
 
@@ -102,8 +105,3 @@ class Source:
         with self._runtime.background(cancelled):
             request = GenerationRequest(volume, look, *seen, self._options, self._runtime)
             return generate_vdi(request)
-
-
-def _names(known: Sequence[str], begun: Any) -> list[str]:
-    """Return names, and the one that is begun with."""
-    return list(dict.fromkeys([*known, *([begun] if isinstance(begun, str) else [])]))

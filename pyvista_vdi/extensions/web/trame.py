@@ -14,7 +14,7 @@ from typing import Any
 from pyvista_vdi.errors import MissingDependencyError
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
-from pyvista_vdi.extensions.web.placing import encoded
+from pyvista_vdi.extensions.web.shown import bare_file
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.view import View
@@ -26,10 +26,10 @@ except ImportError as error:
         'this is a component for trame, which is not installed: pip install "pyvista-vdi[web]"'
     ) from error
 
-#: The component: a viewer that follows three properties, and says where it is turned to.
+#: The component: a viewer that follows two properties, and says where it is turned to.
 _COMPONENT = """
 window.pyvistaVDI = { install(app) { app.component("vdi-view", {
-  props: ["file", "eye", "background"],
+  props: ["file", "eye"],
   emits: ["turned"],
   render() { return Vue.h("vdi-viewer"); },
   mounted() {
@@ -40,14 +40,13 @@ window.pyvistaVDI = { install(app) { app.component("vdi-view", {
     viewer.addEventListener("camerachange", () => {
       clearTimeout(timer);
       timer = setTimeout(() => {
-        const density = window.devicePixelRatio || 1, { camera, clientWidth, clientHeight } = viewer;
+        const { camera, clientWidth, clientHeight } = viewer, density = devicePixelRatio || 1;
         const size = [clientWidth, clientHeight].map((e) => Math.max(1, Math.round(e * density)));
         const text = JSON.stringify({ camera, size });
         if (text !== told) this.$emit("turned", { camera, size });
         told = text;
       }, 100);
     });
-    follow("background", (color) => { viewer.background = color; });
     follow("eye", (camera) => { viewer.camera = { ...camera }; });
     follow("file", async (file) => {
       const bytes = new Uint8Array(await new Response(file).arrayBuffer());
@@ -129,7 +128,7 @@ class VDIView(AbstractElement):
     def update(self, vdi: Any) -> None:
         """Show another VDI, or its VTK form; pages draw the one before until it has come."""
         with self.server.state as state:
-            state[self._file_key] = encoded(as_vdi(vdi), coarse=True)
+            state[self._file_key] = bare_file(as_vdi(vdi))
 
     @property
     def camera(self) -> Camera | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import secrets
 from collections.abc import Sequence
@@ -14,16 +13,12 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, MissingDependencyError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
+from pyvista_vdi.extensions.web import shown as of_viewers
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, camera_of, viewer_camera
-from pyvista_vdi.extensions.web.page import check_controls, edited, refuse_look, several
-from pyvista_vdi.extensions.web.placing import EFFORT, bare
-from pyvista_vdi.extensions.web.still import picture, stand_in, still
 from pyvista_vdi.io import write_png
-from pyvista_vdi.io.vdi_file.layout import DEFLATE
-from pyvista_vdi.io.vdi_file.writer import write_to
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.metrics import check_background
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import checked_planes
 from pyvista_vdi.model.vdi import VDI, picture_view
@@ -37,133 +32,87 @@ except ImportError as error:
         'pip install "pyvista-vdi[notebook]"'
     ) from error
 
-#: What anywidget calls in the page: a view of the model that the kernel's widget is.
+#: What anywidget calls in the page: a view of the model that the kernel's widget is. The element
+#: has another name where it can play or edit: in the page there may be one that can not.
 _RENDER = """
+const NAME = "vdi-viewer%s";
+if (!customElements.get(NAME)) customElements.define(NAME, class extends VDIViewer {});
+const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+
 function render({ model, el }) {
-  const viewer = document.createElement(NAME);
-  const [width, height] = model.get("_picture_size");
+  const viewer = document.createElement(NAME), [width, height] = model.get("_picture_size");
   viewer.style.cssText =
-    `display: block; width: 100%; max-width: ${width}px; aspect-ratio: ${width} / ${height}`;
-  let known = ""; // the camera that both sides have, as text
-  let told = 0; // the frame before which the kernel will be told
-  const takeCamera = () => {
-    const camera = model.get("camera");
-    const text = JSON.stringify(camera);
-    if (text === known) return;
-    known = text;
-    viewer.camera = camera;
+    `display: block; width: 100%%; max-width: ${width}px; aspect-ratio: ${width} / ${height}`;
+  const bytesOf = (name) => {
+    const { buffer, byteOffset, byteLength } = model.get(name) ?? new Uint8Array();
+    return new Uint8Array(buffer, byteOffset, byteLength);
   };
-  const tellCamera = () => {
-    told = 0;
-    const text = JSON.stringify(viewer.camera);
-    if (text === known) return;
-    known = text;
-    model.set("camera", JSON.parse(text));
+  const tell = (name) => {
+    if (same(viewer[name], model.get(name))) return;
+    model.set(name, viewer[name]);
     model.save_changes();
-  };
-  const onCamera = () => {
-    told = told || requestAnimationFrame(tellCamera);
   };
   let timed = false; // whether there is a series, which begins at the kernel's time
-  const takeTime = () => {
-    const time = model.get("time");
-    if (timed && time !== null && viewer.time !== time) viewer.time = time;
-  };
-  const onStep = () => {
-    if (timed) return;
-    timed = true;
-    takeTime();
-  };
-  const tellTime = ({ detail }) => { // of a step that stays
-    if (!timed || !detail.full || viewer.playing || viewer.time === model.get("time")) return;
-    model.set("time", viewer.time);
-    model.save_changes();
-  };
+  let told = 0; // the frame before which the kernel will be told the camera
   const takeBackground = () => {
     viewer.background = model.get("_gradient") || (model.get("background") ?? "transparent");
   };
-  const takePlanes = () => {
-    // A scene has its own
-    const planes = model.get("_scene")?.byteLength ? [] : model.get("clipping_planes");
-    viewer.clippingPlanes =
-      planes.map((plane) => ({ origin: plane.slice(0, 3), normal: plane.slice(3) }));
-  };
-  const bytesOf = ({ buffer, byteOffset, byteLength }) =>
-    new Uint8Array(buffer, byteOffset, byteLength);
-  const takeControls = () => viewer.setAttribute("controls", model.get("controls"));
-  const takeScene = () => {
-    const packed = model.get("_scene"); // of a plotter
-    if (packed?.byteLength) viewer.scene = new Scene(bytesOf(packed));
-  };
-  const takeFile = () => {
-    const file = bytesOf(model.get("_file")); // of a subplot without VDIs there is none
-    timed = false;
-    if (file.length) viewer.showBytes(file).catch(() => {}); // the viewer says what is wrong
+  const take = {
+    background: takeBackground,
+    _gradient: takeBackground,
+    controls: () => viewer.setAttribute("controls", model.get("controls")),
+    clipping_planes() { // a scene has its own
+      const planes = bytesOf("_scene").length ? [] : model.get("clipping_planes");
+      viewer.clippingPlanes = planes.map((p) => ({ origin: p.slice(0, 3), normal: p.slice(3) }));
+    },
+    _scene() { // of a plotter
+      const packed = bytesOf("_scene");
+      if (packed.length) viewer.scene = new Scene(packed);
+    },
+    _file() { // of a subplot without VDIs there is none
+      timed = false;
+      const file = bytesOf("_file");
+      if (file.length) viewer.showBytes(file).catch(() => {}); // the viewer says what is wrong
+    },
+    camera() {
+      if (!same(viewer.camera, model.get("camera"))) viewer.camera = model.get("camera");
+    },
+    time() {
+      const time = model.get("time");
+      if (timed && time !== null && viewer.time !== time) viewer.time = time;
+    },
   };
   el.replaceChildren(viewer);
-  const key = model.get("_key"); // what stands in for the viewer has it, too: still.py
+  const key = model.get("_key"); // what stands in for the viewer has it, too: shown.py
   (globalThis.pyvistaVDIs ??= new Set()).add(key);
   document.querySelectorAll(`img[data-vdi="${key}"]`).forEach((picture) => picture.remove());
-  const taken = {
-    background: takeBackground, _gradient: takeBackground, clipping_planes: takePlanes,
-    controls: takeControls, _scene: takeScene, _file: takeFile, camera: takeCamera, time: takeTime,
-  };
-  for (const [name, take] of Object.entries(taken)) {
-    take();
-    model.on(`change:${name}`, take);
+  for (const [name, taken] of Object.entries(take)) {
+    taken();
+    model.on(`change:${name}`, taken);
   }
-  viewer.addEventListener("camerachange", onCamera);
-  viewer.addEventListener("vditime", onStep);
-  viewer.addEventListener("framedrawn", tellTime);
-  const link = model.get("_link");
-  if (link) {
-    viewer.dataset.link = link;
+  viewer.addEventListener("camerachange", () => {
+    told ||= requestAnimationFrame(() => { told = 0; tell("camera"); });
+  });
+  viewer.addEventListener("vditime", () => {
+    if (timed) return;
+    timed = true;
+    take.time();
+  });
+  viewer.addEventListener("framedrawn", ({ detail }) => { // of a step that stays
+    if (timed && detail.full && !viewer.playing) tell("time");
+  });
+  if (model.get("_link")) {
+    viewer.dataset.link = model.get("_link");
     turnTogether(viewer);
   }
   return () => {
     cancelAnimationFrame(told);
-    for (const [name, take] of Object.entries(taken)) model.off(`change:${name}`, take);
+    for (const [name, taken] of Object.entries(take)) model.off(`change:${name}`, taken);
     viewer.remove();
   };
 }
 export default { render };
 """
-
-
-#: Another element: in the page there may already be one that can neither play nor edit.
-_NAMED = """
-const NAME = "vdi-viewer-of-%s";
-if (!customElements.get(NAME)) customElements.define(NAME, class extends VDIViewer {});
-"""
-
-_PLAIN = 'const NAME = "vdi-viewer";\n'
-
-
-class _CameraTrait(traitlets.TraitType[dict[str, Any], Any]):
-    """A camera in the viewer's form; whatever is a camera becomes one."""
-
-    def validate(self, obj: Any, value: Any) -> dict[str, Any]:
-        return viewer_camera(value, obj._picture_size)
-
-
-class _ColorTrait(traitlets.TraitType["str | None", Any]):
-    """A colour as ``#rrggbb``, or ``None``."""
-
-    def validate(self, obj: Any, value: Any) -> str | None:
-        return None if value is None else _hex(value)
-
-
-class _PlanesTrait(traitlets.TraitType[list[list[float]], Any]):
-    """Clipping planes as lists of six numbers."""
-
-    def validate(self, obj: Any, value: Any) -> list[list[float]]:
-        planes = [list(plane) for plane in checked_planes(value)]
-        if len(planes) > MOST_PLANES:
-            raise InvalidArgumentError(
-                f"clipping_planes: the viewer clips a VDI to {MOST_PLANES} planes at most; "
-                f"got {len(planes)}"
-            )
-        return planes
 
 
 class VDIWidget(anywidget.AnyWidget):
@@ -227,6 +176,7 @@ class VDIWidget(anywidget.AnyWidget):
     """
 
     _has_scene = False
+    _placed: Any = None  # where the model is in the world, where its VDI does not say it
     _file = traitlets.Bytes().tag(sync=True)
     _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
     _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
@@ -234,9 +184,9 @@ class VDIWidget(anywidget.AnyWidget):
     _key = traitlets.Unicode("").tag(sync=True)
     _link = traitlets.Unicode("").tag(sync=True)  # of those that turn together
     time = traitlets.Float(None, allow_none=True).tag(sync=True)
-    camera = _CameraTrait(allow_none=False).tag(sync=True)
-    background = _ColorTrait(None, allow_none=True).tag(sync=True)
-    clipping_planes = _PlanesTrait([]).tag(sync=True)
+    camera = traitlets.Any().tag(sync=True)
+    background = traitlets.Any(None).tag(sync=True)
+    clipping_planes = traitlets.Any([]).tag(sync=True)
     controls = traitlets.Enum(["all", "none"], "all").tag(sync=True)
 
     def __init__(
@@ -249,21 +199,37 @@ class VDIWidget(anywidget.AnyWidget):
         controls: str = "all",
         **look: Any,
     ) -> None:
-        check_controls(controls)
+        one_of(controls, "controls", ("all", "none"))
         self._precision, self._first_look = precision, look
         self._vdi = shown = self._accept(vdi)
-        if not isinstance(shown, DeferredVDI):
-            refuse_look(look)
         self._esm = self._script(shown)
         super().__init__(
-            _file=self._encoded(shown),
-            _picture_size=_size_of(shown),
+            _file=self._sent(shown),
+            _picture_size=[1, 1] if shown is None else list(picture_view(shown)[1]),
             _key=secrets.token_hex(8),
             camera=picture_view(shown)[0] if camera is None else camera,
             time=shown.times[0] if isinstance(shown, VDISeries) else None,
             background=background,
             controls=controls,
         )
+
+    @traitlets.validate("camera")
+    def _check_camera(self, proposal: Any) -> dict[str, Any]:
+        return viewer_camera(proposal.value, self._picture_size)
+
+    @traitlets.validate("background")
+    def _check_background(self, proposal: Any) -> str | None:
+        return None if proposal.value is None else _hex(proposal.value)
+
+    @traitlets.validate("clipping_planes")
+    def _check_planes(self, proposal: Any) -> list[list[float]]:
+        planes = [list(plane) for plane in checked_planes(proposal.value)]
+        if len(planes) > MOST_PLANES:
+            raise InvalidArgumentError(
+                f"clipping_planes: the viewer clips a VDI to {MOST_PLANES} planes at most; "
+                f"got {len(planes)}"
+            )
+        return planes
 
     @property
     def vdi(self) -> Any:
@@ -273,9 +239,9 @@ class VDIWidget(anywidget.AnyWidget):
     @vdi.setter
     def vdi(self, vdi: Any) -> None:
         shown = self._accept(vdi)
-        if isinstance(shown, VDISeries | VDISet | DeferredVDI):
+        if not isinstance(shown, VDI):
             self._esm = self._script(shown)  # views are made anew where it is another
-        self._file = self._encoded(shown, coarse=False)  # the one before is better meanwhile
+        self._file = self._sent(shown, coarse=False)  # the one before is better meanwhile
         self._vdi = shown
         series = isinstance(shown, VDISeries)
         self.time = shown.times[shown.nearest(self.time or 0.0)] if series else None
@@ -309,8 +275,7 @@ class VDIWidget(anywidget.AnyWidget):
         VDIFileError
             If the file cannot be written.
         """
-        background = _rgb(self.background)
-        pixels = picture(self._now(), self.camera, window_size, background, self.clipping_planes)
+        pixels = of_viewers.picture(self._now(), self.camera, window_size, **self._shown_as())
         if filename is not None:
             write_png(pixels, filename)
         return pixels
@@ -320,52 +285,40 @@ class VDIWidget(anywidget.AnyWidget):
 
     def _accept(self, vdi: Any) -> Any:
         """Return what can be shown, or raise InvalidVDIError."""
-        if isinstance(vdi, DeferredVDI):
-            self._begun = vdi.classified(**self._first_look)
-            return vdi
-        if isinstance(vdi, VDISeries | VDISet):
-            if vdi.value_range is not None:
-                of = "series" if isinstance(vdi, VDISeries) else "set"
-                raise InvalidVDIError(
-                    f"this {of} keeps values, which have no colours yet, and a widget edits those "
-                    f"of one VDI alone: pass {of}.classified(cmap=..., opacity=...)"
-                )
-            as_vdi(vdi[0])
-            return vdi
-        return as_vdi(vdi)
+        return of_viewers.as_shown(vdi)
 
     def _now(self) -> VDI:
         """Return the VDI that is seen: of a series the present step, of a set the nearest one."""
-        shown = self._vdi
-        if shown is None:
+        if self._vdi is None:
             raise InvalidVDIError("there is no VDI here: plotter.screenshot() is the picture")
-        if isinstance(shown, DeferredVDI):
-            return self._begun
-        if isinstance(shown, VDISeries):
-            return shown[shown.nearest(shown.times[0] if self.time is None else self.time)]
-        return shown[shown.nearest(camera_of(self.camera))] if isinstance(shown, VDISet) else shown
+        camera = camera_of(self.camera)
+        return of_viewers.seen_of(self._vdi, camera=camera, time=self.time, **self._first_look)
+
+    def _shown_as(self) -> dict[str, Any]:
+        """Return how it is seen."""
+        color = self.background
+        rgb = None if color is None else [value / 255 for value in bytes.fromhex(color[1:])]
+        return {"background": rgb, "clipping_planes": self.clipping_planes, "placed": self._placed}
 
     def _script(self, shown: Any) -> str:
         """Return what runs in the page: what plays series, chooses of a set, or edits values."""
-        series, values = isinstance(shown, VDISeries | VDISet), isinstance(shown, DeferredVDI)
-        script = viewer_script(scene=self._has_scene, series=series, values=values, module=True)
-        name = _NAMED % "series" if series else _NAMED % "values" if values else _PLAIN
-        return script + name + _RENDER
+        needs = of_viewers.needs_of(shown)
+        script = viewer_script(scene=self._has_scene, **needs, module=True)
+        kind = next((f"-of-{name}" for name, needed in needs.items() if needed), "")
+        return script + _RENDER % kind
 
-    def _encoded(self, vdi: Any, *, coarse: bool = True) -> bytes:
-        if vdi is None:
+    def _sent(self, shown: Any, *, coarse: bool = True) -> bytes:
+        """Return the file that the browser is sent."""
+        if shown is None:
             return b""
-        if not isinstance(vdi, VDI | DeferredVDI):
-            return several(vdi._mapped(bare), compression="deflate", level=EFFORT)[0]
-        fits = self._precision is not None or vdi.counts.max() <= DEPTH_CODES
-        sent: Any = vdi.with_precision(self._precision or "8-byte") if fits else vdi
-        about = None
-        if isinstance(sent, DeferredVDI):
-            sent, about = edited(sent, self._begun)
-        stream = io.BytesIO()
+        seen = of_viewers.seen_of(shown, **self._first_look)
+        precision = self._precision or "8-byte"
+        if isinstance(shown, VDISeries | VDISet):
+            shown = shown._mapped(of_viewers.bare)
+        elif self._precision is None and shown.counts.max() > DEPTH_CODES:
+            precision = "exact"
         # A cell waits for it: a twentieth more bytes than by level 6, in half the time
-        write_to(stream, sent, DEFLATE, 1, coarse=coarse, deferred=about)
-        return stream.getvalue()
+        return of_viewers.file_of(shown, precision, 1, seen=seen, coarse=coarse)[0]
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the view, and a picture for where there can be no view."""
@@ -373,40 +326,25 @@ class VDIWidget(anywidget.AnyWidget):
         shown = self._still()
         if shown is None:
             return data, metadata
-        stand_in(shown, self._key, self.model_id)
+        of_viewers.stand_in(shown, self._key, self.model_id)
         return {**data, "image/png": shown}, metadata
 
     def _still(self) -> str | None:
         """Return that picture as base64 PNG, if it can be had."""
-        return still(self._now(), self.camera, _rgb(self.background), self.clipping_planes)
-
-
-def _size_of(shown: Any) -> list[int]:
-    """Return width and height of what the viewer is made for."""
-    first = shown[0] if isinstance(shown, VDISeries) else shown
-    return [1, 1] if first is None else list(first.picture_size)
+        return of_viewers.still(self._now(), self.camera, **self._shown_as())
 
 
 def _hex(color: Any) -> str:
     """Return a colour as ``#rrggbb``: of CSS, RGB from 0 to 1, or of PyVista."""
     from PIL import ImageColor
 
+    if not isinstance(color, str):
+        rgb = check_background(getattr(color, "float_rgb", color))
+        return "#" + bytes(round(255 * value) for value in rgb).hex()
     try:
-        if isinstance(color, str):
-            values: tuple[int, ...] = ImageColor.getrgb(color)[:3]
-        else:
-            rgb = [float(value) for value in getattr(color, "float_rgb", color)]
-            if len(rgb) != 3 or not all(0 <= value <= 1 for value in rgb):
-                raise ValueError
-            values = tuple(round(255 * value) for value in rgb)
-    except (TypeError, ValueError):
+        return "#" + bytes(ImageColor.getrgb(color)[:3]).hex()
+    except ValueError:
         raise InvalidArgumentError(
-            "a background is a name of CSS, '#rrggbb', or red, green and blue from 0 to 1; "
+            f"background must be a name of CSS, '#rrggbb', or three numbers from 0 to 1; "
             f"got {color!r}"
         ) from None
-    return "#" + "".join(f"{value:02x}" for value in values)
-
-
-def _rgb(color: str | None) -> tuple[float, ...] | None:
-    """Return the colour of ``#rrggbb`` as RGB from 0 to 1."""
-    return None if color is None else tuple(value / 255 for value in bytes.fromhex(color[1:]))

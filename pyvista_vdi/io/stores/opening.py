@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any
 
 import numpy as np
 
@@ -17,20 +17,7 @@ from pyvista_vdi.model.store_identity import ZARR_FILES
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.model.whole_file import as_path
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
 _HDF5 = (".h5", ".hdf5", ".he5")
-
-
-class Meant(TypedDict, total=False):
-    """What is meant of a store: arguments of :func:`open_volume`, with its defaults."""
-
-    level: int | str
-    camera: Any
-    window_size: Sequence[int] | None
-    time: int
-    channel: int | str
 
 
 def is_store(path: str | os.PathLike[str]) -> bool:
@@ -94,27 +81,30 @@ def open_volume(
         If it has no such level, time or channel.
     """
     if is_store(path):
-        view: Meant = {"level": level, "camera": camera, "window_size": window_size}
-        meant: Meant = {**view, "time": time, "channel": channel}
-        return open_store(path, **meant)
+        return open_store(path, level, camera, window_size, time, channel)
     chosen = {"time": time, "channel": channel}
     given: dict[str, Any] = {k: v for k, v in chosen.items() if not np.array_equal(v, 0)}
     return registry.method("Volume.read")(path, level=level, **given)  # type: ignore[no-any-return]
 
 
-def open_store(path: str | os.PathLike[str], **meant: Unpack[Meant]) -> StoredVolume:
+def open_store(
+    path: str | os.PathLike[str],
+    level: int | str = "auto",
+    camera: Any = None,
+    window_size: Sequence[int] | None = None,
+    time: int = 0,
+    channel: int | str = 0,
+) -> StoredVolume:
     """Open a store; arguments as of :func:`open_volume`."""
     outer, inner = _parts(path)
     named = outer.rstrip("/\\").lower()
     hdf5 = named.endswith(_HDF5) or (os.path.isfile(outer) and not named.endswith(".zarr"))  # noqa: PTH113
     store = open_hdf5(outer, inner) if hdf5 else open_zarr(outer, inner)
-    view = meant.get("camera"), meant.get("window_size")
-    number, why = chosen_level(store, meant.get("level", "auto"), *view)
-    time, channel = meant.get("time", 0), meant.get("channel", 0)
-    no_time = np.array_equal(time, 0)  # whatever else it is, a number or not
+    number, why = chosen_level(store, level, camera, window_size)
+    # Of four axes without names the first may be time or channel, whatever else time is
     either = "t" in store.axes and "c" not in store.axes and not store.named
-    if either and no_time and not isinstance(channel, str):
-        time, channel = channel, 0  # of four axes without names the first may be either
+    if either and np.array_equal(time, 0) and not isinstance(channel, str):
+        time, channel = channel, 0
     return StoredVolume(store, number, why, time, channel)
 
 

@@ -190,7 +190,6 @@ def chosen_level(
 ) -> tuple[int, str]:
     """Return the level of a store that is asked for, or that a view requires, and why."""
     count = len(store.levels)
-    """Return the level of a store that is asked for, or that a view requires, and why."""
     if not (isinstance(level, str) and level == "auto"):
         if not isinstance(level, (int, np.integer)) or not 0 <= level < count:
             raise InvalidArgumentError(

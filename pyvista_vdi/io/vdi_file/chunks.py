@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from os import cpu_count
 from typing import Any
@@ -51,17 +51,15 @@ def write_chunks(
     encoded: Callable[[int, int], NDArray[Any]],
     done: Callable[[], object],
 ) -> list[tuple[int, int]]:
-    """Compress an array chunk by chunk and write it.
+    """Compress an array chunk by chunk, write it, and return each chunk's bytes and its CRC-32.
 
-    ``stream``: where the chunks go, one behind the other. ``layout``: length of the array and of
-    its chunks. ``codec``: one of :data:`CODECS`, or ``"none"`` for the bare bytes. ``level``:
-    effort of the compressor, 1 to 9. ``encoded``: ``encoded(first, last)`` gives those rows as they
-    are stored: little-endian, contiguous. ``done``: called after each chunk. Returns: Bytes of each
-    chunk, and their CRC-32.
+    ``codec``: one of :data:`CODECS`, or ``"none"`` for the bare bytes. ``level``: effort of the
+    compressor, 1 to 9. ``encoded(first, last)`` gives those rows as they are stored: little-endian,
+    contiguous. ``done`` is called after each chunk.
     """
 
-    def compressed(first: int) -> tuple[bytes, int]:
-        rows = encoded(first, min(first + layout.chunk_rows, layout.n_rows))
+    def compressed(rows_of: tuple[int, int]) -> tuple[bytes, int]:
+        rows = encoded(*rows_of)
         if codec == "none":
             chunk = rows.tobytes()
         elif codec == DEFLATE:
@@ -79,9 +77,9 @@ def write_chunks(
     # the bytes do not depend on which of Blosc's own threads finishes first.
     with workers() as pool:
         index: list[tuple[int, int]] = []
-        firsts, ahead = range(0, layout.n_rows, layout.chunk_rows), 4 * _n_threads()
-        for start in range(0, len(firsts), ahead):
-            for chunk, checksum in pool.map(compressed, firsts[start : start + ahead]):
+        ranges, ahead = layout.ranges(), 4 * _MAX_THREADS
+        for start in range(0, len(ranges), ahead):
+            for chunk, checksum in pool.map(compressed, ranges[start : start + ahead]):
                 stream.write(chunk)
                 index.append((len(chunk), checksum))
                 done()
@@ -93,11 +91,10 @@ class PackedArray:
 
     So what is allocated afterwards is bounded by what the file really holds.
 
-    ``name``: of the array, for errors. ``layout``: what the array must be. ``codec``: as written.
-    ``sizes``: bytes of each chunk. ``n_bytes``: what the sizes must add up to. ``fetch``:
-    ``fetch(k, begin, end)`` gives the bytes of chunk k, which lie there among the array's; it
-    raises DamagedChunkError where they are not what was written. Raises DamagedChunkError if the
-    chunks are not as many and as long as such an array needs.
+    ``name``: of the array, for errors. ``sizes``: bytes of each chunk. ``n_bytes``: what they must
+    add up to. ``fetch(k, begin, end)`` gives the bytes of chunk k, which lie there among the
+    array's; it raises DamagedChunkError where they are not what was written. Raises
+    DamagedChunkError if the chunks are not as many and as long as such an array needs.
     """
 
     def __init__(
@@ -109,10 +106,7 @@ class PackedArray:
         n_bytes: int,
         fetch: Callable[[int, int, int], Any],
     ) -> None:
-        self.layout = layout
-        self._name = name
-        self._codec = codec
-        self._fetch = fetch
+        self.layout, self._name, self._codec, self._fetch = layout, name, codec, fetch
         bytes_of = np.asarray(sizes, dtype=np.int64)
         if len(bytes_of) != layout.n_chunks:
             raise self._damaged(f"{len(bytes_of)} chunks where {layout.n_chunks} belong")
@@ -131,39 +125,48 @@ class PackedArray:
         if self._ends[-1] != n_bytes:
             raise self._damaged(f"its chunks have {self._ends[-1]} bytes, but {n_bytes} are there")
 
-    def ranges(self) -> Iterator[tuple[int, int]]:
-        """Yield the first row of each chunk and the one behind its last."""
-        layout = self.layout
-        for first in range(0, layout.n_rows, layout.chunk_rows):
-            yield first, min(first + layout.chunk_rows, layout.n_rows)
-
     def read(self, first: int, out: NDArray[Any]) -> None:
-        """Decompress the chunk that begins with row ``first``.
+        """Decompress the chunk that begins with row ``first`` into rows as they were stored.
 
-        ``first``: as :meth:`ranges` says. ``out``: takes the chunk's rows as they were stored;
-        contiguous. Raises DamagedChunkError if the chunk is not what was written, or does not
-        decompress.
+        Raises DamagedChunkError if the chunk is not what was written, or does not decompress.
         """
         k, rows = first // self.layout.chunk_rows, out.reshape(-1)
         try:
             chunk = self._fetch(k, self._ends[k], self._ends[k + 1])
             if self._codec == "none":
                 rows.view(np.uint8)[:] = np.frombuffer(chunk, np.uint8)
-                return
-            if self._codec == DEFLATE:
-                planes = np.frombuffer(_inflated(chunk, rows.nbytes), np.uint8)
-                by_row = rows.view(np.uint8).reshape(-1, self.layout.row_bytes)
-                by_row[:] = planes.reshape(self.layout.row_bytes, -1).T
-                return
-            if chunk_size(chunk, rows.nbytes, self._codec) != len(chunk):
-                raise DamagedChunkError(f"chunk {k} has another length than it says")
-            from numcodecs import blosc
+            elif self._codec == DEFLATE:
+                # Nothing more than belongs is ever unpacked
+                stream = zlib.decompressobj()
+                data = stream.decompress(chunk, rows.nbytes + 1)
+                if len(data) != rows.nbytes or not stream.eof or stream.unused_data:
+                    raise DamagedChunkError(
+                        f"a stream of zlib does not end after the {rows.nbytes} bytes that belong"
+                    )
+                planes = np.frombuffer(data, np.uint8).reshape(self.layout.row_bytes, -1)
+                rows.view(np.uint8).reshape(-1, self.layout.row_bytes)[:] = planes.T
+            else:
+                self._check_blosc(chunk, rows.nbytes)
+                from numcodecs import blosc
 
-            blosc.decompress(chunk, rows)
-        except (DamagedChunkError, RuntimeError, ValueError, zlib.error) as error:
-            why = f"rows {first} to {first + len(out) - 1} do not decompress"
-            known = isinstance(error, DamagedChunkError)
-            raise self._damaged(str(error) if known else why) from error
+                blosc.decompress(chunk, rows)
+        except DamagedChunkError as error:
+            raise self._damaged(str(error)) from error
+        except (RuntimeError, ValueError, zlib.error) as error:
+            last = first + len(out) - 1
+            raise self._damaged(f"rows {first} to {last} do not decompress") from error
+
+    def _check_blosc(self, chunk: bytes, raw: int) -> None:
+        """Raise DamagedChunkError if a chunk does not begin with the header of so many bytes."""
+        version, _, flags, _, n_bytes, block_bytes, chunk_bytes = _HEADER.unpack_from(chunk)
+        stored = bool(flags & 0x02)  # not compressible: the bytes follow as they are
+        if version != 2 or (not stored and flags >> 5 != {"lz4": 1, "zstd": 4}[self._codec]):
+            raise DamagedChunkError(f"a chunk is not in Blosc's format with {self._codec}")
+        belong = raw + _HEADER.size if stored else len(chunk)
+        if not (n_bytes == raw and chunk_bytes == len(chunk) == belong and 0 < block_bytes <= raw):
+            raise DamagedChunkError(
+                f"a chunk declares {n_bytes} bytes in {chunk_bytes} where {raw} belong"
+            )
 
     def _damaged(self, why: str) -> DamagedChunkError:
         return DamagedChunkError(f"array {self._name!r}: {why}")
@@ -175,48 +178,6 @@ def check_level(level: Any) -> None:
         raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
 
 
-def smallest(values: NDArray[Any]) -> NDArray[Any]:
-    """Return whole numbers >= 0 in the shortest unsigned type that holds them."""
-    largest = int(values.max(initial=0))
-    kind = next(k for k in ("<u1", "<u2", "<u4", "<u8") if largest <= np.iinfo(k).max)
-    return values.astype(kind)
-
-
 def workers() -> ThreadPoolExecutor:
     """Return threads for work on chunks; in them Blosc starts none of its own."""
-    return ThreadPoolExecutor(_n_threads())
-
-
-def chunk_size(view: memoryview, raw: int, codec: str) -> int:
-    """Return the bytes of the compressed chunk that begins here, its header checked.
-
-    Raises DamagedChunkError if it is not the header of ``raw`` bytes compressed by that codec.
-    """
-    if len(view) < _HEADER.size:
-        raise DamagedChunkError("the data end before the last chunk")
-    version, _, flags, _, n_bytes, block_bytes, chunk_bytes = _HEADER.unpack_from(view)
-    stored = bool(flags & 0x02)  # not compressible: the bytes follow as they are
-    if version != 2 or (not stored and flags >> 5 != {"lz4": 1, "zstd": 4}[codec]):
-        raise DamagedChunkError(f"a chunk is not in Blosc's format with {codec}")
-    if n_bytes != raw or chunk_bytes <= _HEADER.size or not 0 < block_bytes <= raw:
-        raise DamagedChunkError(
-            f"a chunk declares {n_bytes} bytes in {chunk_bytes} where {raw} belong"
-        )
-    if stored and chunk_bytes != raw + _HEADER.size:
-        raise DamagedChunkError(f"a stored chunk of {raw} bytes declares {chunk_bytes}")
-    if raw > chunk_bytes * MAX_RATIO:
-        raise DamagedChunkError(f"{chunk_bytes} bytes cannot hold the {raw} that they declare")
-    return int(chunk_bytes)
-
-
-def _inflated(chunk: bytes, raw: int) -> bytes:
-    """Return the ``raw`` bytes that a zlib stream stands for; nothing more is ever unpacked."""
-    stream = zlib.decompressobj()
-    data = stream.decompress(chunk, raw + 1)
-    if len(data) != raw or not stream.eof or stream.unused_data:
-        raise DamagedChunkError(f"a stream of zlib does not end after the {raw} bytes that belong")
-    return data
-
-
-def _n_threads() -> int:
-    return min(_MAX_THREADS, cpu_count() or 1)
+    return ThreadPoolExecutor(min(_MAX_THREADS, cpu_count() or 1))

@@ -1,13 +1,10 @@
 """The coarse level that a page draws first: a VDI of few lists of the same view."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import length_per_depth
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, with_arrays
 
 
 def coarser(vdi: VDI, step: int = 4) -> VDI:
@@ -41,7 +38,8 @@ def coarser(vdi: VDI, step: int = 4) -> VDI:
         camera, vdi.window_size, *old
     )
     tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
-    return of_rows(vdi, camera, window, offsets, rows, tau.astype(np.float32))
+    arrays = vdi.arrays.take(offsets, rows)._replace(optical_depth=tau.astype(np.float32))
+    return with_arrays(vdi, arrays, camera=camera, window_size=window, metadata={})
 
 
 def rows_of(
@@ -51,17 +49,3 @@ def rows_of(
     offsets = np.concatenate([[0], np.cumsum(counts)])
     rows = np.repeat(vdi.offsets.view(np.int64)[lists] - offsets[:-1], counts)
     return offsets, rows + np.arange(offsets[-1])
-
-
-def of_rows(
-    vdi: VDI,
-    view: Camera,
-    window: tuple[int, int],
-    offsets: NDArray[np.int64],
-    rows: NDArray[np.int64],
-    optical_depth: NDArray[np.float32],
-) -> VDI:
-    """Return the VDI of some supersegments, without metadata."""
-    arrays: dict[str, Any] = {name: getattr(vdi, name)[rows] for name in ("front", "back", "color")}
-    arrays |= {"bounds": vdi.bounds, "depth_origin": vdi.depth_origin}
-    return VDI(view, window, offsets, optical_depth=optical_depth, **arrays)

@@ -79,6 +79,11 @@ class Layout:
         """Number of chunks."""
         return -(-self.n_rows // self.chunk_rows)
 
+    def ranges(self) -> list[tuple[int, int]]:
+        """Return the first row of each chunk and the one behind its last."""
+        firsts = range(0, self.n_rows, self.chunk_rows)
+        return [(first, min(first + self.chunk_rows, self.n_rows)) for first in firsts]
+
     def to_dict(self) -> dict[str, Any]:
         """Return what the description says about the array."""
         return {
@@ -104,32 +109,33 @@ def layouts(
 ) -> dict[str, Layout]:
     """Return the arrays of a file, in their order.
 
-    ``window_size``: W and H. ``n``: supersegments in all lists. ``counts``: type of the lists'
-    lengths, as small as they allow. ``filtered``: whether depths are stored as differences.
-    ``version``: of the format. ``precision``: one of
+    ``n``: supersegments in all lists. ``counts``: type of the lists' lengths, as small as they
+    allow. ``filtered``: whether exact depths are stored as differences. ``precision``: one of
     :data:`pyvista_vdi.model.packing.PRECISIONS`; packed since version 3.
     """
     n_lists = window_size[0] * window_size[1]
-    rows = CHUNK_ROWS
-    counts_layout = Layout(counts, (), n_lists, "none", rows)
+    arrays: dict[str, tuple[Any, tuple[int, ...], int, str]]
     if precision == "8-byte":
-        u2 = np.dtype("<u2")
-        return {
-            "counts": counts_layout,
-            "origin": Layout(np.dtype("<i4"), (), n_lists, "none", rows),
-            "stride": Layout(u2, (), n_lists, "none", rows),
-            **{name: Layout(u2, (), n, "difference", rows) for name in ("front", "back")},
-            "color": Layout(
-                np.dtype("|u1"), (3,), n, "none" if version < 4 else "channel-difference", rows
-            ),
-            "optical_depth": Layout(u2, (), n, "none", rows),
+        color_filter = "none" if version < 4 else "channel-difference"
+        arrays = {
+            "counts": (counts, (), n_lists, "none"),
+            "origin": ("<i4", (), n_lists, "none"),
+            "stride": ("<u2", (), n_lists, "none"),
+            "front": ("<u2", (), n, "difference"),
+            "back": ("<u2", (), n, "difference"),
+            "color": ("|u1", (3,), n, color_filter),
+            "optical_depth": ("<u2", (), n, "none"),
         }
-    f4, kind = np.dtype("<f4"), "difference" if filtered else "none"
-    depth = np.dtype("<u4") if filtered else f4
-    depths = {name: Layout(depth, (), n, kind, rows) for name in ("front", "back")}
+    else:
+        depths = ("<u4", (), n, "difference") if filtered else ("<f4", (), n, "none")
+        arrays = {
+            "counts": (counts, (), n_lists, "none"),
+            "front": depths,
+            "back": depths,
+            "color": ("<f4", (3,), n, "none"),
+            "optical_depth": ("<f4", (), n, "none"),
+        }
     return {
-        "counts": counts_layout,
-        **depths,
-        "color": Layout(f4, (3,), n, "none", rows),
-        "optical_depth": Layout(f4, (), n, "none", rows),
+        name: Layout(np.dtype(dtype), row_shape, rows, how, CHUNK_ROWS)
+        for name, (dtype, row_shape, rows, how) in arrays.items()
     }

@@ -6,8 +6,7 @@ import os
 import struct
 import zipfile
 import zlib
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -19,12 +18,7 @@ from numpy.typing import NDArray
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.vdi_file.chunks import (
-    CODECS,
-    DamagedChunkError,
-    PackedArray,
-    workers,
-)
+from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError, PackedArray, workers
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -44,12 +38,12 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.packing import (
-    Packed8,
+    Arrays,
     check_precision,
     colors_of_differences,
-    packed_8,
+    packed_of_stored,
 )
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, with_arrays
 
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
 _SIGNATURE = b"PK\x03\x04"
@@ -173,28 +167,23 @@ class _OpenFile:
         """Return the VDI with its arrays, all checked."""
         info = self.info
         try:
-            packed = self._packed()
-            with workers() as pool:
-                counts = pool.submit(self._decoded_counts, packed.pop("counts"))
-                packing: Packed8 | None = None
-                if info.precision == "8-byte":
-                    stored = self._decoded_codes(packed, pool, progress)
-                    offsets = counts.result()
-                    packing = packed_8(info.depth_step, offsets, stored, CHUNK_ROWS)
-                    media = packing.media(np.diff(offsets).astype(np.int64))
-                else:
-                    media = self._decoded_media(packed, pool, progress)
-                    offsets = counts.result()
-            vdi = VDI(
-                info.camera,
-                info.window_size,
-                offsets,
-                **media,
-                bounds=info.bounds,
-                depth_origin=info.depth_origin,
-                metadata=info.metadata,
-            )
-            vdi.packing = packing
+            stored = self._decoded(progress)
+            # Add up the lists' lengths. Where none is above n, a sum that wraps falls, which no
+            # VDI's offsets may
+            counts, n, packing = stored.pop("counts"), info.n_supersegments, None
+            offsets = np.zeros(len(counts) + 1, np.uint64)
+            np.cumsum(counts, out=offsets[1:])
+            if int(counts.max(initial=0)) > n or offsets[-1] != n:
+                self._refuse(f"its lists do not hold {n} supersegments")
+            if info.precision == "8-byte":
+                packing = packed_of_stored(info.depth_step, offsets, stored, CHUNK_ROWS)
+                arrays = packing.arrays()
+            else:
+                arrays = Arrays(offsets, *(array.view("<f4") for array in stored.values()))
+            about: dict[str, Any] = {"depth_origin": info.depth_origin, "metadata": info.metadata}
+            vdi = VDI(info.camera, info.window_size, *arrays, info.bounds, **about)
+            if packing is not None:
+                vdi = with_arrays(vdi, replace(packing, offsets=vdi.offsets))
             return vdi if info.deferred is None else DeferredVDI.of_lists(vdi, info.deferred)
         except DamagedChunkError as error:
             self._refuse(str(error))
@@ -343,73 +332,39 @@ class _OpenFile:
                 )
         return wanted
 
-    def _decoded_counts(self, packed: PackedArray) -> NDArray[np.uint64]:
-        """Return the offsets that the lists' lengths add up to."""
-        n, counts = self.info.n_supersegments, np.empty(packed.layout.n_rows, packed.layout.dtype)
-        for first, last in packed.ranges():
-            packed.read(first, counts[first:last])
-        offsets = np.zeros(len(counts) + 1, np.uint64)
-        np.cumsum(counts, out=offsets[1:])
-        # Where no count is above n, a sum that wraps falls, which no VDI's offsets may
-        if int(counts.max(initial=0)) > n or offsets[-1] != n:
-            self._refuse(f"its lists do not hold {n} supersegments")
-        return offsets
-
-    def _decoded_media(
-        self,
-        packed: dict[str, PackedArray],
-        pool: ThreadPoolExecutor,
-        progress: Progress | None,
-    ) -> dict[str, NDArray[Any]]:
-        """Return front, back, color and optical depth, each decompressed where it will stay."""
-        n, names = self.info.n_supersegments, ("front", "back", "color", "optical_depth")
-        color = self._layouts["color"]
+    def _decoded(self, progress: Progress | None) -> dict[str, NDArray[Any]]:
+        """Return the arrays as they were before they were filtered, each where it will stay."""
+        packed = self._packed()
         # Where a CPU device uses them in place
-        media = {name: aligned_empty(n, "<f4") for name in names}
-        media["color"] = aligned_empty((n, *color.row_shape), color.dtype)
-
-        def decode(first: int, last: int) -> None:
-            rows = {name: array[first:last] for name, array in media.items()}
-            front, back = rows["front"], rows["back"]
-            packed["front"].read(first, front)
-            packed["back"].read(first, back)
-            if packed["back"].layout.filter == "difference":
-                # Decode fronts less the back before them, and backs less their own fronts
-                gap, thickness = front.view(np.uint32), back.view(np.uint32).copy()
-                gap += thickness
-                np.cumsum(gap, dtype=np.uint32, out=back.view(np.uint32))
-                np.subtract(back.view(np.uint32), thickness, out=gap)
-            for name in ("color", "optical_depth"):
-                packed[name].read(first, rows[name])
-
-        parts = list(packed["optical_depth"].ranges())
-        done = Pieces(progress, len(parts))
-        for _ in pool.map(lambda rows: decode(*rows), parts):  # raises what went wrong
-            done()
-        return media
-
-    def _decoded_codes(
-        self,
-        packed: dict[str, PackedArray],
-        pool: ThreadPoolExecutor,
-        progress: Progress | None,
-    ) -> dict[str, NDArray[Any]]:
-        """Return the arrays of the 8-byte form as they are stored."""
         stored = {
-            name: np.empty((array.layout.n_rows, *array.layout.row_shape), array.layout.dtype)
-            for name, array in packed.items()
+            name: aligned_empty((layout.n_rows, *layout.row_shape), layout.dtype)
+            for name, layout in self._layouts.items()
         }
 
-        def decode(name: str, first: int, last: int) -> None:
-            rows = stored[name][first:last]
-            packed[name].read(first, rows)
-            if packed[name].layout.filter == "channel-difference":
-                rows[:] = colors_of_differences(rows)
+        def decode(names: tuple[str, ...], first: int, last: int) -> None:
+            for name in names:
+                rows = stored[name][first:last]
+                packed[name].read(first, rows)
+                if packed[name].layout.filter == "channel-difference":
+                    rows[:] = colors_of_differences(rows)
+            if names == faces and packed["back"].layout.filter == "difference":
+                # Fronts less the back before them, and backs less their own fronts
+                gap, back = (stored[name][first:last] for name in names)
+                thickness = back.copy()
+                gap += thickness
+                np.cumsum(gap, dtype=np.uint32, out=back)
+                np.subtract(back, thickness, out=gap)
 
-        tasks = [(name, *rows) for name, array in packed.items() for rows in array.ranges()]
+        # Fronts and backs of an exact VDI follow from each other
+        faces = ("front", "back")
+        names: list[tuple[str, ...]] = [(name,) for name in stored]
+        if self.info.precision == "exact":
+            names = [faces, *((name,) for name in stored if name not in faces)]
+        tasks = [(each, *rows) for each in names for rows in self._layouts[each[0]].ranges()]
         done = Pieces(progress, len(tasks))
-        for _ in pool.map(lambda task: decode(*task), tasks):  # raises what went wrong
-            done()
+        with workers() as pool:
+            for _ in pool.map(lambda task: decode(*task), tasks):  # raises what went wrong
+                done()
         return stored
 
     def _packed(self) -> dict[str, PackedArray]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, smallest, write_chunks
+from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
 from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
@@ -30,12 +30,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     version_of,
 )
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.packing import (
-    DEPTH_CODES,
-    Packed8,
-    channel_differences,
-    gaps_and_thicknesses,
-)
+from pyvista_vdi.model.packing import DEPTH_CODES, channel_differences, stored_rows
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import whole_file
 
@@ -87,21 +82,35 @@ def write_to(
     begins with a coarse level. ``deferred``: what a :class:`DeferredVDI` is about, whose lists
     ``vdi`` are; they have no coarse level, as values do not mix as media do.
     """
-    counts = smallest(np.diff(vdi.offsets))
+    longest = int(vdi.counts.max())
+    kind = next(kind for kind in ("<u1", "<u2", "<u4", "<u8") if longest <= np.iinfo(kind).max)
+    counts = vdi.counts.ravel().astype(kind)
+    version, packing = version_of(vdi.precision, compression), vdi.packing
     arrays = layouts(
         vdi.window_size,
         vdi.n_supersegments,
         counts.dtype,
         filtered=compression != "none",
-        version=version_of(vdi.precision, compression),
+        version=version,
         precision=vdi.precision,
     )
-    description = _described(vdi, arrays, compression, deferred)
+    # Describe them
+    entries = describe(vdi, version)
+    if deferred is not None:
+        entries |= {"format": DEFERRED_NAME, "deferred": dict(deferred)}
+    metadata = entries.pop("metadata")
+    if version >= 3:
+        entries["precision"] = vdi.precision
+    if packing is not None:
+        entries["depth_step"] = packing.step
+    entries |= {"codec": compression, "chunk_rows": CHUNK_ROWS}
+    entries["arrays"] = {name: layout.to_dict() for name, layout in arrays.items()}
+    description = to_json({**entries, "metadata": metadata})
     effort = DEFAULT_LEVELS[compression] if level is None else level
     done = Pieces(progress, sum(layout.n_chunks for layout in arrays.values()))
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(stored(DESCRIPTION), description)
-        shrinks = min(vdi.window_size) >= COARSE_STEP and int(vdi.counts.max()) <= DEPTH_CODES
+        shrinks = min(vdi.window_size) >= COARSE_STEP and longest <= DEPTH_CODES
         if coarse and compression == DEFLATE and shrinks and deferred is None:
             small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
             few = io.BytesIO()
@@ -123,66 +132,28 @@ def stored(name: str) -> zipfile.ZipInfo:
     return info
 
 
-def _described(
-    vdi: VDI, arrays: Mapping[str, Layout], codec: str, deferred: Mapping[str, Any] | None
-) -> str:
-    version = version_of(vdi.precision, codec)
-    entries = describe(vdi, version)
-    if deferred is not None:
-        entries |= {"format": DEFERRED_NAME, "deferred": dict(deferred)}
-    metadata = entries.pop("metadata")
-    packed: dict[str, Any] = {} if version < 3 else {"precision": vdi.precision}
-    if isinstance(vdi.packing, Packed8):
-        packed["depth_step"] = vdi.packing.step
-    return to_json(
-        {
-            **entries,
-            **packed,
-            "codec": codec,
-            "chunk_rows": CHUNK_ROWS,
-            "arrays": {name: layout.to_dict() for name, layout in arrays.items()},
-            "metadata": metadata,
-        }
-    )
-
-
 def _encoder(
     name: str, layout: Layout, vdi: VDI, counts: NDArray[Any]
 ) -> Callable[[int, int], NDArray[Any]]:
-    if isinstance(vdi.packing, Packed8) and name != "counts":
-        # Encode an array of the 8-byte form
-        packed = vdi.packing
-        assert isinstance(packed, Packed8)
+    """Return what gives rows of an array as they are stored."""
+    packing = vdi.packing
 
-        def encoded(first: int, last: int) -> NDArray[Any]:
-            rows: NDArray[Any]
-            if name in ("front", "back"):
-                rows = gaps_and_thicknesses(packed, vdi.offsets, first, last)[name == "back"]
-            elif name == "color":
-                rows = packed.colors(first, last)
-                if layout.filter == "channel-difference":
-                    rows = channel_differences(rows)
-            elif name == "optical_depth":
-                rows = packed.tau_codes(first, last)
-            elif name == "origin":
-                rows = packed.origins[first:last]
-            else:
-                rows = packed.strides[first:last]
-            return np.ascontiguousarray(rows, dtype=layout.dtype)
+    def encoded(first: int, last: int) -> NDArray[Any]:
+        if name == "counts":
+            rows = counts[first:last]
+        elif packing is not None:
+            rows = stored_rows(packing, name, first, last)
+            if layout.filter == "channel-difference":
+                rows = channel_differences(rows)
+        elif layout.filter == "difference":
+            # Bit patterns modulo 2**32, exact: of fronts less those of the backs before (the first
+            # as it stands, 0 where supersegments touch), and of backs less those of their fronts
+            front, back = (face[first:last].view(np.uint32) for face in (vdi.front, vdi.back))
+            rows = back - front
+            if name == "front":
+                rows = np.append(front[:1], front[1:] - back[:-1])
+        else:
+            rows = getattr(vdi, name)[first:last]
+        return np.ascontiguousarray(rows, dtype=layout.dtype)
 
-        return encoded
-    if layout.filter == "difference":
-        # Bit patterns modulo 2**32, exact: of fronts less those of the backs before (the first as
-        # it stands, 0 where supersegments touch), and of backs less those of their fronts
-        front, back = vdi.front.view(np.uint32), vdi.back.view(np.uint32)
-
-        def differences(first: int, last: int) -> NDArray[Any]:
-            if name == "back":
-                return np.subtract(back[first:last], front[first:last]).astype("<u4", copy=False)
-            gaps = front[first:last].astype("<u4")
-            gaps[1:] -= back[first : last - 1]
-            return gaps
-
-        return differences
-    array = counts if name == "counts" else getattr(vdi, name)
-    return lambda first, last: np.ascontiguousarray(array[first:last], dtype=layout.dtype)
+    return encoded

@@ -589,7 +589,7 @@ class Driver:
         return vdi
 
     def _update(self, source: Input) -> None:
-        """Have the source make its VDI now; what fails is not repeated until something changes."""
+        """Make the VDI of the source now; what fails is not repeated until something changes."""
         try:
             source.vdi()
         except Cancelled:  # of one execution
@@ -602,7 +602,7 @@ class Driver:
             raise
 
     def _drop(self) -> None:
-        """Give up what is being made in the background."""
+        """Cancel what is being made in the background."""
         self._background.drop_vdi()
         self._background.drop_estimate()
         self._making = None

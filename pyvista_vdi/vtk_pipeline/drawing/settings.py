@@ -149,7 +149,7 @@ _METHODS = {
 
 
 def with_settings(cls: _Class) -> _Class:
-    """Give a class of mappers VTK's Set and Get of each setting."""
+    """Add to a class of mappers VTK's Set and Get of each setting."""
     for field, told in _METHODS.items():
         for verb, method in zip(("Set", "Get"), _pair(field, told), strict=True):
             method.__name__ = f"{verb}{told.name}"

@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, VDIError, VDIFileError
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.io.files import format_of, holds
@@ -193,7 +194,8 @@ class VDIWriter(Algorithm):
             images, times = steps_and_times(self.GetInputAlgorithm(0, 0))
             vdis = StepSequence(lambda i: vdi_from_image(images[i]), len(times))
             options = {"precision": "8-byte", **self._options()}
-            found.load().write_steps(vdis, times, self._path or "", **options)
+            series = registry.load(registry.names()["VDISeries"])(vdis, times)
+            series.save(self._path, **options)
             return
         self.Modified()
         self.Update()

@@ -39,7 +39,7 @@ class Input:
 
     #: The series or the set whose VDIs are shown.
     collection: VDICollection | None = None
-    #: What chooses among the steps of a series and plays them: see ``extensions.series.player``.
+    #: What chooses among the steps of a series and plays them: see ``extensions.series.shown``.
     player: Any = None
     #: The values that the VDI is classified from; ``None`` where none are kept.
     deferred: DeferredVDI | None = None

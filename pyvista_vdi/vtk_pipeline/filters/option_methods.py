@@ -17,7 +17,7 @@ class OptionMethods:
 
 
 def _pair(told: Option) -> tuple[Callable[..., None], Callable[..., Any]]:
-    name, (_, text) = told.name, told.entry
+    name = told.name
 
     def setter(self: Any, value: Any) -> None:
         self.SetOptions(replace(self.GetOptions(), **{name: value}))
@@ -25,7 +25,7 @@ def _pair(told: Option) -> tuple[Callable[..., None], Callable[..., Any]]:
     def getter(self: Any) -> Any:
         return getattr(self.GetOptions(), name)
 
-    setter.__doc__ = f"Set `{name}`, as of :func:`pyvista_vdi.generate`.\n\n{text}"
+    setter.__doc__ = f"Set `{name}`, as of :func:`pyvista_vdi.generate`: {told.what}.\n\n{told.more}"
     getter.__doc__ = f"Return {told.what}."
     return setter, getter
 

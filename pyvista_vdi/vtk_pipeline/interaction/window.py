@@ -227,7 +227,7 @@ class Window:
         return list(dict.fromkeys(driver for driver in shown if driver is not None))
 
     def listen(self, interactor: Any) -> None:
-        """Let a hand take hold of VDIs, by the styles that move actors.
+        """Make VDIs movable by the interactor styles that move actors.
 
         They ask a cell picker of their own, which classifies the proxy's scalars: all transparent,
         and so a VDI is looked through. While a button goes down where a pick hits a VDI, what is in

@@ -6,33 +6,41 @@ import itertools
 
 import numpy as np
 import pytest
-from drawing import generate_chunked, generate_vdi, request
+from drawing import generate_in_blocks, generate_vdi, request
 from runtimes import fresh_runtime
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Shading, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError
-from pyvista_vdi.extensions.large import generate as large
-from pyvista_vdi.extensions.large.blocks import Blocks, Halo
-from pyvista_vdi.extensions.large.generate import task_of
-from pyvista_vdi.extensions.large.passes import Piece, light_entering
+from pyvista_vdi.extensions.large.blocks import Blocks, cuts_of, with_halo
+from pyvista_vdi.extensions.large.generate import ranges_of
+from pyvista_vdi.extensions.large.passes import Piece, Task
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.model.deferred import lengths_of
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA, Deferral
 from pyvista_vdi.model.ray_forms import Rectangle
+from pyvista_vdi.model.volume import Grid
 from pyvista_vdi.quality.targets import turned
 
-HALOS = [Halo(0, 1), Halo(1, 3)]
 CUTS = [(16, 16, 16), (47, 9, 50), (20, 41, 13)]
+
+
+def blocks_of(volume, chunks, function=None, block_bytes=1):
+    cuts = cuts_of(volume.array.shape, chunks, volume.array.dtype.itemsize, block_bytes)
+    return Blocks.of(Grid.of(volume), cuts, function or transfer_for(volume))
+
+
+def task_of(volume, camera, function, chunks, **options):
+    asked = request(volume, camera, WINDOW, function, **options)
+    return Task.of(blocks_of(volume, chunks, function), asked, (0, 255))
 
 
 @pytest.mark.parametrize("points", [(5, 6, 7), (33, 16, 17), (40, 19, 64)])
 @pytest.mark.parametrize("chunks", [(4, 4, 4), (16, 7, 100)])
 def test_every_point_is_in_one_block(points, chunks):
-    grid = Volume(np.zeros(points, np.uint8))
-    blocks = Blocks.of(grid, chunks, 1, 2000)
+    blocks = blocks_of(Volume(np.zeros(points, np.uint8)), chunks, block_bytes=2000)
     owners = np.zeros(points, int)
     for block in blocks:
         own = blocks.own(block)
@@ -43,33 +51,32 @@ def test_every_point_is_in_one_block(points, chunks):
 
 
 def test_blocks_grow_up_to_the_bytes_that_they_may_have():
-    grid = Volume(np.zeros((64, 64, 64), np.uint8))
     for item, most, counts in ((1, 16**3, (4, 4, 4)), (2, 16**3, (4, 4, 8)), (1, 1, (8, 8, 8))):
-        assert Blocks.of(grid, (8, 8, 8), item, most).counts == counts
+        cuts = cuts_of((64, 64, 64), (8, 8, 8), item, most)
+        assert tuple(len(of_axis) - 1 for of_axis in cuts) == counts
 
 
-@pytest.mark.parametrize("halo", HALOS, ids=str)
+@pytest.mark.parametrize("shading", [None, Shading()], ids=["", "shaded"])
 @pytest.mark.parametrize("chunks", [(4, 5, 6), (8, 19, 7)])
-def test_neighbours_give_the_halo(halo, chunks):
+def test_neighbours_give_the_halo(shading, chunks):
     values = np.random.default_rng(1).integers(0, 255, (13, 19, 17), np.uint8)
-    blocks = Blocks.of(Volume(values), chunks, 1, 1)
-    slabs = {block: halo.slabs(values[blocks.own(block)]) for block in blocks}
+    volume = Volume(values)
+    blocks = blocks_of(volume, chunks, transfer_for(volume, shading=shading))
+    assert (blocks.before, blocks.after) == ((1, 3) if shading else (0, 1))
+    faces = {block: blocks.faces(values[blocks.own(block)]) for block in blocks}
     for block in blocks:
-        parts = {
-            offset: halo.from_slabs(slabs[other], offset)
-            for offset, other in blocks.neighbours(block, halo).items()
-        }
-        found = blocks.with_halo(values[blocks.own(block)], parts, halo)
+        around = blocks.neighbours(block).items()
+        parts = {offset: faces[other][offset] for offset, other in around}
+        found = with_halo(values[blocks.own(block)], parts)
         box = tuple(
-            slice(max(part.start - halo.before, 0), part.stop + halo.after)
+            slice(max(part.start - blocks.before, 0), part.stop + blocks.after)
             for part in blocks.own(block)
         )
         np.testing.assert_array_equal(found, values[box], str(block))
-        first = blocks.part(block, halo, (0, 1)).first
+        first = blocks.part(block, blocks.before, (0, 1)).first
         assert first == tuple(part.start for part in reversed(box))
 
 
-@pytest.mark.parametrize("view", VIEWS)
 def points_along(camera, x, y):
     """Homogeneous points of the model frame along the ray of a pixel."""
     t = np.linspace(0.01, 250, 2000)
@@ -83,9 +90,9 @@ def points_along(camera, x, y):
 def test_rays_meet_blocks_in_their_order_and_windows(view):
     volume = volume_of("uint8")
     camera = VIEWS[view](volume)
-    blocks = Blocks.of(volume, (12, 10, 9), 1, 1)
+    task = task_of(volume, camera, transfer_for(volume), (12, 10, 9))
+    blocks = task.blocks
     order = {block: k for k, block in enumerate(blocks.in_order(camera))}
-    windows = blocks.windows(camera, WINDOW)
     assert sorted(order) == sorted(blocks)
     met = 0
     to_index = np.linalg.inv(volume.index_to_model)
@@ -103,23 +110,17 @@ def test_rays_meet_blocks_in_their_order_and_windows(view):
         places = [order[block] for block in passed]
         assert places == sorted(places)
         for block in passed:
-            window = windows[block]
+            window = task.window(block)
             assert window.x0 <= x < window.x1
             assert window.y0 <= y < window.y1
             met += 1
     assert met > 200
 
 
-def in_blocks(volume, camera, function, chunks=(16, 16, 16), **options):
-    return generate_chunked(
-        volume, camera, WINDOW, function, chunks=chunks, block_bytes=1, **options
-    )
-
-
 def both_ways(volume, camera, function, chunks=(16, 16, 16), **options):
     """Return the VDI of one piece, and that of blocks."""
     whole = generate_vdi(volume, camera, WINDOW, function, **options)
-    return whole, in_blocks(volume, camera, function, chunks, **options)
+    return whole, generate_in_blocks(volume, camera, WINDOW, function, chunks=chunks, **options)
 
 
 def check_ray_depths(found, whole):
@@ -211,23 +212,20 @@ def test_what_is_visible_only_between_two_blocks_is_seen():
     np.testing.assert_allclose(ray_depths(found), ray_depths(whole), rtol=1e-5)
 
 
-def first_passes(task, volume, blocks=None):
-    """What the first pass finds in all blocks, or in some."""
-    windows = task.blocks.windows(task.camera, WINDOW)
-    return windows, {
-        block: task.first_pass(block, volume.array[task.blocks.own(block)], windows[block])
-        for block in (blocks or windows)
+def first_passes(task, volume):
+    """What the first pass finds in all blocks."""
+    return {
+        block: task.first_pass(block, volume.array[task.blocks.own(block)]) for block in task.blocks
     }
 
 
 def first_depths(volume, camera, function, chunks):
     """Return the sums of the optical depths that the first pass finds in all blocks."""
-    task = task_of(request(volume, camera, WINDOW, function), chunks, 1)
-    total = np.zeros(WINDOW[::-1])
-    windows, seen = first_passes(task, volume)
-    for block, window in windows.items():
-        if seen[block].depths is not None:
-            total[window.y0 : window.y1, window.x0 : window.x1] += seen[block].depths
+    task, total = task_of(volume, camera, function, chunks), np.zeros(WINDOW[::-1])
+    for block, seen in first_passes(task, volume).items():
+        if seen.depths is not None:
+            x0, x1, y0, y1 = task.window(block)
+            total[y0:y1, x0:x1] += seen.depths
     return total
 
 
@@ -274,24 +272,25 @@ def test_runs_are_joined_at_faces_where_they_are_alike(interpolation, behind, ex
 def test_rows_do_not_depend_on_where_they_are_cut():
     volume = volume_of("uint8")
     camera = VIEWS["all of it"](volume)
-    asked = request(volume, camera, WINDOW, transfer_for(volume), max_supersegments=5)
-    task = task_of(asked, (8, 8, 8), 1)
-    blocks, halo = task.blocks, task.halo
-    windows, seen = first_passes(task, volume)
-    pieces = []
-    for block, light in light_entering(task, windows, seen).items():
-        parts = {
-            offset: halo.from_slabs(seen[other].slabs, offset)
-            for offset, other in blocks.neighbours(block, halo).items()
-        }
-        values = blocks.with_halo(volume.array[blocks.own(block)], parts, halo)
-        pieces.append(task.second_pass(block, values, windows[block], light))
+    task = task_of(volume, camera, transfer_for(volume), (8, 8, 8), max_supersegments=5)
+    blocks, seen, pieces = task.blocks, first_passes(task, volume), []
+    for block, light in task.light_entering({at: task.window(at) for at in blocks}, seen).items():
+        others = blocks.neighbours(block)
+        around = [seen.get(others.get(offset)) for offset in blocks.offsets]
+        values = volume.array[blocks.own(block)]
+        pieces.append(task.second_pass(block, values, light, None, *around))
     height = WINDOW[1]
-    whole = task.merge(0, height, pieces)
-    for cuts in ((0, 20, height), (0, 4, 8, 28, height), range(height + 1)):
-        rows = [task.merge(y0, y1, pieces) for y0, y1 in itertools.pairwise(cuts)]
+    whole = task.merge(0, height, *pieces)
+    for ranges in (ranges_of(height, 3), [(0, 1), (1, 30), (30, height)]):
+        rows = [task.merge(y0, y1, *pieces) for y0, y1 in ranges]
         for k, expected in enumerate(whole):
             np.testing.assert_array_equal(np.concatenate([part[k] for part in rows]), expected)
+
+
+def test_rows_are_shared_out():
+    assert ranges_of(99, 4) == [(0, 24), (24, 48), (48, 72), (72, 99)]
+    assert ranges_of(7, 3) == [(0, 4), (4, 7)]
+    assert ranges_of(3, 9) == [(0, 3)]
 
 
 def test_rows_of_a_piece():
@@ -329,7 +328,7 @@ def test_a_grid_of_occlusion_that_is_too_large_is_refused_before_anything_is_rea
     function = TransferFunction(np.ones((2, 3)), [0, 1], (0, 255))
     camera = VIEWS["all of it"](volume)
     with pytest.raises(DeviceMemoryError, match=r"radius of 8.*larger radius"):
-        generate_chunked(volume, camera, WINDOW, function, ambient_occlusion=8.0)
+        generate_in_blocks(volume, camera, WINDOW, function, ambient_occlusion=8.0)
     assert not read
 
 
@@ -342,9 +341,9 @@ def test_no_more_memory_is_taken_than_allowed(runtime, limit):
     options = {"chunks": (24, 24, 24), "memory_limit": limit, "max_supersegments": 5}
     if limit < 1_000_000:
         with pytest.raises(DeviceMemoryError, match="rows of .* memory_limit is .* smaller chunks"):
-            generate_chunked(*arguments, device=own, **options)
+            generate_in_blocks(*arguments, device=own, **options)
     else:
-        generate_chunked(*arguments, device=own, **options)
+        generate_in_blocks(*arguments, device=own, **options)
         assert own.peak_allocated <= limit
 
 
@@ -357,7 +356,11 @@ def test_it_is_given_up_when_it_is_asked_to():
         return fraction < 0.5
 
     with pytest.raises(Cancelled):
-        in_blocks(volume, VIEWS["all of it"](volume), transfer_for(volume), progress=progress)
+        generate_in_blocks(
+            *(volume, VIEWS["all of it"](volume), WINDOW, transfer_for(volume)),
+            chunks=(16, 16, 16),
+            progress=progress,
+        )
     assert told == sorted(told)
     assert 0.5 <= told[-1] < 0.9
 
@@ -373,9 +376,12 @@ def test_blocks_keep_the_values_of_one_piece(budget, default_runtime):
     )
     kept = Deferral("deferred", (20, 200), [2, 1])
     whole = generate_deferred(asked, kept)
-    found = generate_deferred(
-        asked, kept, lambda made: large.generate_chunked(made, chunks=(20, 14, 27), block_bytes=1)
-    )
+
+    def make(made):
+        view = made.volume, made.camera, WINDOW, made.transfer_function, made.options
+        return generate_in_blocks(*view, chunks=(20, 14, 27), device=default_runtime)
+
+    found = generate_deferred(asked, kept, make)
     assert found.metadata["blocks"] == [3, 3, 2]
 
     def sums(vdi):

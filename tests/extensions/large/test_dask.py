@@ -15,7 +15,7 @@ pytest.importorskip("distributed", reason="dask.distributed is not installed (ex
 import dask
 import dask.array as da
 from distributed import Client, LocalCluster
-from drawing import generate_chunked, generate_on_dask
+from drawing import generate_in_blocks
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 from pyvista_vdi import Volume, generate, open_volume
@@ -26,9 +26,7 @@ from pyvista_vdi.errors import (
     InvalidArgumentTypeError,
     InvalidVolumeError,
     NoDeviceError,
-    VDIWarning,
 )
-from pyvista_vdi.extensions.large.generate import balanced
 
 #: Seconds within which a worker starts on the busiest machine; more is a worker that never does.
 STARTED = 120
@@ -49,51 +47,54 @@ def client(tmp_path_factory):
         yield client
 
 
+def lazy(array):
+    return da.from_array(array, chunks=(16, 16, 16))
+
+
 @pytest.fixture(scope="module")
 def scene():
     volume = volume_of("uint8")
-    options = {"max_supersegments": 8, "chunks": (16, 16, 16), "block_bytes": 1}
-    return (volume, VIEWS["all of it"](volume), WINDOW, transfer_for(volume, "linear")), options
+    view = VIEWS["all of it"](volume), WINDOW, transfer_for(volume, "linear")
+    return (Volume(lazy(volume.array)), *view), {"max_supersegments": 8}
 
 
 @pytest.fixture(scope="module")
 def expected(scene, default_runtime):
     arguments, options = scene
-    return generate_chunked(*arguments, device=default_runtime, **options)
-
-
-def check_same(vdi, expected):
-    assert vdi.equals(expected)
+    return generate_in_blocks(*arguments, device=default_runtime, **options)
 
 
 def test_whoever_makes_it_the_bytes_are_the_same(client, scene, expected):
     arguments, options = scene
     told = []
-    check_same(
-        generate_on_dask(*arguments, client=client, progress=told.append, **options), expected
-    )
+    found = generate_in_blocks(*arguments, client=client, progress=told.append, **options)
+    assert found.equals(expected)
     assert told == sorted(told)
     assert told[0] == 0
     assert told[-1] == pytest.approx(1)
-    one = list(client.nthreads())[:1]
-    check_same(generate_on_dask(*arguments, client=client, workers=one, **options), expected)
+
+
+def test_what_is_out_of_sight_is_empty(client, scene):
+    volume, camera, *rest = scene[0]
+    away = camera.replace(focal_point=tuple(2 * np.array(camera.position) - camera.focal_point))
+    found = generate_in_blocks(volume, away, *rest, client=client)
+    assert found.n_supersegments == 0
 
 
 def test_values_are_the_same_by_workers(client, scene, default_runtime):
     volume, camera, size, _ = scene[0]
-    chunked = Volume(da.from_array(volume.array, chunks=(16, 41, 25)), volume.spacing)
     options = {"classification": "deferred", "value_range": (20, 200), "max_supersegments": 8}
-    expected = generate(chunked, camera, size, device=default_runtime, **options)
+    expected = generate(volume, camera, size, device=default_runtime, **options)
     assert expected.n_supersegments > 1000
-    check_same(generate(chunked, camera, size, client=client, **options), expected)
+    assert generate(volume, camera, size, client=client, **options).equals(expected)
 
 
 @pytest.mark.slow
 def test_occlusion_is_the_same_by_workers(client, scene, default_runtime):
     arguments, options = scene
     options = {**options, "ambient_occlusion": 8.0}
-    expected = generate_chunked(*arguments, device=default_runtime, **options)
-    check_same(generate_on_dask(*arguments, client=client, **options), expected)
+    expected = generate_in_blocks(*arguments, device=default_runtime, **options)
+    assert generate_in_blocks(*arguments, client=client, **options).equals(expected)
 
 
 def kill_once(pid, fraction):
@@ -123,14 +124,15 @@ def test_a_killed_worker_changes_nothing(client, scene, expected, fraction):
     arguments, options = scene
     client.wait_for_workers(2, timeout=STARTED)
     progress = kill_once(lambda: min(client.run(os.getpid).values()), fraction)
-    check_same(generate_on_dask(*arguments, client=client, progress=progress, **options), expected)
+    found = generate_in_blocks(*arguments, client=client, progress=progress, **options)
+    assert found.equals(expected)
     client.wait_for_workers(2, timeout=STARTED)
 
 
 def test_cancelled_at_once(client, scene):
     arguments, options = scene
     with pytest.raises(Cancelled):
-        generate_on_dask(*arguments, client=client, progress=lambda done: done < 0.1, **options)
+        generate_in_blocks(*arguments, client=client, progress=lambda done: done < 0.1, **options)
     ends = time.monotonic() + STARTED  # the client's request may still be on its way
     while left := client.run_on_scheduler(_left):
         assert time.monotonic() < ends, left
@@ -139,13 +141,6 @@ def test_cancelled_at_once(client, scene):
 
 def _left(dask_scheduler):
     return [str(key) for key in dask_scheduler.tasks if "pass" in str(key)]
-
-
-def test_dask_arrays_are_computed_where_they_are_needed(client, scene, expected):
-    (volume, *rest), options = scene
-    lazy = Volume(da.from_array(volume.array, chunks=(16, 16, 16)), volume.spacing)
-    options = {key: value for key, value in options.items() if key != "chunks"}
-    check_same(generate_on_dask(lazy, *rest, client=client, **options), expected)
 
 
 @pytest.mark.parametrize(
@@ -158,43 +153,41 @@ def test_dask_arrays_are_computed_where_they_are_needed(client, scene, expected)
 )
 def test_what_is_no_client_is_refused(client, scene, given, error, message):
     (volume, camera, size, function), _ = scene
-    lazy = Volume(da.from_array(volume.array, chunks=(16, 16, 16)))
     wrong = client.cluster if given == "cluster" else given
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
         pytest.raises(error, match=message),
     ):
-        generate(lazy, camera, size, transfer_function=function, client=wrong)
+        generate(volume, camera, size, transfer_function=function, client=wrong)
 
 
-def test_an_address_is_that_of_its_scheduler(client, scene):
-    (volume, camera, size, function), _ = scene
-    lazy = Volume(da.from_array(volume.array, chunks=(16, 16, 16)), volume.spacing)
-    found = generate(
-        lazy, camera, size, transfer_function=function, client=client.scheduler.address
-    )
-    assert found.n_supersegments > 1000
+def test_an_address_is_that_of_its_scheduler(client, scene, expected):
+    (volume, camera, size, function), options = scene
+    options = {**options, "transfer_function": function, "client": client.scheduler.address}
+    assert generate(volume, camera, size, **options).n_supersegments > 1000
 
 
-def test_dask_arrays_of_unknown_chunks_say_what_to_call(scene):
-    (volume, *_), _ = scene
-    lazy = da.from_array(volume.array, chunks=(16, 16, 16))
-    with pytest.raises(InvalidVolumeError, match="compute_chunk_sizes"):
-        Volume(lazy[lazy[:, 0, 0] < 200])
-
-
-def test_what_cannot_be_read_is_named(client, scene):
-    (volume, *rest), options = scene
+@pytest.mark.parametrize(
+    ("fails", "says"),
+    [
+        ("raises", r"block \(1, 1, 1\) \(points \[16:32.*disk is gone"),
+        pytest.param("dies", r"block \(1, 1, 1\).*died, 4 in all", marks=pytest.mark.slow),
+    ],
+)
+def test_what_cannot_be_read_is_named(client, scene, fails, says):
+    (_, *rest), options = scene
 
     def broken(part, block_info=None):
-        if block_info[0]["chunk-location"] == (1, 1, 1):
-            raise OSError("the disk is gone")
-        return part
+        if block_info[0]["chunk-location"] != (1, 1, 1):
+            return part
+        if fails == "dies":
+            os._exit(9)  # as of too little memory
+        raise OSError("the disk is gone")
 
-    array = da.from_array(volume.array, chunks=(16, 16, 16)).map_blocks(broken, dtype=np.uint8)
-    options = {key: value for key, value in options.items() if key != "chunks"}
-    with pytest.raises(DeviceError, match=r"block \(1, 1, 1\) \(points \[16:32.*disk is gone"):
-        generate_on_dask(Volume(array), *rest, client=client, **options)
+    array = lazy(volume_of("uint8").array).map_blocks(broken, dtype=np.uint8)
+    with pytest.raises(DeviceError, match=says):
+        generate_in_blocks(Volume(array), *rest, client=client, **options)
+    client.wait_for_workers(2, timeout=STARTED)
 
 
 def zarr_store(folder, values, **options):
@@ -239,11 +232,6 @@ def in_folders(client, tmp_path, monkeypatch):
         client.run(os.chdir, folder, workers=[worker])
 
 
-def generated(opened, rest, client, **options):
-    options |= {"client": client, "max_supersegments": 8, "block_bytes": 1}
-    return generate_on_dask(opened, *rest, **options)
-
-
 @pytest.mark.skipif(not Path("/proc/self/cwd").exists(), reason="a path that differs by process")
 @pytest.mark.parametrize("kind", [*STORES, "dask"])
 @pytest.mark.parametrize(
@@ -252,17 +240,17 @@ def generated(opened, rest, client, **options):
 def test_a_worker_that_has_not_the_same_store_is_named(
     client, scene, in_folders, where, said, kind
 ):
-    (volume, *rest), _ = scene
-    here = in_folders("here", where)
+    (_, *rest), options = scene
+    array, here = volume_of("uint8").array, in_folders("here", where)
     make = STORES["zarr" if kind == "dask" else kind]
-    make(here, volume.array)
+    make(here, array)
     if where != "none":
-        make(here.parent / where, volume.array // 2)
+        make(here.parent / where, array // 2)
     path = "/proc/self/cwd/s"  # as of a mount that is not the same on all machines
     opened = Volume(da.from_zarr(path)) if kind == "dask" else open_volume(path)
     bad = list(client.nthreads())[1]
     with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.*{said}"):
-        generated(opened, rest, client)
+        generate_in_blocks(opened, *rest, client=client, **options)
 
 
 @pytest.mark.every(9)
@@ -270,70 +258,35 @@ def test_a_worker_that_has_not_the_same_store_is_named(
 def test_relative_paths_are_this_process_s_and_changes_are_seen_while_it_is_open(
     client, scene, in_folders, kind, default_runtime
 ):
-    (volume, *rest), _ = scene
-    here = in_folders("none", "none")
-    STORES[kind](here, volume.array)
+    (_, *rest), options = scene
+    array, here = volume_of("uint8").array, in_folders("none", "none")
+    STORES[kind](here, array)
     opened = open_volume("s")
-    whole = generate_chunked(opened, *rest, max_supersegments=8, block_bytes=1)
-    check_same(generated(opened, rest, client), whole)
+    whole = generate_in_blocks(opened, *rest, **options)
+    assert generate_in_blocks(opened, *rest, client=client, **options).equals(whole)
     if kind == "hdf5":
         del opened
-    changed = np.where(volume.array > 100, 0, volume.array)
+    changed = np.where(array > 100, 0, array)
     STORES[kind](here, changed)
     if kind == "hdf5":
         opened = open_volume("s")
-    found = generated(opened, rest, client)
-    check_same(
-        found,
-        generate_chunked(
-            Volume(changed), *rest, max_supersegments=8, chunks=(16,) * 3, block_bytes=1
-        ),
-    )
+    found = generate_in_blocks(opened, *rest, client=client, **options)
+    expected = generate_in_blocks(Volume(changed), *rest, chunks=(16, 16, 16), **options)
+    assert found.equals(expected)
     assert not found.equals(whole)
 
 
-def test_workers_without_a_device_are_named(client, scene, expected):
+def test_a_worker_without_a_device_is_named(client, scene):
     arguments, options = scene
-    workers = list(client.nthreads())
+    worker = list(client.nthreads())[1]
     before = os.environ.get("PYVISTA_VDI_DEVICE", "")
 
-    def choose(name, only=None):
-        client.run(lambda: os.environ.update(PYVISTA_VDI_DEVICE=name), workers=only)
+    def choose(name):
+        client.run(lambda: os.environ.update(PYVISTA_VDI_DEVICE=name), workers=[worker])
 
     try:
-        choose("nobody", workers[:1])
-        with pytest.warns(VDIWarning, match=f"1 of 2 workers.*{workers[0]}.*nobody"):
-            vdi = generate_on_dask(*arguments, client=client, **options)
-        check_same(vdi, expected)
         choose("nobody")
-        with pytest.raises(NoDeviceError, match=f"no worker.*{workers[0]}"):
-            generate_on_dask(*arguments, client=client, **options)
+        with pytest.raises(NoDeviceError, match=f"1 of 2 workers.*{worker}.*nobody"):
+            generate_in_blocks(*arguments, client=client, **options)
     finally:
         choose(before)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are killed by SIGKILL")
-def test_nobody_waits_for_workers_that_are_gone(client, scene):
-    arguments, options = scene
-    client.wait_for_workers(2, timeout=STARTED)
-    one = list(client.nthreads())[:1]
-    pid = next(iter(client.run(os.getpid, workers=one).values()))
-    progress = kill_once(lambda: pid, 0.2)
-    with pytest.raises(DeviceError, match=f"are gone: {one[0]}"):
-        generate_on_dask(*arguments, client=client, workers=one, progress=progress, **options)
-    client.wait_for_workers(2, timeout=STARTED)
-
-
-def test_rows_are_balanced_by_what_is_in_them():
-    weights = np.zeros(99, np.int64)
-    weights[40:60] = 100
-    ranges = list(balanced(weights, 4))
-    assert ranges[0][0] == 0
-    assert ranges[-1][1] == 99
-    assert all(a[1] == b[0] for a, b in zip(ranges, ranges[1:]))  # noqa: B905, RUF007
-    assert all(y0 % 4 == 0 for y0, _ in ranges)
-    # A group of four rows is 400 of 2000: a range has a fourth of all, or one group more or less
-    assert all(abs(weights[y0:y1].sum() - 500) <= 400 for y0, y1 in ranges)
-    assert list(balanced(np.zeros(7, np.int64), 3)) == [(0, 7)]
-    assert list(balanced(np.ones(3, np.int64), 9)) == [(0, 3)]

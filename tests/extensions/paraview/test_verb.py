@@ -13,7 +13,7 @@ import pytest
 from command_line import complaint, outcome, run
 
 from pyvista_vdi.extensions.paraview import cli as verb
-from pyvista_vdi.extensions.paraview.parts.one_process import require_one_process
+from pyvista_vdi.extensions.paraview.parts.client import require_one_process
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ import shutil
 import numpy as np
 import pytest
 from command_line import run
-from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import (
@@ -23,8 +22,11 @@ pytestmark = pytest.mark.filterwarnings("ignore:the transfer function shows valu
 
 SIZE, RANGE = (24, 16), (20, 180)
 TIMES = (0.0, 0.5, 2.0, 4.0)
-KEPT = {"classification": "deferred", "value_range": RANGE}
-KEPT["settings"] = pvdi.Settings(importance=[1, 2])
+KEPT = {
+    "classification": "deferred",
+    "value_range": RANGE,
+    "settings": pvdi.Settings(importance=[1, 2]),
+}
 LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.8], "clim": (40, 170)}
 
 
@@ -142,18 +144,19 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
 @pytest.mark.parametrize(
     ("kept", "says"),
     [
-        ({"importance": [1, -1]}, "importance must be"),
-        ({"value_range": RANGE, "importance": [(0, 0), (300, 0)]}, "importance is 0 over all"),
-        ({"importance": "much"}, "importance must be.*much"),
+        ({"settings": pvdi.Settings(importance=[1, -1])}, "importance must be"),
+        (
+            {"value_range": RANGE, "settings": pvdi.Settings(importance=[(0, 0), (300, 0)])},
+            "importance is 0 over all",
+        ),
+        ({"settings": pvdi.Settings(importance="much")}, "importance must be.*much"),
         ({"ambient_occlusion": pvdi.AmbientOcclusion()}, "ambient occlusion follows"),
     ],
 )
 def test_what_cannot_be_kept_is_refused_before_a_step_is_written(kept, says, tmp_path):
     path = tmp_path / "a.vdis"
     with (
-        pvdi.SeriesWriter(
-            path, CAMERA, SIZE, classification="deferred", **with_settings(**kept)
-        ) as out,
+        pvdi.SeriesWriter(path, CAMERA, SIZE, classification="deferred", **kept) as out,
         pytest.raises((InvalidArgumentError, UnsupportedError), match=says),
     ):
         out.append(next(volumes()))

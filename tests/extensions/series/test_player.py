@@ -12,7 +12,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.extensions.series.player import Player
+from pyvista_vdi.extensions.series.shown import SeriesInput
 
 #: Seconds after which something that should have happened has not.
 LONG = 600.0
@@ -78,9 +78,9 @@ def steps(clock):
 
 @pytest.fixture
 def player(steps, clock, default_runtime):
-    player = Player(pvdi.VDISeries(steps, np.arange(N) * 0.5), clock)
+    player = SeriesInput(pvdi.VDISeries(steps, np.arange(N) * 0.5), clock)
     yield player
-    player.close()
+    player.rest()
 
 
 def _settled():
@@ -99,11 +99,11 @@ def look(player, clock, seconds=0.1001):
 
 
 def test_a_step_is_shown_by_its_index_or_by_its_time(player, steps):
-    assert (player.step, player.time, player.vdi) == (0, 0.0, steps.vdis[0])
+    assert (player.step, player.time, player.current) == (0, 0.0, steps.vdis[0])
     player.step = -1
-    assert (player.step, player.time, player.vdi) == (N - 1, 3.5, steps.vdis[-1])
+    assert (player.step, player.time, player.current) == (N - 1, 3.5, steps.vdis[-1])
     player.time = 1.1
-    assert (player.step, player.vdi) == (2, steps.vdis[2])
+    assert (player.step, player.current) == (2, steps.vdis[2])
     player.step = np.int64(3)
     assert player.step == 3
     assert not player.advance()
@@ -138,7 +138,7 @@ def test_every_step_is_shown_when_it_is_due(player, steps, clock):
         assert not player.advance()  # not yet
         assert look(player, clock)
         shown.append(player.step)
-        assert player.vdi is steps.vdis[player.step]
+        assert player.current is steps.vdis[player.step]
     assert shown == [(1 + k) % N for k in range(2 * N)]
     assert player.dropped == 0
 
@@ -223,7 +223,7 @@ def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
     assert {1, 3, 4, 5, 6, 7, 0} <= set(shown)
     player.step = 2
     with pytest.raises(VDIFileError, match="step 2"):
-        _ = player.vdi
+        _ = player.current
 
 
 def test_few_steps_are_held_where_memory_is_short(player, steps, clock):
@@ -247,7 +247,7 @@ def test_what_is_kept_is_not_decoded_in_the_next_round(player, steps, clock, kep
             steps.asked.clear()
         assert look(player, clock)
         assert steps.living() <= kept
-        assert player.vdi.equals(steps.vdis[player.step])
+        assert player.current.equals(steps.vdis[player.step])
     # Of a round that does not fit, some are the same in each
     assert len(steps.asked) == 0 if kept == N else len(set(steps.asked)) < N
 
@@ -258,5 +258,5 @@ def test_nobody_looks_and_nothing_goes_on(player, steps, clock):
     player.advance()
     _settled()
     assert len(steps.asked) <= 3
-    player.close()
+    player.rest()
     assert not [t for t in threading.enumerate() if t.name == "pyvista-vdi series"]

@@ -78,5 +78,5 @@ def test_mistakes_are_named(volume, saved, capsys, tmp_path):
     assert "half_angle" in run(capsys, *bad, status=1)
     for option in (["--thickness", "1"],):
         error = run(capsys, "convert", saved, "-o", tmp_path / "a.vdiset", *option, status=1)
-        assert f"{option[0]} is for" in error
+        assert f"{' '.join(option)} is for" in error
     assert not list(tmp_path.iterdir())

@@ -435,7 +435,7 @@ def test_without_controls_there_are_none(vdi, open_page, tmp_path):
 @pytest.mark.parametrize("kind", ["html", "series"])
 def test_other_controls_are_refused_before_anything_is_written(kind, vdi, tmp_path):
     shown = vdi if kind == "html" else pvdi.VDISeries([vdi], [0.0])
-    with pytest.raises(InvalidArgumentError, match=r'controls is "all" or "none"; got .bar.'):
+    with pytest.raises(InvalidArgumentError, match=r"controls must be 'all' or 'none'; got 'bar'"):
         shown.save(tmp_path / "a.html", controls="bar")
     assert not list(tmp_path.iterdir())
 

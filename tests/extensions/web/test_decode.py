@@ -6,29 +6,23 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from browsers import WITHOUT_WORKERS, assert_decoded, file_of, in_base64
+from browsers import assert_decoded, file_of, in_base64
+from in_node import in_node
 from rewriting import described, rewritten
 from strategies import random_vdi
 
 from pyvista_vdi.io.vdi_file.coarse import coarser
 
-SCRIPT = """
-import { decodeVDI } from "./decode.js";
-import { load } from "./loader.js";
-window.decoded = (bytes) => told(decodeVDI(bytes));
-window.loadVDI = load;
-"""
+DECODED = """async (...texts) => {
+  const { decodeVDI } = await from("decode.js");
+  return Promise.all(texts.map((text) => told(decodeVDI(bytesOf(text)))));
+}"""
 
 PACKED = ("counts", "origin", "stride", "front", "back", "color", "optical_depth")
 
 
-@pytest.fixture
-def page(open_page):
-    return open_page(script=SCRIPT)
-
-
-def decoded(page, data):
-    return page.evaluate("(text) => decoded(bytesOf(text))", in_base64(data))
+def decoded(*files):
+    return in_node(DECODED, *map(in_base64, files))
 
 
 def random(seed, max_window=(6, 5)):
@@ -52,109 +46,75 @@ def large_vdi():
 
 
 @pytest.mark.parametrize("precision", ["exact", "8-byte"])
-def test_arrays_are_python_s(precision, page):
-    for vdi in (large_vdi(), *(random_vdi(np.random.default_rng(seed)) for seed in range(4))):
-        packed = vdi.with_precision(precision)
-        assert_decoded(decoded(page, file_of(packed)), packed)
+def test_arrays_are_python_s(precision):
+    vdis = large_vdi(), *(random_vdi(np.random.default_rng(seed)) for seed in range(4))
+    kept = [vdi.with_precision(precision) for vdi in vdis]
+    for got, vdi in zip(decoded(*map(file_of, kept)), kept, strict=True):
+        assert_decoded(got, vdi)
 
 
-@pytest.mark.parametrize("codec", ["lz4", "zstd", "none"])
-def test_other_compressions_are_refused_with_the_remedy(codec, page):
-    answer = decoded(page, file_of(random(1), codec))
-    assert f"is compressed with {codec}, and pages read deflate alone" in answer
-    assert "pyvista-vdi convert" in answer
-
-
-def levels_of(vdi):
-    small, window = coarser(vdi), list(vdi.window_size)
-    return [
+def test_the_coarse_level_comes_before_the_rest_is_there():
+    """Bytes and base64 text that ends anywhere; before it an empty VDI of the same view."""
+    vdi = random(1, (24, 18))
+    data, small, window = file_of(vdi), coarser(vdi), list(vdi.window_size)
+    cut = data.index(b"PK\3\4", data.index(b"PK\5\6"))  # the member behind the coarse level
+    early, all_of_it = in_node(
+        """async (text, cut) => {
+          const { LevelDecoder } = await from("decode.js");
+          const bytes = bytesOf(text), levels = [], rest = textOf(bytes.subarray(cut - 10));
+          const decoder = new LevelDecoder(({ level, offsets, windowSize, pictureSize }) =>
+            levels.push([level, offsets.at(-1), windowSize, pictureSize]));
+          await decoder.push(bytes.slice(0, cut - 10));
+          await decoder.push(rest.slice(0, 26));
+          const early = levels.length;
+          await decoder.push(rest.slice(26));
+          await decoder.end();
+          return [early, levels];
+        }""",
+        in_base64(data),
+        cut,
+    )
+    assert early == 2
+    assert all_of_it == [
+        ["begun", 0, [1, 1], window],
         ["coarse", small.n_supersegments, list(small.window_size), window],
         ["full", vdi.n_supersegments, window, window],
     ]
 
 
-TOLD = "({ level, n, windowSize, pictureSize }) => [level, n, windowSize, pictureSize]"
-
-
-def test_the_coarse_level_comes_before_the_rest_is_there(page):
-    """The source gives nothing more until the coarse level has come."""
-    vdi = random(1, (24, 18))
-    data = file_of(vdi)
-    cut = data.index(b"PK\3\4", data.index(b"PK\5\6"))  # the member behind the coarse level
-    levels = page.evaluate(
-        f"""async ([text, cut]) => {{
-          const bytes = bytesOf(text), levels = [], rest = Promise.withResolvers();
-          async function* pieces() {{
-            yield bytes.slice(0, cut - 10);
-            yield textOf(bytes.subarray(cut - 10, cut + 11)).slice(0, 26);
-            await rest.promise;
-            yield textOf(bytes.subarray(cut - 10, cut + 11)).slice(26);
-            yield textOf(bytes.subarray(cut + 11));
-          }}
-          await loadVDI(pieces(), {{ onLevel: (prepared) => {{
-            levels.push(({TOLD})(prepared));
-            rest.resolve();
-          }} }});
-          return levels;
-        }}""",
-        [in_base64(data), cut],
-    )
-    assert levels == levels_of(vdi)
-
-
-def test_without_workers_the_page_decodes(open_page):
-    """Where a policy forbids workers."""
-    vdi = random(1, (24, 18))
-    levels = open_page(script=SCRIPT, before=WITHOUT_WORKERS).evaluate(
-        f"""async (text) => {{
-          const levels = [];
-          await loadVDI(bytesOf(text), {{ onLevel: (it) => levels.push(({TOLD})(it)) }});
-          return levels;
-        }}""",
-        in_base64(file_of(vdi)),
-    )
-    assert levels == levels_of(vdi)
-
-
-def test_every_truncation_is_noticed(page):
+def test_every_truncation_is_noticed():
     """But for the archive's directory behind the last member, which nothing is read from."""
     data = file_of(random(1))
     end = zipfile.ZipFile(BytesIO(data)).start_dir
     cuts = [*range(0, end, 41), end - 1, end]
-    answers = page.evaluate(
-        """async ([text, cuts]) => {
-          const bytes = bytesOf(text), answers = [];
-          for (const cut of cuts) answers.push(await decoded(bytes.slice(0, cut)));
-          return answers.map(String);
-        }""",
-        [in_base64(data), cuts],
-    )
-    for cut, answer in zip(cuts, answers, strict=True):
+    for cut, answer in zip(cuts, decoded(*(data[:cut] for cut in cuts)), strict=True):
         assert answer.startswith("VDIFileError: the VDI file is "), (cut, answer)
         assert "truncated" in answer, (cut, answer)
 
 
-def test_every_changed_byte_is_noticed_or_harmless(page):
+def test_every_changed_byte_is_noticed_or_harmless():
     data = file_of(random(2))
-    outcome = page.evaluate(
-        """async ([text, step]) => {
-          const bytes = bytesOf(text), whole = JSON.stringify(await decoded(bytes));
-          const outcome = { refused: 0, same: 0, other: [] };
+    refused, same, other = in_node(
+        """async (text, step) => {
+          const { decodeVDI } = await from("decode.js");
+          const bytes = bytesOf(text), whole = JSON.stringify(await told(decodeVDI(bytes)));
+          const outcome = [0, 0, []];
           for (let k = 0; k < bytes.length; k += step) {
             const changed = bytes.slice();
             changed[k] ^= 0x55;
-            const answer = await decoded(changed);
-            if (typeof answer === "string" && answer.startsWith("VDIFileError")) ++outcome.refused;
-            else if (JSON.stringify(answer) === whole) ++outcome.same;
-            else outcome.other.push([k, answer]);
+            const answer = await told(decodeVDI(changed));
+            if (typeof answer === "string" && answer.startsWith("VDIFileError")) ++outcome[0];
+            else if (JSON.stringify(answer) === whole) ++outcome[1];
+            else outcome[2].push([k, answer]);
           }
           return outcome;
         }""",
-        [in_base64(data), max(1, len(data) // 400)],
+        in_base64(data),
+        max(1, len(data) // 400),
     )
-    assert outcome["other"] == []
+    assert other == []
     # The coarse level, the directory and the headers' times and attributes are not read here
-    assert outcome["refused"] > 0.4 * (outcome["refused"] + outcome["same"])
+    assert refused > 0.4 * (refused + same)
 
 
 HOSTILE = {
@@ -179,46 +139,29 @@ NO_CAMERAS = (
 )
 
 
-def test_hostile_headers(page):
+def test_hostile_headers_and_other_compressions():
     vdi = random(2)
     data, camera = file_of(vdi), vdi.camera.to_dict()
     changes = [{name: value} for name, values in HOSTILE.items() for value in values]
     for wrong in (*NO_CAMERAS, {"position": camera["focal_point"]}):
         changes.append({"camera": {**camera, **wrong}})
-    for change in changes:
-        answer = decoded(page, described(data, **change))
+    answers = decoded(*(described(data, **change) for change in changes))
+    for change, answer in zip(changes, answers, strict=True):
         assert isinstance(answer, str), change
         assert answer.startswith("VDIFileError: "), (change, answer)
+    codecs = "lz4", "zstd", "none"
+    for codec, answer in zip(codecs, decoded(*(file_of(vdi, c) for c in codecs)), strict=True):
+        assert f"is compressed with {codec}, and pages read deflate alone" in answer
+        assert "pyvista-vdi convert" in answer
 
 
-@pytest.mark.parametrize("more", [b"", b"\0" * 10**7], ids=["too short", "too long"])
-def test_streams_that_lie_about_their_size(more, page):
+def test_streams_that_lie_about_their_size():
     """A stream that goes on is broken off; one that ends early is noticed."""
+    data, lies = file_of(random(2)), []
+    for change in (lambda raw: raw[:-1], lambda raw: raw + b"\0" * 10**7):
 
-    def edit(members):
-        raw = zlib.decompress(members["back"])
-        members["back"] = zlib.compress(raw + more if more else raw[:-1])
+        def edit(members, change=change):
+            members["back"] = zlib.compress(change(zlib.decompress(members["back"])))
 
-    answer = decoded(page, rewritten(file_of(random(2)), edit, PACKED))
-    assert "does not decompress to the" in answer
-
-
-def test_a_load_can_be_ended(page):
-    """And the worker that was decoding is gone: the next load has one that answers it alone."""
-    reason, levels = page.evaluate(
-        """async (text) => {
-          const bytes = bytesOf(text), stop = new AbortController(), levels = [];
-          async function* pieces() {
-            yield bytes.slice(0, 100);
-            stop.abort(new Error("enough"));
-            yield bytes.slice(100);
-          }
-          const onLevel = ({ level }) => levels.push(level);
-          const reason = await loadVDI(pieces(), { onLevel, signal: stop.signal }).then(
-            () => "loaded", (error) => error.message);
-          await loadVDI(bytes, { onLevel });
-          return [reason, levels];
-        }""",
-        in_base64(file_of(random(1, (24, 18)))),
-    )
-    assert (reason, levels) == ("enough", ["coarse", "full"])
+        lies.append(rewritten(data, edit, PACKED))
+    assert all("does not decompress to the" in answer for answer in decoded(*lies))

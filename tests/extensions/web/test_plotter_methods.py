@@ -11,7 +11,7 @@ from PIL import Image
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.web.scenes.scene import scene_of
+from pyvista_vdi.extensions.web.scene import scene_of
 
 slow = pytest.mark.slow
 pytestmark = pytest.mark.gl
@@ -157,7 +157,7 @@ def test_the_docs_name_every_method():
 def test_what_a_method_adds_is_drawn_or_named_as_the_docs_say(method, plotter):
     CALLS[method](plotter)
     plotter.show(auto_close=False)
-    left_out = scene_of(plotter.renderer, plotter.renderer.actors).left_out
+    left_out = scene_of(plotter.renderer).left_out
     assert (left_out == []) == (documented()[method] == "yes"), left_out
 
 

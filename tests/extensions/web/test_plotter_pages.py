@@ -129,11 +129,11 @@ def test_of_a_set_the_page_draws_the_nearest(plotter, from_disk, vdi_set, tmp_pa
 def test_of_several_series_those_that_do_not_play_are_named(plotter, series, vdi_set):
     for name, more in (("first", series), ("second", series[:2]), ("third", vdi_set)):
         plotter.add_vdi(more, name=name, **AS_IT_IS)
-    with pytest.warns(VDIWarning, match="all but one of the") as warned:
+    with pytest.warns(VDIWarning, match="all but one of") as warned:
         plotter.vdi.export_html(None)
     words = str(warned[0].message)
-    assert "2 steps of a series (second)" in words
-    assert "6 VDIs of a set (third)" in words
+    assert "2 VDIs (second)" in words
+    assert "6 VDIs (third)" in words
     assert "first" not in words
 
 

@@ -56,7 +56,7 @@ window.picture = (camera, width, height, clippingPlanes, depth, few) => {
   const framebuffer = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
   gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
-  raycaster.draw({ camera, width, height, clippingPlanes, depthTexture, few });
+  raycaster.draw({ camera, width, height, clippingPlanes, depthTexture });
   const seen = new Float32Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, seen);
   gl.deleteFramebuffer(framebuffer);

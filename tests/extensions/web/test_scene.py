@@ -12,9 +12,9 @@ from plugin_scenes import soft_ball
 from skimage.metrics import structural_similarity
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.extensions.web.bundle import viewer_script
-from pyvista_vdi.extensions.web.scenes.scene import scene_of
+from pyvista_vdi.extensions.web.scene import scene_of
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -102,8 +102,8 @@ def meshes(plotter):
     box.cell_data["c"] = np.arange(box.n_cells) % 7
     plotter.add_mesh(box, scalars="c", **looks)
     turns = np.linspace(0, 12, 60)
-    spiral = pv.Spline(np.stack([1.4 * np.cos(turns), 1.4 * np.sin(turns), turns / 5 - 1], 1), 200)
-    plotter.add_mesh(spiral, color="gold")
+    spiral = np.stack([1.4 * np.cos(turns), 1.4 * np.sin(turns), turns / 5 - 1], 1)
+    plotter.add_mesh(pv.lines_from_points(spiral), color="gold")
     plotter.add_points(np.random.default_rng(0).normal(size=(30, 3)), color="red", point_size=7)
     plotter.add_mesh(pv.Cube(center=(-1, 1, 0)), style="wireframe", color="k")
 
@@ -343,14 +343,6 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
         "its place in other views than the first (CubeAxesActor)",
     ):
         assert what in words
-
-
-def test_a_renderer_without_vdis_is_none_for_the_viewer(plotter):
-    plotter.add_mesh(pv.Sphere())
-    ball(plotter).visibility = False
-    plotter.show(auto_close=False)
-    with pytest.raises(UnsupportedError, match="shows no VDI"):
-        scene_of(plotter.renderer)
 
 
 def test_the_viewer_is_small():

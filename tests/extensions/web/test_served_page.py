@@ -72,7 +72,9 @@ def test_the_page_is_the_viewer_and_leaks_nothing(server):
     assert server.token not in text
     assert headers["Referrer-Policy"] == "no-referrer"
     assert headers["Cache-Control"] == "no-store"
-    nonce = re.search(r"nonce-([\w-]+)", headers["Content-Security-Policy"])[1]
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', text)[1]
+    nonce = re.search(r"script-src 'nonce-([\w-]+)' blob:;", policy)[1]
+    assert policy.startswith("default-src 'none';")
     assert re.findall(r"<script[^>]*>", text) == [f'<script type="module" nonce="{nonce}">']
 
 

@@ -1,8 +1,8 @@
-"""ParaView's client side of an algorithm, and its output window."""
+"""ParaView's client side of an algorithm, its output window, and its server's processes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from vtkmodules.vtkCommonCore import vtkOutputWindow
@@ -17,46 +17,32 @@ class Client:
         self.manager = manager
         self.proxy = proxy
 
-    @staticmethod
-    def _manager() -> Any:
-        from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager
-
-        if not vtkSMProxyManager.IsInitialized():
-            return None
-        return vtkSMProxyManager.GetProxyManager().GetActiveSessionProxyManager()
-
     @classmethod
     def of(cls, algorithm: Any, *, silent: bool = False) -> Client | None:
         """Return the client side, or ``None`` after having said why there is none."""
-        manager = cls._manager()
-        for i in range(manager.GetNumberOfProxies("sources") if manager else 0):
-            proxy = manager.GetProxy("sources", manager.GetProxyName("sources", i))
+        manager = _manager()
+        for _, proxy in _proxies(manager, "sources") if manager else ():
             if proxy.GetClientSideObject() is algorithm:
                 return cls(manager, proxy)
         if not silent:
-            problem = "client and server are two processes: set the properties from the client"
-            say(algorithm, problem)
+            say(algorithm, "client and server are two processes: set properties from the client")
         return None
 
     @classmethod
     def watch(cls, algorithm: Any, event: str, changed: Callable[[Any], None]) -> bool:
         """Call ``changed(algorithm)`` at an event of the manager; return whether there is one."""
-        manager = cls._manager()
-        return manager is not None and bool(watch(manager, algorithm, changed, event))
+        manager = _manager()
+        return bool(manager and watch(manager, algorithm, changed, event))
 
     def views(self) -> list[Any]:
         """Return the proxies of render views."""
-        number = self.manager.GetNumberOfProxies("views")
-        names = [self.manager.GetProxyName("views", i) for i in range(number)]
-        views = [self.manager.GetProxy("views", name) for name in names]
+        views = (proxy for _, proxy in _proxies(self.manager, "views"))
         return [view for view in views if hasattr(view.GetClientSideObject(), "GetRenderer")]
 
     def representations(self) -> list[tuple[str, Any]]:
         """Return the names and proxies of what shows the algorithm's output in views."""
         found = []
-        for i in range(self.manager.GetNumberOfProxies("representations")):
-            name = self.manager.GetProxyName("representations", i)
-            proxy = self.manager.GetProxy("representations", name)
+        for name, proxy in _proxies(self.manager, "representations"):
             source = proxy.GetProperty("Input")
             inputs = source.GetNumberOfProxies() if source is not None else 0
             if inputs and source.GetProxy(0) is self.proxy:
@@ -75,7 +61,32 @@ class Client:
             prop.SetElement(i, value)
 
 
+def _proxies(manager: Any, group: str) -> Iterator[tuple[str, Any]]:
+    """Yield the names and proxies of a group."""
+    for i in range(manager.GetNumberOfProxies(group)):
+        name = manager.GetProxyName(group, i)
+        yield name, manager.GetProxy(group, name)
+
+
+def _manager() -> Any:
+    from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager
+
+    started = vtkSMProxyManager.IsInitialized()
+    return started and vtkSMProxyManager.GetProxyManager().GetActiveSessionProxyManager()
+
+
 def say(algorithm: Any, problem: object) -> None:
     """Write what went wrong to ParaView's output window."""
     text = f"{type(algorithm).__name__}: {problem}\n"
     vtkOutputWindow.GetInstance().DisplayErrorText(text)
+
+
+def require_one_process(controller: Any) -> None:
+    """Raise ImportError if ParaView's server has several ranks, by its controller."""
+    count = 1 if controller is None else controller.GetNumberOfProcesses()
+    if count > 1:
+        raise ImportError(
+            f"this server has {count} ranks, and the VDI plugin works with one: start pvserver or "
+            "pvbatch without mpirun, or let the ranks of a simulation make the VDI, by "
+            "pyvista_vdi.extensions.insitu.InSitu, and open its file"
+        )

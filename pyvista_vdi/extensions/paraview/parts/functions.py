@@ -1,16 +1,23 @@
-"""ParaView's transfer functions, which the plugin's filters classify by, and follow."""
+"""What the plugin's filters have in common: ParaView's transfer functions, and a view."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from operator import methodcaller
 from typing import Any
 
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolumeProperty
 
-from pyvista_vdi.extensions.paraview.parts.client import Client
+from pyvista_vdi.extensions.paraview.parts.client import Client, say
+from pyvista_vdi.extensions.paraview.parts.properties import CAMERA, CAMERA_PROPERTIES
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, watch
+
+
+def sets(attribute: str, read: Callable[..., Any] = lambda value: value) -> Any:
+    """Return a method that sets what is made of its arguments, and is out of date if it differs."""
+    return lambda self, *values: self._change(attribute, read(*values))
 
 
 class Looks:
@@ -63,9 +70,7 @@ class Functions(Algorithm):
         """Set ParaView's opacity transfer function, or ``None`` for the default."""
         self._follow("opacity", function)
 
-    def SetUnitDistance(self, distance: float) -> None:
-        """Set the scalar opacity unit distance; 0 is the default one."""
-        self._change("_unit_distance", distance or None)
+    SetUnitDistance = sets("_unit_distance", lambda distance: distance or None)
 
     def _follow(self, role: str, function: Any) -> None:
         """Be out of date whenever a transfer function changes."""
@@ -100,3 +105,59 @@ def functions_of_array(client: Client, name: str, ends: tuple[float, float] | No
         for function in (color, opacity):
             vtkSMTransferFunctionProxy.RescaleTransferFunction(function, *ends)
     return [color, opacity]
+
+
+def _of_lens(name: str, read: Callable[..., Any] = lambda *value: value) -> Any:
+    """Return a method that sets one of the camera's arguments, a number or three."""
+    return lambda self, *value: self._change("_lens", {**self._lens, name: read(*value)})
+
+
+class Looking(Algorithm):
+    """The properties of a view: an algorithm with ``SetCamera`` gets them as a camera."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._camera_chosen = False
+        self._lens: dict[str, Any] = {
+            "position": (0.0, 0.0, 1.0),
+            "focal_point": (0.0, 0.0, 0.0),
+            "view_up": (0.0, 1.0, 0.0),
+        }
+
+    SetView = sets("_camera_chosen", lambda which: which == CAMERA)
+    SetCameraPosition = _of_lens("position")
+    SetCameraFocalPoint = _of_lens("focal_point")
+    SetCameraViewUp = _of_lens("view_up")
+    SetCameraViewAngle = _of_lens("view_angle", float)
+    SetCameraParallelProjection = _of_lens("parallel_projection", bool)
+    SetCameraParallelScale = _of_lens("parallel_scale", float)
+
+    def SetSize(self, width: int, height: int) -> None:
+        """Set the window; 0 is the default one."""
+        self.SetWindowSize((width, height) if width and height else None)
+
+    def SetDeviceName(self, name: str | None) -> None:
+        """Choose the OpenCL device; empty is the default one."""
+        self.SetDevice(name or None)
+
+    def TakeActiveView(self) -> None:
+        """Copy the active view's camera and size into the properties."""
+        client = Client.of(self)
+        if client is None:
+            return
+        view = client.manager.GetSelectionModel("ActiveView").GetCurrentProxy()
+        if view is None or view.GetProperty("CameraPosition") is None:
+            say(self, "the active view is no render view: click into one, or type its camera in")
+            return
+        view.SynchronizeCameraProperties()
+        client.set("View", [CAMERA])
+        for name in CAMERA_PROPERTIES:
+            client.set(name, client.values(name, view))
+        client.set("WindowSize", client.values("ViewSize", view))
+        client.set("Azimuth", [0.0])
+        client.set("Elevation", [0.0])
+        client.proxy.UpdateVTKObjects()
+
+    def _given_camera(self) -> Any:
+        # Made as late as this: set one at a time, the properties may pass through no camera at all
+        return Camera(**self._lens) if self._camera_chosen else None

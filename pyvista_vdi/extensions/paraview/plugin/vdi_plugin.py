@@ -29,14 +29,14 @@ except ImportError as error:
     ) from error
 
 from pyvista_vdi.errors import VDIError
-from pyvista_vdi.extensions.paraview.parts.client import Client, say
+from pyvista_vdi.extensions.paraview.parts.client import Client, require_one_process, say
 from pyvista_vdi.extensions.paraview.parts.functions import (
     Functions,
+    Looking,
     Looks,
     functions_of_array,
+    sets,
 )
-from pyvista_vdi.extensions.paraview.parts.looking import Looking
-from pyvista_vdi.extensions.paraview.parts.one_process import require_one_process
 from pyvista_vdi.extensions.paraview.parts.properties import (
     DEVICE_XML,
     FUNCTIONS_XML,
@@ -100,13 +100,7 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
         self._value_range: tuple[float, float] | None = None
         self._importance: list[tuple[float, float]] = []
 
-    def SetAzimuth(self, degrees: float) -> None:
-        """Turn the generating view."""
-        self._change("_azimuth", degrees)
-
-    def SetElevation(self, degrees: float) -> None:
-        """Lift the generating view."""
-        self._change("_elevation", degrees)
+    SetAzimuth, SetElevation = sets("_azimuth"), sets("_elevation")
 
     def SetArray(self, index: int, port: int, connection: int, kind: int, name: str) -> None:
         """Choose the array, as ``SetInputArrayToProcess``: kind 0 is at points, 1 at cells."""
@@ -120,17 +114,14 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
     SetSpecular = _of_looks("SetSpecular")
     SetSpecularPower = _of_looks("SetSpecularPower")
 
-    def SetClassification(self, deferred: int) -> None:
-        """Choose when scalars are classified: as the VDI is made, or by what shows it."""
-        self._change("_deferred", bool(deferred))
+    SetClassification = sets("_deferred", bool)
 
     def _function_changed(self) -> None:
         if not self._deferred:  # else it decides nothing here
             super()._function_changed()
 
-    def SetValueRange(self, low: float, high: float) -> None:
-        """Set the scalars that a deferred VDI keeps; two that are equal mean all."""
-        self._change("_value_range", (low, high) if low != high else None)
+    # Two that are equal mean all
+    SetValueRange = sets("_value_range", lambda low, high: (low, high) if low != high else None)
 
     def AddImportance(self, scalar: float, weight: float) -> None:
         """Append a point to the importance by which a deferred VDI is cut."""

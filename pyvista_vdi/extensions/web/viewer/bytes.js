@@ -58,35 +58,20 @@ function bytesOfBase64(text) {
   }
 }
 
-// Four tables, by which four bytes are taken in at once
-let crcTables = null;
+let crcTable = null;
 
-function makeCrcTables() {
-  const tables = [0, 1, 2, 3].map(() => new Uint32Array(256));
-  for (let n = 0; n < 256; ++n) {
-    let c = n;
-    for (let bit = 0; bit < 8; ++bit) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1;
-    tables[0][n] = c;
-  }
-  for (let k = 1; k < 4; ++k) {
-    for (let n = 0; n < 256; ++n) {
-      const c = tables[k - 1][n];
-      tables[k][n] = tables[0][c & 255] ^ (c >>> 8);
-    }
-  }
-  return tables;
+function makeCrcTable() {
+  return Uint32Array.from({ length: 256 }, (_, n) => {
+    for (let bit = 0; bit < 8; ++bit) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
+    return n;
+  });
 }
 
 /** The CRC-32 of bytes, as ZIP has it. */
 export function crc32(bytes) {
-  const [t0, t1, t2, t3] = (crcTables ??= makeCrcTables());
+  const table = (crcTable ??= makeCrcTable());
   let c = -1;
-  let k = 0;
-  for (; k + 4 <= bytes.length; k += 4) {
-    c ^= bytes[k] | (bytes[k + 1] << 8) | (bytes[k + 2] << 16) | (bytes[k + 3] << 24);
-    c = t3[c & 255] ^ t2[(c >>> 8) & 255] ^ t1[(c >>> 16) & 255] ^ t0[c >>> 24];
-  }
-  for (; k < bytes.length; ++k) c = t0[(c ^ bytes[k]) & 255] ^ (c >>> 8);
+  for (let k = 0; k < bytes.length; ++k) c = table[(c ^ bytes[k]) & 255] ^ (c >>> 8);
   return ~c >>> 0;
 }
 

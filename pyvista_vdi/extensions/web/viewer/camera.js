@@ -2,13 +2,7 @@
 import { cameraAxes, isParallel } from "./rays.js";
 import { add, dot, subtract, times, unit } from "./vectors.js";
 
-/**
- * Return a view as the viewer keeps it; refuse one that shows nothing.
- *
- * @param {object} camera position, focal_point, view_up (three numbers each, world units) and
- *   view_angle (vertical, degrees) or parallel_scale (half the viewport's height, world units).
- * @throws {TypeError} That names what is wrong.
- */
+/** Return a view as the viewer keeps it: see element.d.ts; a TypeError says why one shows nothing. */
 export function checkedCamera(camera) {
   const checked = Object.fromEntries(["position", "focal_point", "view_up"]
     .map((name) => [name, checkedNumbers("camera", camera, name)]));
@@ -32,12 +26,7 @@ export function checkedCamera(camera) {
   return checked;
 }
 
-/**
- * Return a clipping plane as the viewer keeps it; refuse one that nothing is seen by.
- *
- * @param {object} plane origin and normal, three numbers each.
- * @throws {TypeError} That names what is wrong.
- */
+/** Return a clipping plane as the viewer keeps it; a TypeError says why nothing is seen by one. */
 export function checkedPlane(plane) {
   const [origin, normal] = ["origin", "normal"].map((name) => checkedNumbers("plane", plane, name));
   if (!(Math.hypot(...normal) > 0)) throw new TypeError("A plane's normal is not zero; this one is.");
@@ -67,14 +56,7 @@ function turned(vector, axis, degrees) {
   ];
 }
 
-/**
- * Look at a box from a direction, so that all of it is seen: VTK's ResetCamera.
- *
- * @param {object} camera Whose lens is kept.
- * @param {number[]} bounds World: low and high of x, y and z.
- * @param {number[]} from Direction of the eye from the box's centre.
- * @param {number[]} view_up
- */
+/** Look at a box of the world from a direction, so that all of it is seen: VTK's ResetCamera. */
 export function lookingAt(camera, bounds, from, view_up) {
   const [low, high] = [0, 1].map((end) => [0, 2, 4].map((k) => bounds[k + end]));
   const focal_point = times(add(low, high), 0.5);
@@ -113,10 +95,7 @@ export function nearer(camera, factor) {
   return { ...camera, position: add(camera.focal_point, from, 1 / factor) };
 }
 
-/**
- * Widen a view, so that a picture of some width over height is seen whole in a window that is
- * narrower.
- */
+/** Widen a view, so that a picture of some width over height is seen whole in a narrower window. */
 export function fitted(camera, aspect, [width, height]) {
   const wider = (aspect * height) / width;
   if (!(wider > 1)) return camera;

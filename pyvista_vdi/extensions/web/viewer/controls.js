@@ -28,22 +28,16 @@ const ICONS = {
   reset: "M4 9a6 6 0 1 1 1 5M4 4v5h5",
   settings: "M3 6h7M14 6h3M3 14h3M10 14h7M12 4v4M8 12v4",
   save: "M10 3v9M6.5 8.5L10 12l3.5-3.5M3.5 16.5h13",
-  link: "M8.5 11.5a3.2 3.2 0 0 0 4.6 0l2.5-2.5a3.2 3.2 0 0 0-4.6-4.6l-1 1" +
-    "M11.5 8.5a3.2 3.2 0 0 0-4.6 0l-2.5 2.5a3.2 3.2 0 0 0 4.6 4.6l1-1",
   full: "M3.5 7.5v-4h4M12.5 3.5h4v4M16.5 12.5v4h-4M7.5 16.5h-4v-4",
 };
 
 /**
- * The bar of a viewer and its settings.
+ * The bar of a viewer and its settings, in the frame that covers the canvas; `say(text)` for a while.
  *
- * @param {object} parts Of the viewer: `frame` covers the picture, and gets them; `canvas` is turned.
- * @param {HTMLElement} viewer The element.
- * @param {object} host `link()`, what shares what is seen, or null; `say(text)` for a while.
- * @param {AbortSignal} signal Ends it.
  * @returns {{show: function(), key: function(KeyboardEvent, EventTarget): boolean}} `show` what has
  *   changed; whether a `key` is taken.
  */
-export function viewerControls({ frame, canvas }, viewer, host, signal) {
+export function viewerControls({ frame, canvas }, viewer, say, signal) {
   const button = (label, act, ...content) => {
     const made = htmlElement("button", { type: "button", title: label, label }, ...content);
     made.addEventListener("click", act);
@@ -57,20 +51,12 @@ export function viewerControls({ frame, canvas }, viewer, host, signal) {
       htmlElement("a", { href: url, download: `${name}.png` }).click();
       setTimeout(() => URL.revokeObjectURL(url), 60000);
     } catch (error) {
-      host.say(error.message);
-    }
-  };
-  const share = async () => {
-    try {
-      await navigator.clipboard.writeText(host.link());
-      host.say("The link to what is seen is in the clipboard.");
-    } catch {
-      host.say("The page's address is the link to what is seen: copy it there.");
+      say(error.message);
     }
   };
   const goFull = () => {
     const done = document.fullscreenElement ? document.exitFullscreen() : viewer.requestFullscreen();
-    done.catch((error) => host.say(`No full screen here: ${error.message}`));
+    done.catch((error) => say(`No full screen here: ${error.message}`));
   };
   const canFill = document.fullscreenEnabled;
 
@@ -121,7 +107,6 @@ export function viewerControls({ frame, canvas }, viewer, host, signal) {
   frame.replaceChildren(htmlElement("div", { className: "bar", role: "group", label: "Controls of the picture" },
     button("Reset the view", () => viewer.resetCamera(), strokes(ICONS.reset)),
     button("Save the picture (PNG)", save, strokes(ICONS.save)),
-    ...(host.link ? [button("Copy a link to what is seen", share, strokes(ICONS.link))] : []),
     ...(canFill ? [button("Full screen", goFull, strokes(ICONS.full))] : []), settings));
 
   // -- what the viewer tells ---------------------------------------------------------------------

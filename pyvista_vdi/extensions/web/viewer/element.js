@@ -190,23 +190,12 @@ export class VDIViewer extends HTMLElement {
     return told?.colors?.length && told.scalar_range ? told : null;
   }
 
-  /**
-   * A point of the world under a place of the picture: where half of what hides the ray lies.
-   *
-   * @param {number} x CSS pixels from the left, and from the top `y`.
-   * @returns {number[]|null} null where hardly anything is seen, and in scenes.
-   */
+  /** A point of the world under a place of the picture, CSS pixels; null where little is seen. */
   pointAt(x, y) {
     return this.#shown.pointAt(x, y);
   }
 
-  /**
-   * The picture at full quality: premultiplied RGBA, 8 bits, top row first, without background; a
-   * scene's texts are in it.
-   *
-   * @param {{width: number, height: number}} size Pixels.
-   * @returns {Promise<{width: number, height: number, data: Uint8ClampedArray}>}
-   */
+  /** The picture at full quality: premultiplied RGBA, 8 bits, top row first, without background. */
   async screenshot({ width = this.#shown.size[0], height = this.#shown.size[1] } = {}) {
     await this.ready;
     return this.#shown.screenshot(width, height);
@@ -219,19 +208,9 @@ export class VDIViewer extends HTMLElement {
     return { ...this.#status, supersegments: n, lists: windowSize, level, precision, pixels };
   }
 
-  /** Draw again; after a movement with few pixels first. */
-  invalidate(moves = true) {
-    this.#shown.invalidate(moves);
-  }
-
   // -- where it comes from -----------------------------------------------------------------------
 
-  /**
-   * Show what a URL, bytes, a file or a stream hold: a .vdi file, a series, .vdis, or a set, .vdiset.
-   *
-   * @param {string|URL|Uint8Array|Blob|ReadableStream} source A File is a Blob.
-   * @returns {Promise<VDIViewer>} When all of it is drawn.
-   */
+  /** Show what a URL, bytes, a file or a stream hold: a VDI, a series or a set; wait until it is. */
   async load(source) {
     this.#loading?.abort();
     const { signal } = (this.#loading = new AbortController());
@@ -242,11 +221,9 @@ export class VDIViewer extends HTMLElement {
     try {
       await load(source, {
         signal,
-        onBegin: (vdi) => this.#shown.warmUp(vdi),
         onLevel: (prepared) => {
-          this.#endSeries();
-          this.setPrepared(prepared);
-          this.#comeTo(prepared.bounds);
+          if (prepared.level === "begun") this.#shown.warmUp(prepared);
+          else this.#take(prepared);
         },
         onSeries: (series) => this.#beginSeries(series),
         onProgress: (progress) => this.#tell({ progress }),
@@ -258,11 +235,13 @@ export class VDIViewer extends HTMLElement {
     return promise;
   }
 
-  // Look at what an address gives, where it lies elsewhere than what it gave before.
-  #comeTo(bounds) {
+  #take(prepared) {
     const before = this.#shownBefore;
     this.#shownBefore = null;
-    if (before && before.some((edge, k) => edge !== bounds[k])) this.resetCamera();
+    this.#endSeries();
+    this.#show(prepared);
+    // Look at what an address gives, where it lies elsewhere than what it gave before
+    if (before && before.some((edge, k) => edge !== prepared.bounds[k])) this.resetCamera();
   }
 
   /** Show the bytes of a .vdi file; what is there stays until they are decoded. */
@@ -270,8 +249,8 @@ export class VDIViewer extends HTMLElement {
     return this.load(bytes);
   }
 
-  /** Show what prepare.js has made of a VDI: swapped whole. */
-  setPrepared(prepared) {
+  // Show what prepare.js has made of a VDI: swapped whole.
+  #show(prepared) {
     this.#shown.prepared = prepared;
     if (!this.#shown.camera) this.resetCamera();
     this.#bar?.show();
@@ -337,7 +316,7 @@ export class VDIViewer extends HTMLElement {
   // Go on with what is there: what was wrong is no more.
   #recover() {
     if (this.#ready.settled) this.#renew();
-    if (this.#shown.prepared) this.setPrepared(this.#shown.prepared);
+    if (this.#shown.prepared) this.#show(this.#shown.prepared);
     else this.#tell({ state: "empty", progress: 0, message: undefined });
   }
 
@@ -368,13 +347,7 @@ export class VDIViewer extends HTMLElement {
     return this.#player !== null && this.#player.playing;
   }
 
-  /**
-   * Show one step after the other, from the one that is shown, or from the first where the last
-   * one is and nothing follows it. Steps that are not decoded in time are left out.
-   *
-   * @param {{rate: number, loop: boolean}} [options] Steps per second, 24 by default; whether the
-   *   first step follows the last one, as it does by default.
-   */
+  /** Show one step after the other, `{rate, loop}`: so many a second, and from the first again. */
   play(options) {
     this.#played();
     this.#player.play(options);
@@ -396,7 +369,7 @@ export class VDIViewer extends HTMLElement {
     const player = this.#player = new (series.views ? Surround : Player)(series, {
       show: (prepared, step) => {
         this.#step = { step, time: this.series && series.times[step] };
-        this.setPrepared(prepared);
+        this.#show(prepared);
       },
       changed: () => {
         if (player !== this.#player) return;
@@ -412,11 +385,12 @@ export class VDIViewer extends HTMLElement {
       this.#comeToTime();
     };
     [this.#controls, this.#bar].forEach((each) => each?.show());
-    if (series.views && this.#shown.camera) player.look(this.#shown.camera);
-    else if (series.views) this.resetCamera();
-    const still = lessMotion().matches || this.#wantedTime !== null;
-    this.#comeToTime();
-    if (this.hasAttribute("autoplay") && !still && !series.views) player.play();
+    const plays = this.hasAttribute("autoplay") && !lessMotion().matches && this.#wantedTime === null;
+    if (!series.views) {
+      this.#comeToTime();
+      if (plays) player.play();
+    } else if (this.#shown.camera) player.look(this.#shown.camera);
+    else this.resetCamera();
   }
 
   // Until the step of the time that a link says has come, show the nearest.
@@ -498,19 +472,9 @@ export class VDIViewer extends HTMLElement {
     }
     if (this.#source && this.#loading.signal.aborted) this.load(this.#source).catch(() => {});
     this.#player?.resume();
-    this.#controls = playerControls?.(this.#parts.controls, () => this.series && this.#player,
-      () => this.#series.times, {
-        toggle: () => this.playing ? this.pause() : this.play(),
-        seek: (step) => this.#seek(step),
-      }, signal);
+    this.#controls = playerControls?.(this.#parts.controls, this);
     this.#controls?.show();
-    this.#bar = viewerControls(this.#parts, this, {
-      link: this.#address && (() => {
-        this.#address.now();
-        return location.href;
-      }),
-      say: (text) => this.#hint(text),
-    }, signal);
+    this.#bar = viewerControls(this.#parts, this, (text) => this.#hint(text), signal);
     this.#listen(signal);
     this.#shown.invalidate(false);
   }

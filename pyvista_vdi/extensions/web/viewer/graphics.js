@@ -7,10 +7,8 @@ let gl = null;
 const viewers = new Set();
 
 /**
- * Take part in the page's graphics.
- *
- * @param {{lost: function()}} viewer `lost` is called when all that it has made there is gone.
- * @returns {WebGL2RenderingContext|null} null where this browser has no WebGL 2.
+ * Take part in the page's graphics: the context, or null where this browser has no WebGL 2. The
+ * viewer's `lost` is called when all that it has made there is gone.
  */
 export function takeGraphics(viewer) {
   if (!gl || gl.isContextLost()) {
@@ -36,12 +34,8 @@ export function leaveGraphics(viewer) {
 }
 
 /**
- * Bring a picture to a viewer's canvas, which becomes as large as it is: a moving view has few pixels,
- * and the page makes a canvas as large as its element.
- *
- * @param {WebGLFramebuffer} framebuffer Its lower left part is the picture.
- * @param {number[]} size Width and height of that part, pixels.
- * @param {CanvasRenderingContext2D} to Of the viewer's canvas.
+ * Bring a picture, the lower left part of a framebuffer, to a viewer's canvas, which becomes as large
+ * as it is: a moving view has few pixels, and the page makes a canvas as large as its element.
  */
 export function showPicture(framebuffer, [width, height], to) {
   for (const each of [canvas, to.canvas]) {
@@ -82,16 +76,13 @@ const compiled = new WeakMap(); // context -> text of both shaders -> program
 
 /**
  * Return a program, compiled and linked when it is first asked for: all viewers of a page share it.
- *
- * @param {string[]} [attributes] Names of the vertex shader's inputs, in the order of their places.
- * @returns {{program: WebGLProgram, uniforms: object, fresh: boolean}} Places by the uniforms' names;
- *   whether it has just been compiled.
- * @throws {Error} With the compiler's words, if it refuses.
+ * `attributes`: the vertex shader's inputs, in the order of their places. With it come the places of
+ * its uniforms by their names.
  */
 export function programOf(gl, vertex, fragment, attributes = []) {
   if (!compiled.has(gl)) compiled.set(gl, new Map());
   const programs = compiled.get(gl), known = programs.get(vertex + fragment);
-  if (known) return { ...known, fresh: false };
+  if (known) return known;
   const program = gl.createProgram(), uniforms = {};
   const require = (good, words) => {
     if (!good && !gl.isContextLost()) {
@@ -114,5 +105,5 @@ export function programOf(gl, vertex, fragment, attributes = []) {
     uniforms[name.replace("[0]", "")] = gl.getUniformLocation(program, name);
   }
   programs.set(vertex + fragment, { program, uniforms });
-  return { program, uniforms, fresh: true };
+  return { program, uniforms };
 }

@@ -10,14 +10,8 @@ const MOST_OF_WINDOW = 0.8; // a viewer that is higher could not be scrolled pas
 const degrees = (y, x) => (Math.atan2(y, x) * 180) / Math.PI;
 
 /**
- * What a drag does: the view after the pointer went from one point to another.
- *
- * @param {"rotate"|"pan"|"spin"|"dolly"} what
- * @param {object} camera Before.
- * @param {number[]} from Pixels from the window's lower left corner, as `to`.
- * @param {number[]} to
- * @param {number[]} size Of the window.
- * @param {number} [height] Pixels that the camera's angle spans.
+ * What a drag does: "rotate", "pan", "spin" or "dolly". Points and sizes are pixels from the window's
+ * lower left corner; `height`: those that the camera's angle spans.
  */
 export function dragged(what, camera, from, to, size, height = size[1]) {
   const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
@@ -54,12 +48,8 @@ export function keyed(camera, { key, shiftKey }) {
 
 /**
  * Hear keys before whatever is around: pages have shortcuts of their own, and those of JupyterLab
- * delete cells.
- *
- * @param {ShadowRoot} root Whose keys are heard.
- * @param {(event: KeyboardEvent, target: EventTarget) => boolean} take Does what the key is for, and
- *   says whether it is for anything; others go on as if there were no viewer.
- * @param {AbortSignal} signal Ends it.
+ * delete cells. `take(event, target)` does what a key is for, and says whether it is for anything;
+ * others go on as if there were no viewer.
  */
 export function hearKeys(root, take, signal) {
   const taken = new Set();
@@ -89,13 +79,9 @@ export function scrollsAround(element) {
 }
 
 /**
- * Let people move a view.
- *
- * @param {HTMLElement} target What the pointer is over.
- * @param {object} view `camera` is read and `move(camera)` takes the next one; `height`: pixels that
- *   the camera's angle spans; `rest()` is called when a movement ends; `shared`: whether fingers and
- *   the wheel also scroll what is around; `hint(text)` says how it is moved nevertheless.
- * @param {AbortSignal} signal Ends it.
+ * Let people move a view, by pointers over an element. Of the view `camera` is read and `move(camera)`
+ * takes the next one; `height`: pixels that its angle spans; `rest()`: a movement has ended; `shared`:
+ * whether fingers and the wheel also scroll what is around, and `hint(text)` how it is moved then.
  */
 export function interact(target, view, signal) {
   const pointers = new Map(); // identifier -> point

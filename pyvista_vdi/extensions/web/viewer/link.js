@@ -13,12 +13,7 @@ const ENTRIES = {
 
 const keysTaken = new Set(); // by viewers of this page
 
-/**
- * What is seen as text: entries of the camera, the look and the time.
- *
- * @param {{camera: object, look: object, time: number|null}} state
- * @returns {string} `position:80,40,90/focal_point:...`; what is as it was made is left out.
- */
+/** What is seen as text, `position:80,40,90/focal_point:...`; what is as it was made is left out. */
 export function textOfView({ camera, look: { transfer, ...look } = AS_MADE, time = null }) {
   const isOther = ([name, value]) => JSON.stringify(value) !== JSON.stringify(AS_MADE[name]);
   const said = { ...camera, ...Object.fromEntries(Object.entries(look).filter(isOther)), time, ...transfer };
@@ -27,11 +22,7 @@ export function textOfView({ camera, look: { transfer, ...look } = AS_MADE, time
     .map(([name, value]) => `${name}:${value}`).join("/");
 }
 
-/**
- * The state that such a text says.
- *
- * @throws {TypeError} That names what is wrong.
- */
+/** The `camera`, `look` and `time` that such a text says; a TypeError names what is wrong. */
 export function viewOfText(text) {
   const said = {};
   for (const entry of text.split("/")) {
@@ -72,14 +63,9 @@ function textOfViewer({ camera, home, look, series, playing, time }) {
 }
 
 /**
- * Keep what a viewer shows in the page's address, and follow the address.
- *
- * @param {string} key Before the `=`: of viewers with the same the first one is followed.
- * @param {HTMLElement} viewer
- * @param {function(object|null)} take Shows something else, of null what the page begins with.
- * @param {AbortSignal} signal Ends it.
- * @returns {{changed: function(), now: function()}|null} To be told that something else is shown, or
- *   that the address is wanted; null where another viewer has the key.
+ * Keep what a viewer shows in the page's address, behind a key, and follow the address: `take(state)`
+ * shows something else, of null what the page begins with. Of viewers with the same key the first one
+ * is followed; for others null is returned, else what is to be told of changes: `changed()`.
  */
 export function followAddress(key, viewer, take, signal) {
   if (keysTaken.has(key)) return null;
@@ -98,8 +84,7 @@ export function followAddress(key, viewer, take, signal) {
       console.info(`The view in this page's address is not followed: ${error.message}`);
     }
   };
-  const now = () => {
-    clearTimeout(timer);
+  const write = () => {
     const text = textOfViewer(viewer);
     if (text === (saidIn(location.hash, key) ?? "")) return;
     const others = partsOfHash(location.hash).filter((part) => !part.startsWith(`${key}=`));
@@ -110,11 +95,12 @@ export function followAddress(key, viewer, take, signal) {
       console.info(`What is seen is not kept in this page's address: ${error.message}`);
     }
   };
-  const changed = () => {
-    clearTimeout(timer);
-    timer = setTimeout(now, WRITTEN_AFTER);
-  };
   window.addEventListener("hashchange", read, { signal });
   if (saidIn(location.hash, key) !== undefined) read();
-  return { changed, now };
+  return {
+    changed() {
+      clearTimeout(timer);
+      timer = setTimeout(write, WRITTEN_AFTER);
+    },
+  };
 }

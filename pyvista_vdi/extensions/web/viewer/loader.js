@@ -9,22 +9,15 @@ import { BEGIN, Series, beginsAsSeries } from "./series.js";
  * @param {string|URL|Uint8Array|ArrayBuffer|Blob|ReadableStream|AsyncIterable} source A .vdi, .vdis
  *   or .vdiset file: where it is, its bytes, or its pieces, which may be base64 text as
  *   {@link embedded} gives it. Or where the folder of a series is, with a slash behind it.
- * @param {object} options
- * @param {(prepared: object) => void} options.onLevel Called with each level as prepare.js makes
- *   it; its `level` is "coarse" or "full".
- * @param {(vdi: object) => void} [options.onBegin] Called before a coarse level with its camera,
- *   windowSize, bounds and depthOrigin.
- * @param {(series: Series) => void} [options.onSeries] Called in their place, where it is one, as
- *   soon as it has a VDI.
- * @param {(progress: number) => void} [options.onProgress] Called with what is read of 1.
- * @param {AbortSignal} [options.signal] Ends it: nothing is called any more.
- * @returns {Promise<void>} When all is there.
+ * @param {object} options `onLevel(prepared)` is called with each level as prepare.js makes it,
+ *   `onSeries(series)` in its place, as soon as it has a VDI; `onProgress(share)` with what is read
+ *   of 1. `signal` ends it: nothing is called any more.
  * @throws {VDIFileError} A sentence that says what is wrong.
  */
-export async function load(source, { onLevel, onBegin = () => {}, onSeries, onProgress = () => {},
+export async function load(source, { onLevel, onSeries, onProgress = () => {},
   signal = new AbortController().signal }) {
-  const unlessAborted = (call) => (...given) => signal.aborted || call(...given);
-  const [level, begin, series, progress] = [onLevel, onBegin, onSeries, onProgress].map(unlessAborted);
+  const unlessAborted = (call) => (given) => signal.aborted || call(given);
+  const [level, series, progress] = [onLevel, onSeries, onProgress].map(unlessAborted);
   let pieces = null;
   try {
     const { reading } = await withWorker(signal, async (ask) => {
@@ -43,7 +36,7 @@ export async function load(source, { onLevel, onBegin = () => {}, onSeries, onPr
       if (onSeries && beginsAsSeries?.(head.whole)) {
         return { reading: Series.ofPieces(head.whole, pieces, series) }; // without this worker
       }
-      const hear = ({ begun, prepared }) => begun ? begin(begun) : level(prepared);
+      const hear = ({ prepared }) => level(prepared);
       await ask({ piece: head.whole }, hear);
       for await (const piece of pieces) await ask({ piece }, hear);
       await ask({ end: true }, hear);
@@ -58,12 +51,8 @@ export async function load(source, { onLevel, onBegin = () => {}, onSeries, onPr
 const EMBEDDED = 'script[type="application/vdi+base64"]';
 
 /**
- * The base64 text in an element's `<script type="application/vdi+base64">`, one or several, as the
- * page is read.
- *
- * @param {Element} element
- * @returns {AsyncIterable<string>|null} For {@link load}, also once more; null where there is no
- *   such script yet.
+ * The base64 text in an element's scripts, as the page is read: for {@link load}, also once more; null
+ * where there is no such script yet.
  */
 export function embedded(element) {
   return element.querySelector(EMBEDDED) &&

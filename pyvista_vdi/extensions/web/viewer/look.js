@@ -11,12 +11,8 @@ export const AS_MADE = Object.freeze({
 export const MOST_FACTOR = 16;
 
 /**
- * Return a look as the viewer keeps it; refuse one that is none.
- *
- * @param {object} look What is left out is as the VDI was made. `brightness` multiplies colours,
- *   `opacity` optical depths; `clip`: low and high of x, y and z, as shares of the VDI's bounds.
- *   `transfer`: the transfer function of a VDI that keeps values, of values.js.
- * @throws {TypeError} That names what is wrong.
+ * Return a look as the viewer keeps it: see element.d.ts; what is left out is as the VDI was made. A
+ * TypeError refuses others.
  */
 export function checkedLook(look) {
   const { brightness, opacity, clip, transfer } = { ...AS_MADE, ...look };

@@ -1,19 +1,15 @@
 // Which step of a series is shown, and when; steps are decoded ahead, in a worker.
-import { htmlElement } from "./html.js";
+import { htmlElement, setSlider, slider } from "./html.js";
 import { Ahead } from "./series.js";
 
 /** Steps per second of films. */
 const RATE = 24;
 /** Steps that are decoded before their time comes. */
 const STEPS_AHEAD = 3;
-
 /** Keys that a slider takes by itself. */
 const OF_SLIDERS = /^(Arrow|Page|Home|End)/;
 
-/**
- * Shows one step of a series after the other, at a rate, leaving out what is not ready: where
- * decoding takes longer than steps last, it takes those that will be due when they are ready.
- */
+/** Shows one step of a series after the other, at a rate, leaving out what is not ready. */
 export class Player {
   #series;
   #ahead;
@@ -130,7 +126,7 @@ export class Player {
       this.pause();
       return;
     }
-    const first = Math.max(this.#place + 1, this.#dueAt(now + this.#ahead.seconds));
+    const first = Math.max(this.#place, due) + 1;
     const next = Array.from({ length: STEPS_AHEAD }, (_, k) => first + k);
     const coming = next.filter((place) => this.#loops || place < n).map((place) => place % n);
     this.#ahead.want(this.settled ? coming : [this.step, ...coming]);
@@ -157,44 +153,39 @@ export class Player {
 }
 
 /**
- * A button, a slider and the time; the space bar plays and pauses, comma and period are a step
- * back and forth.
+ * A button, a slider and the time of a viewer's series, in a bar; the space bar plays and pauses,
+ * comma and period are a step back and forth.
  *
- * @param {HTMLElement} bar What they are put in.
- * @param {() => (Player|null)} playerOf
- * @param {() => number[]} timesOf
- * @param {{toggle: function(), seek: function(number)}} does
- * @param {AbortSignal} signal Ends it.
  * @returns {{show: function(), key: function(KeyboardEvent, EventTarget): boolean}} `show` what has
  *   changed; whether a `key` is taken.
  */
-export function playerControls(bar, playerOf, timesOf, does, signal) {
+export function playerControls(bar, viewer) {
+  const toggle = () => viewer.playing ? viewer.pause() : viewer.play();
+  const step = () => viewer.series.nearest(viewer.time);
+  const seek = (to) => {
+    const { times } = viewer.series;
+    viewer.time = times[Math.min(Math.max(to, 0), times.length - 1)];
+  };
   const button = htmlElement("button", { type: "button" }), output = htmlElement("output");
-  const slider = htmlElement("input", { type: "range", min: 0, step: 1, label: "Time" });
-  bar.replaceChildren(button, slider, output);
-  button.addEventListener("click", does.toggle, { signal });
-  slider.addEventListener("input", () => does.seek(Number(slider.value)), { signal });
+  const time = slider("Time", { min: 0, step: 1 }, seek);
+  button.addEventListener("click", toggle);
+  bar.replaceChildren(button, time, output);
   const show = () => {
-    const player = playerOf();
-    bar.hidden = !player;
-    if (!player) return;
-    const times = timesOf(), { step, playing } = player;
-    button.textContent = playing ? "\u275a\u275a" : "\u25b6\ufe0e";
-    button.setAttribute("aria-label", playing ? "Pause" : "Play");
-    slider.max = times.length - 1;
-    slider.value = step;
-    const time = String(Number(times[step].toPrecision(6)));
-    slider.setAttribute("aria-valuetext", time);
-    output.textContent = time;
+    bar.hidden = !viewer.series;
+    if (bar.hidden) return;
+    button.textContent = viewer.playing ? "\u275a\u275a" : "\u25b6\ufe0e";
+    button.setAttribute("aria-label", viewer.playing ? "Pause" : "Play");
+    time.max = viewer.series.length - 1;
+    output.textContent = String(Number(viewer.time.toPrecision(6)));
+    setSlider(time, step(), output.textContent);
   };
   const key = (event, target) => {
-    const player = playerOf();
-    if (!player) return false;
+    if (!viewer.series) return false;
     const steps = { ",": -1, ".": 1 }[event.key];
-    if (target === slider && OF_SLIDERS.test(event.key)) return true; // it does
+    if (target === time && OF_SLIDERS.test(event.key)) return true; // it does
     if (target === button && [" ", "Enter"].includes(event.key)) return true; // so does this
-    if (steps) does.seek(player.step + steps);
-    else if (event.key === " ") does.toggle();
+    if (steps) seek(step() + steps);
+    else if (event.key === " ") toggle();
     else return false;
     event.preventDefault();
     return true;

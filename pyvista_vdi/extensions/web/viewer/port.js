@@ -14,13 +14,9 @@ let lent = 0;
 let warned = false;
 
 /**
- * Decode a file: as soon as no more than MOST_FILES are, in a worker that starts meanwhile.
- *
- * @param {AbortSignal} signal Ends it, and the worker that is at it.
- * @param {function(function(object, function(object)=, ArrayBuffer[]=): Promise): Promise} work Is
- *   given what says a message of worker.js to the worker, has its answers heard, and waits until it
- *   is done.
- * @throws {VDIFileError} A sentence that says what is wrong.
+ * Decode a file, in a worker that starts meanwhile, as soon as no more than MOST_FILES are decoded:
+ * `work(ask)` has `ask(message, hear, handed)` say messages of worker.js to it, hear its answers, and
+ * wait until it is done. The signal ends it, and the worker that is at it.
  */
 export async function withWorker(signal, work) {
   signal.throwIfAborted();

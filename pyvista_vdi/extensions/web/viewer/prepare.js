@@ -11,22 +11,17 @@ const BINS = 128;
 const LARGEST = 3.4028234663852886e38;
 const SMALLEST = 1.1754943508222875e-38;
 
-/**
- * Prepare a VDI for a {@link Raycaster}.
- *
- * @param {object} vdi As decode.js makes it.
- * @returns {object} Its lists as textures (typed arrays), its list space, and what it is.
- */
+/** Prepare what decode.js made for a Raycaster: lists as textures, list space, and what it is. */
 export function prepare(vdi) {
   const frame = frameOf(vdi);
   const space = listSpace(frame, vdi);
   const packed = vdi.precision === "8-byte";
   const n = vdi.offsets[vdi.offsets.length - 1];
   const arrays = packed ? packedLists(vdi, frame, space, n) : exactLists(vdi, frame, space, n);
+  const { windowSize, camera, bounds, level, precision, pictureSize, metadata } = vdi;
   return {
-    windowSize: vdi.windowSize, camera: vdi.camera, bounds: vdi.bounds, level: vdi.level,
-    pictureSize: vdi.pictureSize, metadata: vdi.metadata, n, frame, space, packed, ...arrays,
-    step: packed ? vdi.depthStep * frame.scale : 0,
+    windowSize, camera, bounds, level, precision, pictureSize, metadata, n, frame, space, packed,
+    ...arrays, step: packed ? vdi.depthStep * frame.scale : 0,
     ...(vdi.values && { values: preparedValues(vdi, frame, space) }),
   };
 }
@@ -53,13 +48,11 @@ function exactLists(vdi, frame, space, n) {
   const lists = new Uint32Array(2 * windowSize[0] * windowSize[1]);
   const faces = new Float32Array(2 * texels(n));
   const media = new Float32Array(4 * texels(n));
-  const { parallel, shifted, origin, nearest } = space;
   const coordinate = (offset) => {
-    if (parallel) return offset;
-    const depth = Math.max(offset + origin, nearest);
-    return shifted ? (depth - origin) / depth : -1 / depth;
+    const [a, b, c, d] = space.depths, x = Math.max(offset, space.nearest);
+    return (a * x + b) / (c * x + d);
   };
-  const slabs = occupancy(vdi, frame);
+  const slabs = occupancy(vdi, frame, space);
   for (let list = 0; list < lists.length / 2; ++list) {
     const begin = offsets[list], end = offsets[list + 1];
     lists[2 * list] = begin;
@@ -85,7 +78,7 @@ function packedLists(vdi, frame, space, n) {
   const { offsets, windowSize, words, origin, stride, depthStep } = vdi;
   const lists = new Uint32Array(4 * windowSize[0] * windowSize[1]);
   const floats = new Float32Array(lists.buffer);
-  const slabs = occupancy(vdi, frame);
+  const slabs = occupancy(vdi, frame, space);
   for (let list = 0; list < lists.length / 4; ++list) {
     const begin = offsets[list], end = offsets[list + 1];
     lists[4 * list] = begin;
@@ -140,35 +133,18 @@ function valuesOfWords(first, second) {
 }
 
 // The occupancy grid (paper, section 4): one bit for each slab of equal view depth of each stack.
-function occupancy({ windowSize, offsets, ...vdi }, frame) {
-  let near = Infinity, far = -Infinity;
-  const see = (front, back) => {
-    near = Math.min(near, front);
-    far = Math.max(far, back);
-  };
-  for (let list = 0; list + 1 < offsets.length; ++list) {
-    const begin = offsets[list], last = offsets[list + 1] - 1;
-    if (begin > last) continue;
-    if (vdi.words) {
-      const depth = (c) => (vdi.origin[list] + c * vdi.stride[list]) * vdi.depthStep;
-      see(depth(vdi.words[2 * begin] & 16383), depth((vdi.words[2 * last] >>> 14) & 16383));
-    } else {
-      see(vdi.front[begin], vdi.back[last]);
-    }
-  }
+function occupancy({ windowSize, depthOrigin }, frame, space) {
+  const [near, far] = space.range.map((offset) => offset / frame.scale);
   const perDepth = far > near ? SLABS / (far - near) : 1;
   // Depths that are looked up are rounded: a tenth of a slab, and as many units in the last place
   // of the depth as a ray's coordinates are off by
   const margin = 0.1 + 64 * 2 ** -23 * perDepth * Math.max(Math.abs(near), Math.abs(far),
-    Math.abs(far + vdi.depthOrigin));
+    Math.abs(far + depthOrigin));
   const stacks = windowSize.map((lists) => ((lists - 1) >> STACK_SHIFT) + 1);
   const masks = new Uint32Array(2 * stacks[0] * stacks[1]);
   const slab = (x) => Math.min(Math.max(Math.floor(x), 0), SLABS - 1);
   return {
-    grid: {
-      masks, stacks, firstDepth: (near < far ? near : 0) * frame.scale,
-      slabsPerDepth: perDepth / frame.scale,
-    },
+    grid: { masks, stacks, firstDepth: space.range[0], slabsPerDepth: perDepth / frame.scale },
     occupy(list, front, back) {
       const i = (list % windowSize[0]) >> STACK_SHIFT;
       const j = Math.floor(list / windowSize[0]) >> STACK_SHIFT;

@@ -3,7 +3,7 @@ import { filledTexture, programOf } from "./graphics.js";
 import { AS_MADE } from "./look.js";
 import { TEXTURE_WIDTH } from "./prepare.js";
 import {
-  frameForms, frameOf, isParallel, listSpace, pixelRays, pixelsOfBounds, pointAlong,
+  frameForms, frameOf, isParallel, pixelRays, pixelsOfBounds, pointAlong,
 } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 import { MEAN_STEPS, SPREADS, fillTable } from "./values.js";
@@ -22,12 +22,7 @@ export class Raycaster {
     this.vertices = gl.createVertexArray();
   }
 
-  /**
-   * Take a VDI; the one before is drawn until its textures are there, and is freed then.
-   *
-   * @param {object} prepared What prepare.js makes.
-   * @throws {Error} If this machine's textures cannot hold it.
-   */
+  /** Take what prepare.js made of a VDI; the one before is freed when its textures are there. */
   set(prepared) {
     const { gl } = this, { n, windowSize, packed, stacks } = prepared;
     const largest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
@@ -69,19 +64,11 @@ export class Raycaster {
    * Draw premultiplied RGBA into the bound framebuffer, by its blending; bottom row first. A
    * scissor that is set holds.
    *
-   * @param {object} view
-   * @param {object} view.camera position, focal_point, view_up and view_angle (degrees) or
-   *   parallel_scale: VTK's meanings, world units; model_transform, if the model lies elsewhere in
-   *   the world than it did for the VDI.
-   * @param {number} view.width Pixels, as height; the viewport is set to them.
-   * @param {number[]} [view.corner] Of the viewport.
-   * @param {{origin: number[], normal: number[]}[]} [view.clippingPlanes] World; the side that the
-   *   normal points to is kept.
-   * @param {WebGLTexture} [view.depthTexture] R32F: view depth of what is opaque, world units, at
-   *   each texel of the framebuffer; rays end there.
-   * @param {object} [view.look] Of look.js.
-   * @param {number} [view.cutoff] A ray ends where less transmittance is left.
-   * @param {boolean} [view.finds] Whether t of a ray's end is written, as four bytes of a float32.
+   * Of the view the `camera` is VTK's, in world units, with a `model_transform` where the model lies
+   * elsewhere than it did for the VDI; the viewport is set to `width` and `height`, pixels, from a
+   * `corner`. `clippingPlanes`, world, keep the side of their normals; rays end at a `depthTexture`,
+   * R32F, view depths of what is opaque in world units, and where less transmittance than `cutoff` is
+   * left. `finds`: t of a ray's end is written, as four bytes of a float32.
    */
   draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null,
     look = AS_MADE, cutoff = TRANSMITTANCE_CUTOFF, finds = false }) {
@@ -97,7 +84,9 @@ export class Raycaster {
       throw new Error(`A VDI is clipped to at most ${clippingPlanes.length - planes.length +
         MOST_PLANES} planes, not to ${clippingPlanes.length}.`);
     }
-    const { program, uniforms: u } = this.program(space, vdi, depthTexture, planes);
+    const defines = [vdi.packed && "PACKED", depthTexture && "OPAQUE", vdi.values && "VALUES"];
+    const shader = fragmentShader(defines.filter(Boolean), planes.length);
+    const { program, uniforms: u } = programOf(gl, VERTEX_SHADER, shader);
     gl.useProgram(program);
     gl.viewport(...corner, width, height);
     const halves = (forms) => [0, 3].map((k) => forms.flatMap((form) => form.slice(k, k + 3)));
@@ -105,12 +94,13 @@ export class Raycaster {
     const vectors = { formValue, formSlope, planeValue, planeSlope };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(u[name], value);
     const scalars = {
-      depthOrigin: space.origin, firstDepth: vdi.firstDepth, slabsPerDepth: vdi.slabsPerDepth, cutoff,
+      firstDepth: vdi.firstDepth, slabsPerDepth: vdi.slabsPerDepth, cutoff,
       brightness: look.brightness, thickness: look.opacity, codeStep: vdi.step,
-      nearest: space.parallel ? -1e30 : space.nearest - space.origin,
-      worldScale: frame.scale, reference: rays.reference,
+      nearest: space.nearest, worldScale: frame.scale, reference: rays.reference,
     };
     for (const [name, value] of Object.entries(scalars)) gl.uniform1f(u[name], value);
+    gl.uniform4fv(u.depths, space.depths);
+    gl.uniform2fv(u.reciprocals, space.reciprocals);
     gl.uniform2f(u.corner, ...corner);
     gl.uniform2f(u.middle, width / 2, height / 2);
     gl.uniformMatrix3fv(u.direction, false, rays.direction.flat());
@@ -129,12 +119,9 @@ export class Raycaster {
   }
 
   /**
-   * Where the ray of a pixel has lost half of the light that it loses: a point of the world, or null
-   * where hardly anything is seen. Waits for the device.
-   *
-   * @param {object} target Of a Pacer, of a pixel.
-   * @param {object} view As of {@link draw}.
-   * @param {number[]} pixel From the lower left corner.
+   * Where the ray of a pixel, from the lower left corner, has lost half of the light that it loses: a
+   * point of the world, or null where hardly anything is seen. Waits for the device, which draws into
+   * a target of a pixel.
    */
   pointAt(target, view, [x, y]) {
     const { gl, vdi } = this, { camera, width, height } = view;
@@ -172,36 +159,6 @@ export class Raycaster {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     if (set) gl.scissor(...set);
     else gl.disable(gl.SCISSOR_TEST);
-  }
-
-  /**
-   * Have the program for V_O of a VDI in 8 bytes compiled, which takes longer than a frame: by a
-   * pixel of the bound framebuffer, in which no ray is left.
-   *
-   * @param {object} vdi camera, windowSize, bounds, depthOrigin and values of what will be set.
-   */
-  warmUp(vdi) {
-    const { gl } = this, { camera, windowSize } = vdi;
-    const frame = frameOf(vdi), space = listSpace(frame, vdi);
-    const rays = pixelRays(frame, camera, windowSize);
-    const { planes } = frameForms(frame, space, windowSize, rays, space.parallel, []);
-    const { program, uniforms, fresh } = this.program(space, { packed: true, values: vdi.values }, null, planes);
-    if (!fresh) return;
-    gl.useProgram(program);
-    gl.uniform3fv(uniforms.planeValue, new Float32Array(3 * planes.length).fill(-1));
-    if (uniforms.table) gl.uniform1i(uniforms.table, 1); // floats, and all others are whole numbers
-    const everything = filledTexture(gl, "RGBA32UI", 1, new Uint32Array(4));
-    gl.viewport(0, 0, 1, 1);
-    gl.bindVertexArray(this.vertices);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.bindVertexArray(null);
-    gl.deleteTexture(everything);
-  }
-
-  program({ parallel, shifted }, { packed, values }, opaque, { length }) {
-    const defines = [parallel && "PARALLEL", shifted && "SHIFTED", packed && "PACKED",
-      opaque && "OPAQUE", values && "VALUES"].filter(Boolean);
-    return programOf(this.gl, VERTEX_SHADER, fragmentShader(defines, length));
   }
 
   free() {

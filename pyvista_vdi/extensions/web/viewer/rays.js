@@ -88,11 +88,12 @@ function windowCentre(camera) {
 /**
  * The list space of a VDI's generating view.
  *
- * @returns {{rows: number[][], parallel: boolean, shifted: boolean, origin: number,
- *   nearest: number, perDepth: number[][]}} `rows`: model' to u, v (pixels from the window's
- *   centre), depth coordinate and denominator; `origin`: depth origin, world'; `nearest`: least
- *   view depth in front of the eye, world'; `perDepth`: rows 1, a, b of the centre rays' model'
- *   direction per unit of view depth.
+ * @returns {{rows: number[][], parallel: boolean, depths: number[], reciprocals: number[],
+ *   range: number[], nearest: number, perDepth: number[][]}} `rows`: model' to u, v (pixels from the
+ *   window's centre), depth coordinate and denominator; `depths`: a, b, c, d of the depth coordinate
+ *   (a x + b) / (c x + d) of an offset x from the depth origin, and `reciprocals`: e, f of 1 / Z = e +
+ *   f z; `range`: offsets of the bounds, world'; `nearest`: the least in front of the eye;
+ *   `perDepth`: rows 1, a, b of the centre rays' model' direction per unit of view depth.
  */
 export function listSpace(frame, vdi) {
   const { camera, windowSize } = vdi;
@@ -108,6 +109,9 @@ export function listSpace(frame, vdi) {
     row.map((x, k) => (x / half - centre * denominator[k]) * lists * 0.5);
   const depth = parallel || shifted
     ? [...toView[2].slice(0, 3), toView[2][3] - origin] : [0, 0, 0, -1];
+  // Z - Z_ref; (Z - Z_ref) / Z, for long lenses; else -1 / Z
+  const [depths, reciprocals] = parallel ? [[1, 0, 0, 1], [1, 0]]
+    : shifted ? [[1, 0, 1, origin], [1 / origin, -1 / origin]] : [[0, -1, 1, origin], [0, -1]];
   return {
     rows: [
       side(toView[0], halfWidth, cx, windowSize[0]),
@@ -115,10 +119,8 @@ export function listSpace(frame, vdi) {
       depth,
       denominator,
     ],
-    parallel,
-    shifted,
-    origin,
-    nearest: NEAREST_DEPTH,
+    parallel, depths, reciprocals, range: [near - origin, far - origin],
+    nearest: parallel ? -1e30 : NEAREST_DEPTH - origin,
     perDepth: pixelRays(frame, camera, windowSize).direction,
   };
 }
@@ -167,18 +169,11 @@ export function pointAlong(frame, rays, [a, b], t) {
 }
 
 /**
- * Forms that a frame needs: list coordinates, and planes that rays are clipped to.
- *
- * @param {object} frame Of {@link frameOf}.
- * @param {object} space Of {@link listSpace}.
- * @param {number[]} windowSize Of the VDI's lists.
- * @param {object} rays Of {@link pixelRays}, of the new view.
- * @param {boolean} parallel Of the new view.
- * @param {{origin: number[], normal: number[]}[]} clippingPlanes World; the normal's side is kept.
- * @param {number[]} [clip] The part of the bounds that is seen: low and high of x, y and z, shares.
+ * Forms that a frame needs: list coordinates, and planes that rays are clipped to, of which those of
+ * the world keep their normals' sides. `rays` and `parallel` are of the new view; `clip`: the part of
+ * the bounds that is seen, low and high of x, y and z as shares.
  */
-export function frameForms(frame, space, windowSize, rays, parallel, clippingPlanes,
-  clip = [0, 1, 0, 1, 0, 1]) {
+export function frameForms(frame, space, windowSize, rays, parallel, clippingPlanes, clip) {
   const coordinates = space.rows.map((row) => formOf(rays, row.slice(0, 3), row[3]));
   const [u, v, , denominator] = coordinates;
   const planes = [];
@@ -193,7 +188,7 @@ export function frameForms(frame, space, windowSize, rays, parallel, clippingPla
       planes.push(add(times(form, sign), times(denominator, lists / 2)));
     }
   }
-  if (!space.parallel) planes.push(add(denominator, [-space.nearest, 0, 0, 0, 0, 0]));
+  if (!space.parallel) planes.push(add(denominator, [-NEAREST_DEPTH, 0, 0, 0, 0, 0]));
   if (!parallel) planes.push([rays.reference, 0, 0, 1, 0, 0]);
   for (const plane of clippingPlanes) {
     const normal = unit(plane.normal);
@@ -205,13 +200,8 @@ export function frameForms(frame, space, windowSize, rays, parallel, clippingPla
 }
 
 /**
- * The rectangle of pixels that a VDI's bounds are seen in.
- *
- * @param {object} frame Of {@link frameOf}.
- * @param {object} camera Of the new view.
- * @param {number[]} size Of its window, pixels.
- * @returns {number[][]} Ends along the width and the height, two pixels more to each side, row 0 at
- *   the bottom; all of the window where the bounds are not in front of the eye.
+ * The pixels that a VDI's bounds are seen in by a camera: ends along the width and the height, two more
+ * to each side, row 0 at the bottom; all of the window where they are not in front of the eye.
  */
 export function pixelsOfBounds(frame, camera, size) {
   const toView = modelToView(frame, camera);

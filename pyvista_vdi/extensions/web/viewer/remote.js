@@ -2,36 +2,32 @@
 //
 // The viewer draws what it has. Where its view rests that is told to the server, which sends another
 // VDI; that is swapped whole.
-import { htmlElement } from "./html.js";
+import { htmlElement, slider } from "./html.js";
 
 /** Milliseconds without a movement after which a view rests. */
 const VIEW_RESTS = 150;
 /** Milliseconds until a lost connection is tried again: twice as long each time, up to the last. */
-const FIRST_RETRY = 500;
-const LAST_RETRY = 16000;
+const FIRST_RETRY = 500, LAST_RETRY = 16000;
 /** The server's longest edge of a picture, pixels. */
 const LONGEST_EDGE = 8192;
-/** Why a server ends a connection for good: the client has said something wrong. */
-const REFUSED = 1008;
-/** Code of a connection that has ended, or was not made, without a word. */
-const UNSAID = 1006;
+/** Codes of a socket's end: the client has said something wrong; and none was said. */
+const REFUSED = 1008, UNSAID = 1006;
 /** Status of an ordinary request of the socket's address, and of one that is not let in. */
-const NO_SOCKET = 426;
-const FORBIDDEN = 403;
+const NO_SOCKET = 426, FORBIDDEN = 403;
 
 /**
- * The VDIs of a server in a viewer.
+ * The VDIs of a server, at the URL of a socket with the token, in a `<vdi-viewer>`.
  *
  * Events: `hello` (detail: what the server offers), `status` (detail: {doing, text}).
  */
 export class RemoteVDI extends EventTarget {
   #socket = null;
-  #incoming = null; // a VDI that comes
+  #incoming = null; // a VDI that comes, and how many of its bytes have
   #next = null; // the file of the last that has
   #showing = false;
   #said = new Map(); // the last message of each kind, said again to a new connection
-  #timer = 0; // until the view rests
-  #retrying = 0; // another timer
+  #resting = 0; // timers: until the view rests
+  #retrying = 0; // and until the connection is tried again
   #retry = FIRST_RETRY;
   #closing = new AbortController();
 
@@ -39,16 +35,12 @@ export class RemoteVDI extends EventTarget {
   hello = null;
   received = { vdis: 0, bytes: 0 };
 
-  /**
-   * @param {HTMLElement} viewer - A `<vdi-viewer>`.
-   * @param {string} url - Of the socket, with the token.
-   */
   constructor(viewer, url) {
     super();
     [this.viewer, this.url] = [viewer, url];
     const moved = () => {
-      clearTimeout(this.#timer);
-      this.#timer = setTimeout(() => this.#sendView(), VIEW_RESTS);
+      clearTimeout(this.#resting);
+      this.#resting = setTimeout(() => this.#sendView(), VIEW_RESTS);
     };
     const sizes = new ResizeObserver(moved), { signal } = this.#closing;
     sizes.observe(viewer);
@@ -70,7 +62,7 @@ export class RemoteVDI extends EventTarget {
   /** End the connection for good. The viewer goes on drawing what it has. */
   close() {
     this.#closing.abort();
-    clearTimeout(this.#timer);
+    clearTimeout(this.#resting);
     clearTimeout(this.#retrying);
     this.#socket.close();
   }
@@ -84,13 +76,12 @@ export class RemoteVDI extends EventTarget {
       else this.#take(new Uint8Array(data));
     };
     socket.onclose = async (event) => {
-      const { why, forGood } = this.#closing.signal.aborted ? {} : await whyNot(event, this.url);
       if (this.#closing.signal.aborted) return;
-      if (forGood) {
-        this.#status(null, why);
-        return;
-      }
-      this.#status(null, `${why}; trying again in ${Math.ceil(this.#retry / 1000)} s`);
+      const { why, forGood } = await whyNot(event, this.url);
+      if (this.#closing.signal.aborted) return;
+      const again = forGood ? "" : `; trying again in ${Math.ceil(this.#retry / 1000)} s`;
+      this.#status(null, why + again);
+      if (forGood) return;
       this.#retrying = setTimeout(() => this.#connect(), this.#retry);
       this.#retry = Math.min(2 * this.#retry, LAST_RETRY);
     };
@@ -99,10 +90,9 @@ export class RemoteVDI extends EventTarget {
   #hear(message) {
     const { viewer } = this;
     if (message.type === "hello") {
-      const first = this.hello === null;
+      if (this.hello === null) viewer.home = message.camera;
+      viewer.camera ??= message.camera; // where no link has said another
       this.hello = message;
-      if (first) viewer.home = message.camera;
-      if (first && !viewer.camera) viewer.camera = message.camera; // no link has said another
       this.#status(null, "");
       this.dispatchEvent(new CustomEvent("hello", { detail: message })); // a panel may take room
       this.#said.forEach((said) => this.#send(said));
@@ -111,11 +101,8 @@ export class RemoteVDI extends EventTarget {
       this.#retry = FIRST_RETRY; // not at once: a server may fail whenever it is asked for one
       // One that has not come whole is given up by the server
       this.#incoming = { file: new Uint8Array(message.bytes), filled: 0 };
-    } else if (message.type === "status") {
-      this.#status(message.doing, "");
-    } else if (message.type === "error") {
-      this.#status(null, message.message);
-    }
+    } else if (message.type === "status") this.#status(message.doing, "");
+    else if (message.type === "error") this.#status(null, message.message);
   }
 
   #take(part) {
@@ -132,11 +119,10 @@ export class RemoteVDI extends EventTarget {
   // Decode and swap what has come, one after the other: the last one counts.
   async #show() {
     this.#showing = true;
-    while (this.#next !== null) {
-      const file = this.#next;
+    for (let file; (file = this.#next) !== null;) {
       this.#next = null;
       try {
-        await this.viewer.showBytes(file);
+        await this.viewer.load(file);
         this.received.vdis += 1;
       } catch (error) {
         this.#status(null, error.message);
@@ -146,18 +132,17 @@ export class RemoteVDI extends EventTarget {
   }
 
   #sendView() {
-    const { viewer } = this;
-    if (!this.#listens) return;
+    if (!this.#isHeard) return;
+    const { clientWidth, clientHeight, camera } = this.viewer;
+    delete camera.window_center; // of the picture, not of the view
     const density = globalThis.devicePixelRatio || 1;
-    const edge = (length) => Math.min(LONGEST_EDGE, Math.max(1, Math.round(length * density)));
-    const size = [edge(viewer.clientWidth), edge(viewer.clientHeight)];
-    const { position, focal_point, view_up, view_angle, parallel_scale } = viewer.camera;
-    const lens = parallel_scale === undefined ? { view_angle } : { parallel_scale };
-    clearTimeout(this.#timer);
-    this.#send({ type: "view", camera: { position, focal_point, view_up, ...lens }, size });
+    const size = [clientWidth, clientHeight].map((edge) =>
+      Math.min(LONGEST_EDGE, Math.max(1, Math.round(edge * density))));
+    clearTimeout(this.#resting);
+    this.#send({ type: "view", camera, size });
   }
 
-  get #listens() {
+  get #isHeard() {
     return this.hello !== null && this.#socket.readyState === WebSocket.OPEN;
   }
 
@@ -167,7 +152,7 @@ export class RemoteVDI extends EventTarget {
 
   #say(message) {
     this.#said.set(message.type, message);
-    if (this.#listens) this.#send(message);
+    if (this.#isHeard) this.#send(message);
   }
 
   #status(doing, text) {
@@ -191,14 +176,14 @@ async function whyNot({ code, reason }, url) {
   }
 }
 
-// Fill a panel with plain controls of what the server offers; `complain` is told what is wrong.
-function fillPanel(panel, remote, { cmaps, opacities, look, range, steps }, complain) {
+// Plain controls of what the server offers; `complain` is told what is wrong.
+function controlsOf(remote, { cmaps, opacities, look, range, steps }, complain) {
   const labelled = (text, ...inputs) => htmlElement("label", {}, text, ...inputs);
   const choice = (label, names, value) => {
     const known = names.includes(value);
-    const options = names.map((name) => htmlElement("option", {}, name));
-    const select = htmlElement("select", { label }, ...options);
-    if (!known) select.prepend(htmlElement("option", { value: "" }, "as started"));
+    const option = (name, more) => htmlElement("option", more, name);
+    const select = htmlElement("select", { label }, ...(known ? [] : [option("as started", { value: "" })]),
+      ...names.map((name) => option(name)));
     select.value = known ? value : "";
     return select;
   };
@@ -228,23 +213,13 @@ function fillPanel(panel, remote, { cmaps, opacities, look, range, steps }, comp
     controls.push(labelled("Colours", cmap), labelled("Opacity", opacity), labelled("Range", ...ends));
   }
   if (steps > 1) {
-    const time = htmlElement("input", {
-      type: "range", min: 0, max: steps - 1, value: 0, label: "Time step",
-    });
-    time.addEventListener("input", () => remote.setStep(Number(time.value)));
-    controls.push(labelled("Time", time));
+    const limits = { min: 0, max: steps - 1, value: 0 };
+    controls.push(labelled("Time", slider("Time step", limits, (step) => remote.setStep(step))));
   }
-  panel.replaceChildren(...controls);
+  return controls;
 }
 
-/**
- * Connect a page's viewer to the server that the page came from.
- *
- * @param {HTMLElement} viewer - A `<vdi-viewer>`.
- * @param {HTMLElement} panel - Gets the controls.
- * @param {HTMLElement} line - Gets what goes on, as text.
- * @returns {RemoteVDI} The connection.
- */
+/** Connect a page's viewer to the server that the page came from; return the connection. */
 export function connectPage(viewer, panel, line) {
   const url = new URL("socket", location.href);
   url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
@@ -259,12 +234,10 @@ export function connectPage(viewer, panel, line) {
   remote.addEventListener("hello", ({ detail }) => {
     const offer = JSON.stringify(detail);
     if (offered && offer !== offered) location.reload(); // another volume is served there by now
-    else if (!offered) fillPanel(panel, remote, detail, (wrong) => say({ wrong }));
+    else if (!offered) panel.replaceChildren(...controlsOf(remote, detail, (wrong) => say({ wrong })));
     offered = offer;
   });
-  const words = { vdi: "making a VDI of this view" };
-  remote.addEventListener("status", ({ detail }) => {
-    say({ going: detail.text || words[detail.doing] || "" });
-  });
+  remote.addEventListener("status", ({ detail: { text, doing } }) =>
+    say({ going: text || (doing === "vdi" ? "making a VDI of this view" : "") }));
   return remote;
 }

@@ -43,12 +43,10 @@ export class Renderer {
   #retiring = 0; // a timer
 
   /**
-   * @param {HTMLElement} viewer
-   * @param {{canvas: HTMLCanvasElement, over: HTMLCanvasElement}} parts What is drawn into, and
-   *   what a scene's texts are drawn into.
-   * @param {object} host `busy()`: whether there will be frames without end; `took()` is called when
-   *   the next frame has another VDI, `drawn(full, latest)` after a frame: whether with all pixels,
-   *   and of what is to be shown by now; `failed(error)`.
+   * What draws into a viewer's canvas, and a scene's texts into the one over it. Of the host
+   * `busy()` says whether there will be frames without end; `took()` is called when the next frame has
+   * another VDI, `drawn(full, latest)` after a frame: whether with all pixels, and of what is to be
+   * shown by now; `failed(error)`.
    */
   constructor(viewer, { canvas, over }, host) {
     [this.#viewer, this.#canvas, this.#over, this.#host] = [viewer, canvas, over, host];
@@ -124,14 +122,14 @@ export class Renderer {
     this.invalidate(false);
   }
 
-  /** Have the program compiled while the first lists are still being decoded. */
-  warmUp(vdi) {
+  /** Have the program compiled while the first lists are still being decoded: by an empty VDI. */
+  warmUp(begun) {
     if (!this.#raycaster || this.prepared) return;
-    const gl = this.#gl;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#pacer.screen(...this.size).framebuffer);
-    gl.enable(gl.BLEND);
-    this.#raycaster.warmUp(vdi);
-    gl.disable(gl.BLEND);
+    this.#raycaster.set(begun);
+    this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, this.#pacer.screen(...this.size).framebuffer);
+    this.#gl.enable(this.#gl.BLEND);
+    this.#raycaster.draw({ camera: begun.camera, width: 1, height: 1 });
+    this.#gl.disable(this.#gl.BLEND);
   }
 
   // -- frames ------------------------------------------------------------------------------------
@@ -142,8 +140,8 @@ export class Renderer {
     this.#asked = true;
     this.#wake();
     const something = this.camera && (this.prepared || this.scene?.head);
-    if (this.#drawing || !something || !this.#viewer.isConnected || !this.begin()) return;
-    if (this.#drawing) return; // which may have begun with another size
+    if (this.#drawing || !something || !this.#viewer.isConnected) return;
+    if (!this.begin() || this.#drawing) return; // which may have begun to draw with another size
     this.#drawing = true;
     requestAnimationFrame(() => this.#frames());
   }
@@ -249,11 +247,11 @@ export class Renderer {
       const data = new Uint8ClampedArray(4 * width * height), row = 4 * width;
       const upsideDown = new Uint8Array(data.length);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-      scene?.paintTexts(this.fitted(camera, width, height), width, height);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upsideDown);
       for (let y = 0; y < height; ++y) {
         data.set(upsideDown.subarray((height - 1 - y) * row, (height - y) * row), y * row);
       }
+      scene?.layTexts(data, this.fitted(camera, width, height), [width, height]);
       return { width, height, data };
     } finally {
       pacer.free(target);

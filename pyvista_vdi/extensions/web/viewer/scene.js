@@ -5,7 +5,6 @@ import { emptyTexture, programOf } from "./graphics.js";
 import { load } from "./loader.js";
 import { Raycaster } from "./raycast.js";
 import { cameraAxes, halfExtent, isParallel } from "./rays.js";
-import { VERTEX_SHADER } from "./shader.js";
 import { dot, subtract } from "./vectors.js";
 
 /** Samples of a pixel where meshes are drawn, as in PyVista's windows. */
@@ -48,17 +47,6 @@ void main() {
   seen = depths ? vec4(-seenFrom.z) : vec4(headlight * tint.rgb, 1.0);
 }`;
 
-/** Lays a picture of the same pixels over what is there; `flipped`: its first row is the upper one. */
-const PICTURE_SHADER = `#version 300 es
-precision highp float;
-uniform sampler2D picture;
-uniform bool flipped;
-out vec4 seen;
-void main() {
-  ivec2 at = ivec2(gl_FragCoord.xy);
-  if (flipped) at.y = textureSize(picture, 0).y - 1 - at.y;
-  seen = texelFetch(picture, at, 0);
-}`;
 
 /** A scene: `viewer.scene = new Scene(bytes)`. */
 export class Scene {
@@ -68,19 +56,19 @@ export class Scene {
   #meshes = [];
   #bodies = []; // VDIs; the first is the viewer's own
   #pictures = []; // of all views, and of the view that the scene was made in
-  #vertices = null;
   #annotated = new WeakMap(); // canvases, and what was drawn there
+
+  /** The view that the scene begins in, if it says one; null before it is loaded. */
+  camera = null;
+  /** Called when there is more to be seen. */
+  changed = () => {};
+  /** The viewer that shows it. */
+  viewer = null;
+  /** Whether all of it can be drawn. */
+  complete = false;
 
   /** @param {Uint8Array} bytes What web/scenes/scene.py makes. */
   constructor(bytes) {
-    /** The view that the scene begins in, if it says one; null before it is loaded. */
-    this.camera = null;
-    /** Called when there is more to be seen. */
-    this.changed = () => {};
-    /** The viewer that shows it. */
-    this.viewer = null;
-    /** Whether all of it can be drawn. */
-    this.complete = false;
     /** Fulfilled when meshes and pictures are there. */
     this.loaded = this.#load(bytes);
     /** Fulfilled when all can be drawn. */
@@ -122,7 +110,6 @@ export class Scene {
     if (gl === this.#gl || !this.head) return;
     this.#gl = gl;
     this.#buffers = this.#drawn = null;
-    this.#vertices = gl.createVertexArray();
     if (this.#meshes.length && !gl.getExtension("EXT_color_buffer_float")) {
       throw new Error("This browser's graphics cannot draw depths as numbers " +
         "(EXT_color_buffer_float), by which meshes hide a volume.");
@@ -147,8 +134,7 @@ export class Scene {
       drawn?.buffers.forEach((buffer) => gl.deleteBuffer(buffer));
     }
     this.#free();
-    gl.deleteVertexArray(this.#vertices);
-    this.#gl = this.#vertices = null;
+    this.#gl = null;
   }
 
   /**
@@ -156,8 +142,8 @@ export class Scene {
    *
    * @param {Raycaster} raycaster The viewer's own VDI.
    * @param {object} target Of a Pacer.
-   * @param {object} view camera, width, height, density (pixels of it for one of the page), moving,
-   *   look, clippingPlanes; the same object for all bands of a picture.
+   * @param {object} view camera, width, height, density (pixels of it for one of the page), look,
+   *   clippingPlanes; the same object for all bands of a picture.
    */
   paint(raycaster, target, view) {
     const gl = this.#gl, { width, height } = view;
@@ -170,9 +156,11 @@ export class Scene {
         gl.enable(gl.SCISSOR_TEST);
         this.#drawn = view;
       }
+      // Behind the VDIs, within the scissor
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#buffers.resolved);
+      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target.framebuffer);
+      gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-      gl.viewport(0, 0, width, height);
-      this.#cover(this.#buffers.color, false);
     }
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
@@ -265,35 +253,16 @@ export class Scene {
     }
   }
 
-  /** Lay them over the bound framebuffer, for a picture. */
-  paintTexts(camera, width, height) {
-    const gl = this.#gl;
+  /** Lay them over a picture: premultiplied RGBA, top row first. */
+  layTexts(data, camera, size) {
     if (!this.#pictures.some(Boolean)) return;
-    const canvas = new OffscreenCanvas(width, height);
-    this.annotate(canvas, camera, [width, height]);
-    const picture = emptyTexture(gl, "RGBA8", width, height);
-    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, true);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, canvas);
-    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
-    gl.viewport(0, 0, width, height);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    this.#cover(picture, true);
-    gl.disable(gl.BLEND);
-    gl.deleteTexture(picture);
-  }
-
-  #cover(picture, flipped) {
-    const gl = this.#gl;
-    const { program, uniforms } = programOf(gl, VERTEX_SHADER, PICTURE_SHADER);
-    gl.useProgram(program);
-    gl.uniform1i(uniforms.flipped, flipped);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, picture);
-    gl.uniform1i(uniforms.picture, 0);
-    gl.bindVertexArray(this.#vertices);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.bindVertexArray(null);
+    const canvas = new OffscreenCanvas(...size);
+    this.annotate(canvas, camera, size);
+    const { data: over } = canvas.getContext("2d").getImageData(0, 0, ...size);
+    for (let k = 0; k < data.length; ++k) {
+      const opacity = over[k | 3] / 255, straight = (k & 3) === 3 ? 255 : over[k];
+      data[k] = opacity * straight + (1 - opacity) * data[k];
+    }
   }
 
   // Framebuffers as large as the target's: of depths, of colours by samples, and of those resolved.
@@ -308,29 +277,28 @@ export class Scene {
       gl.renderbufferStorageMultisample(gl.RENDERBUFFER, count, gl[format], width, height);
       return id;
     };
-    const framebuffer = (picture, buffers) => {
+    const framebuffer = (color, depth) => {
       const id = gl.createFramebuffer();
       gl.bindFramebuffer(gl.FRAMEBUFFER, id);
-      if (picture) gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, picture, 0);
-      for (const [place, buffer] of Object.entries(buffers)) {
-        gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl[place], gl.RENDERBUFFER, buffer);
-      }
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.RENDERBUFFER, color);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
       return id;
     };
-    const [depth, color] = ["R32F", "RGBA8"].map((format) => emptyTexture(gl, format, width, height));
+    const depth = emptyTexture(gl, "R32F", width, height);
     const renderbuffers = [renderbuffer("DEPTH_COMPONENT24", 0), renderbuffer("RGBA8", samples),
-      renderbuffer("DEPTH_COMPONENT24", samples)];
-    const passes = [framebuffer(depth, { DEPTH_ATTACHMENT: renderbuffers[0] }),
-      framebuffer(null, { COLOR_ATTACHMENT0: renderbuffers[1], DEPTH_ATTACHMENT: renderbuffers[2] })];
-    const resolved = framebuffer(color, {});
-    this.#buffers = { width, height, depth, color, renderbuffers, passes, resolved };
+      renderbuffer("DEPTH_COMPONENT24", samples), renderbuffer("RGBA8", 0)];
+    const passes = [framebuffer(null, renderbuffers[0]), framebuffer(renderbuffers[1], renderbuffers[2])];
+    const resolved = framebuffer(renderbuffers[3], null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, passes[0]);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, depth, 0);
+    this.#buffers = { width, height, depth, renderbuffers, passes, resolved };
     return this.#buffers;
   }
 
   #free() {
-    const gl = this.#gl, { depth, color, renderbuffers, passes, resolved } = this.#buffers ?? {};
+    const gl = this.#gl, { depth, renderbuffers, passes, resolved } = this.#buffers ?? {};
     if (this.#buffers) {
-      for (const texture of [depth, color]) gl.deleteTexture(texture);
+      gl.deleteTexture(depth);
       for (const buffer of renderbuffers) gl.deleteRenderbuffer(buffer);
       for (const framebuffer of [...passes, resolved]) gl.deleteFramebuffer(framebuffer);
     }

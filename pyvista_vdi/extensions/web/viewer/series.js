@@ -11,8 +11,6 @@ const NAME_AT = 30;
 export const BEGIN = 64;
 /** Decoded VDIs that are kept. */
 const KEPT = 6;
-/** Share of the last VDI's decoding in what the next one is expected to take. */
-const LAST = 0.3;
 
 const nameOf = (i) => `${String(i).padStart(6, "0")}.vdi`;
 
@@ -56,14 +54,7 @@ export class Series {
     return far.indexOf(Math.min(...far));
   }
 
-  /**
-   * A VDI as prepare.js makes it.
-   *
-   * @param {number} i Its index.
-   * @param {AbortSignal} signal Ends it.
-   * @returns {Promise<object>}
-   * @throws {VDIFileError} A sentence that names the step.
-   */
+  /** A VDI as prepare.js makes it; a VDIFileError names the step. */
   async prepared(i, signal) {
     try {
       return await withWorker(signal, async (ask) => {
@@ -84,13 +75,8 @@ export class Series {
   }
 
   /**
-   * Read a ZIP from pieces that come one behind the other.
-   *
-   * @param {Uint8Array} first
-   * @param {AsyncIterable} pieces Those that follow: Uint8Array or base64 text.
-   * @param {(series: Series) => void} onSeries Called when its first VDI is there.
-   * @returns {Promise<void>} When all has been read.
-   * @throws {VDIFileError} If there is no VDI.
+   * Read a ZIP from its first bytes and the pieces that follow, bytes or base64 text; `onSeries` is
+   * called when its first VDI is there.
    */
   static async ofPieces(first, pieces, onSeries) {
     const bytes = new GrowingBytes();
@@ -120,11 +106,8 @@ export class Series {
   }
 
   /**
-   * The series or set in a folder, of which each VDI is read when it is asked for.
-   *
-   * @param {string} name Of the JSON: "series.json" or "set.json".
-   * @param {(name: string) => Promise<Uint8Array>} read Returns the bytes of one of the files.
-   * @returns {Promise<Series>}
+   * Return the series or set in a folder, of which each VDI is read when it is asked for: by `name`,
+   * "series.json" or "set.json", and by `read`, which returns the bytes of one of its files.
    */
   static async ofFolder(name, read) {
     const series = new Series(name, await read(name), (i) => read(nameOf(i)));
@@ -159,7 +142,7 @@ function headOf(name, text) {
 /** Decodes VDIs of a series before they are shown, one after the other. */
 export class Ahead {
   #series;
-  #host;
+  #host; // show(prepared, i) has one drawn; came(i): it is ready; broken(i, error): it cannot be
   #wanted = []; // indices
   #ready = new Map(); // index -> what prepare.js made of it; what was shown last is last
   #broken = new Set();
@@ -168,14 +151,7 @@ export class Ahead {
 
   /** Index of the one that was handed to be drawn. */
   shown = -1;
-  /** Seconds that one takes to be ready. */
-  seconds = 0;
 
-  /**
-   * @param {Series} series
-   * @param {object} host `show(prepared, i)` has a VDI drawn; `came(i)` is called when one is ready,
-   *   `broken(i, error)` when it cannot be.
-   */
   constructor(series, host) {
     [this.#series, this.#host] = [series, host];
   }
@@ -217,7 +193,7 @@ export class Ahead {
     this.#working = true;
     const known = (i) => this.#ready.has(i) || this.#broken.has(i);
     for (let i; (i = this.#wanted.find((each) => !known(each))) !== undefined;) {
-      const { signal } = this.#stop, began = performance.now();
+      const { signal } = this.#stop;
       try {
         this.#ready.set(i, await this.#series.prepared(i, signal));
       } catch (error) {
@@ -226,8 +202,6 @@ export class Ahead {
         this.#host.broken(i, error);
         continue;
       }
-      const took = (performance.now() - began) / 1000;
-      this.seconds += (took - this.seconds) * (this.seconds ? LAST : 1);
       for (const old of this.#ready.keys()) {
         if (this.#ready.size <= KEPT) break;
         if (old !== this.shown && !this.#wanted.includes(old)) this.#ready.delete(old);

@@ -4,10 +4,9 @@
 // straight, and steps from list to list. r runs along it over an interval of length 1 and is 0 at
 // the end that is deeper in V_O, where the interpolated 1/Z is smallest.
 //
-// PARALLEL, SHIFTED    the depth coordinate: Z - Z_ref; (Z - Z_ref) / Z, for long lenses; else -1/Z
-// PACKED               8-byte supersegments
-// OPAQUE               rays end at the opaque depth of their pixel
-// VALUES               supersegments keep values, which a table makes media of
+// PACKED    8-byte supersegments
+// OPAQUE    rays end at the opaque depth of their pixel
+// VALUES    supersegments keep values, which a table makes media of
 import { STACK_SHIFT, TEXTURE_WIDTH } from "./prepare.js";
 import { FIRST_SPREAD, MEAN_STEPS, SPREADS } from "./values.js";
 
@@ -48,7 +47,8 @@ uniform vec3 formValue[4], formSlope[4]; // u, v, depth coordinate, denominator:
 uniform vec3 planeValue[PLANES], planeSlope[PLANES];
 uniform mat3 direction;           // model' length per t: columns for 1, a and b
 uniform ivec2 window;             // lists
-uniform float depthOrigin;        // world'
+uniform vec4 depths;              // of rays.js, depthForms: the depth coordinate of an offset
+uniform vec2 reciprocals;         // and 1 / Z of a depth coordinate
 uniform float firstDepth, slabsPerDepth; // of the occupancy grid, offsets from the depth origin
 uniform float cutoff;
 uniform float brightness, thickness; // factors of colours and of optical depths
@@ -74,35 +74,15 @@ out vec4 seen;
 ivec2 texel(int k) { return ivec2(k & ((1 << WIDTH_SHIFT) - 1), k >> WIDTH_SHIFT); }
 
 float coordinate(float offset) {
-#if defined(PARALLEL)
-  return offset;
-#elif defined(SHIFTED)
-  return offset / (offset + depthOrigin);
-#else
-  return -1.0 / (offset + depthOrigin);
-#endif
+  return (depths.x * offset + depths.y) / (depths.z * offset + depths.w);
 }
 
 float offsetOf(float z) {
-#if defined(PARALLEL)
-  return z;
-#elif defined(SHIFTED)
-  return z * depthOrigin / (1.0 - z);
-#else
-  return -1.0 / z - depthOrigin;
-#endif
+  return (depths.w * z - depths.y) / (depths.x - depths.z * z);
 }
 
 // 1 / Z; in parallel projection lengths are not divided by it.
-float reciprocal(float z) {
-#if defined(PARALLEL)
-  return 1.0;
-#elif defined(SHIFTED)
-  return (1.0 - z) / depthOrigin;
-#else
-  return -z;
-#endif
-}
+float reciprocal(float z) { return reciprocals.x + reciprocals.y * z; }
 
 // -- a list, and its supersegments in the ray's sense: depths are negated for rays that come back
 
@@ -250,13 +230,8 @@ CLIPPING
     vec4 slope = vec4(dot(formSlope[0], pixel), dot(formSlope[1], pixel),
                       dot(formSlope[2], pixel), dot(formSlope[3], pixel));
     vec4 p0 = value + t0 * slope, p1 = value + t1 * slope;
-#ifdef PARALLEL
-    start = p0.xyz;
-    end = p1.xyz;
-#else
     start = p0.xyz / p0.w;
     end = p1.xyz / p1.w;
-#endif
   }
   along = end - start;
   along = mix(along, vec3(0.0), lessThan(abs(along), vec3(1.2e-38)));

@@ -19,14 +19,7 @@ const ROOT_OF_3 = Math.sqrt(3);
 /** Most points of a curve. */
 const MOST_POINTS = 64;
 
-/**
- * Return a transfer function as the viewer keeps it; refuse one that is none.
- *
- * @param {object} transfer `cmap`, a name, or null for the colours that the file has; `clim`, the
- *   values of the first and the last colour; `points` (x, opacity, ...): shares of `clim` that grow,
- *   and opacities, 0 to 1.
- * @throws {TypeError} That names what is wrong.
- */
+/** Return a transfer function as the viewer keeps it: see element.d.ts; a TypeError refuses others. */
 export function checkedTransfer({ cmap = null, clim, points }) {
   if (cmap !== null && !COLORMAPS.includes(cmap)) {
     throw new TypeError(`A colour map is one of ${COLORMAPS.join(", ")}; got ${cmap}.`);
@@ -122,12 +115,9 @@ function integralsOf({ values, metadata }, { colors, opacities, points, scalar_r
 }
 
 /**
- * What a transfer function makes of each mean and spread.
- *
- * @param {object} prepared Of prepare.js, with values.
- * @param {object|null} transfer Of {@link checkedTransfer}; null: what the file starts with.
- * @param {Float32Array} table Rows of MEAN_STEPS + 1 entries, one for each of SPREADS: straight
- *   colour, and extinction per model' length.
+ * Fill a table with what a transfer function, or null for what the file starts with, makes of each mean
+ * and spread: rows of MEAN_STEPS + 1 entries, one for each of SPREADS, of straight colour and of
+ * extinction per model' length.
  */
 export function fillTable(prepared, transfer, table) {
   const { atLow, sums } = integralsOf(prepared, toldOf(prepared, transfer));

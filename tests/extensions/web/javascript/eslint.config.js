@@ -11,7 +11,7 @@ export default [{
       "CustomEvent EventTarget AbortController AbortSignal ResizeObserver IntersectionObserver MutationObserver " +
       "matchMedia getComputedStyle requestAnimationFrame cancelAnimationFrame setTimeout clearTimeout setInterval " +
       "clearInterval queueMicrotask structuredClone customElements fetch atob btoa createImageBitmap ImageData " +
-      "MessageChannel DOMException OffscreenCanvas globalThis process"),
+      "DOMException OffscreenCanvas globalThis process Buffer TextEncoder setImmediate"),
   },
   linterOptions: { reportUnusedDisableDirectives: "error" },
   rules: {

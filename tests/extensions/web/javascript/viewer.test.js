@@ -1,19 +1,16 @@
 // Pure functions of the viewer, by Node: node --test in this folder. No browser is needed.
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { pathToFileURL } from "node:url";
+import { textOf, viewerModule } from "./viewer.js";
 
-// Of an installation, where it is named
-const named = process.env.PYVISTA_VDI_VIEWER;
-const viewer = named ? pathToFileURL(named).href
-  : new URL("../../../../pyvista_vdi/extensions/web/viewer", import.meta.url).href;
-const textOf = (name) => readFileSync(new URL(`${viewer}/${name}`), "utf-8");
-const { checkedCamera, lookingAt } = await import(`${viewer}/camera.js`);
-const { textOfView, viewOfText } = await import(`${viewer}/link.js`);
-const { AS_MADE, checkedLook, isAsMade } = await import(`${viewer}/look.js`);
-const { inShort } = await import(`${viewer}/html.js`);
-const { checkedTransfer, editedFrom } = await import(`${viewer}/values.js`);
+const { checkedCamera, checkedPlane, fitted, lookingAt, nearer, panned, rotated } = await viewerModule("camera.js");
+const { inShort } = await viewerModule("html.js");
+const { dragOf, dragged, keyed } = await viewerModule("interaction.js");
+const { textOfView, viewOfText } = await viewerModule("link.js");
+const { AS_MADE, checkedLook, isAsMade } = await viewerModule("look.js");
+const { frameOf, listSpace, pixelRays, pixelsOfBounds, pointAlong } = await viewerModule("rays.js");
+const { checkedTransfer, editedFrom } = await viewerModule("values.js");
+const { GrowingBytes, crc32 } = await viewerModule("bytes.js");
 
 const camera = checkedCamera({
   position: [2.1, 1 / 3, -1.7e-9], focal_point: [0, 0, 0], view_up: [0, 1, 0], view_angle: 30,
@@ -64,12 +61,70 @@ test("what is no view is refused by name", () => {
   ]) assert.throws(() => viewOfText(text), { name: "TypeError", message: why });
 });
 
-test("a look has factors and shares in order", () => {
+test("looks, views and planes that show nothing are refused by name", () => {
   assert.ok(isAsMade(checkedLook({})));
   assert.ok(!isAsMade(checkedLook({ opacity: 2 })));
-  for (const look of [{ brightness: 17 }, { opacity: NaN }, { clip: [1, 0, 0, 1, 0, 1] }, { clip: [] }]) {
-    assert.throws(() => checkedLook(look), TypeError);
+  const lens = { view_angle: undefined };
+  for (const [check, given, why] of [
+    [checkedLook, { brightness: 17 }, /brightness is a factor from 1\/16 to 16; got 17/],
+    [checkedLook, { opacity: NaN }, /opacity is a factor/], [checkedLook, { clip: [0, 1] }, /clip is six finite/],
+    [checkedLook, { clip: [0.6, 0.5, 0, 1, 0, 1] }, /lower to a higher share/],
+    [checkedCamera, {}, /position is three finite numbers/],
+    [checkedCamera, { ...camera, position: camera.focal_point }, /are the same point/],
+    [checkedCamera, { ...camera, view_angle: 180 }, /view_angle is a positive number below 180/],
+    [checkedCamera, { ...camera, ...lens, parallel_scale: -1 }, /parallel_scale is/],
+    [checkedCamera, { ...camera, view_up: camera.position }, /view_up is not parallel/],
+    [checkedCamera, { ...camera, window_center: [0, NaN] }, /window_center is two finite numbers/],
+    [checkedPlane, { origin: [0, 0, 0], normal: [0, 0, 0] }, /normal is not zero/],
+    [checkedPlane, { normal: [1, 0, 0] }, /origin is three finite numbers; got undefined/],
+  ]) assert.throws(() => check(given), { name: "TypeError", message: why });
+});
+
+test("buttons and keys have VTK's meanings", () => {
+  const held = (shiftKey, ctrlKey) => [0, 1, 2].map((button) => dragOf(button, { shiftKey, ctrlKey }));
+  assert.deepEqual(held(false, false), ["rotate", "pan", "dolly"]);
+  assert.deepEqual([held(true, false)[0], held(false, true)[0], held(true, true)[0]], ["pan", "spin", "dolly"]);
+  assert.deepEqual(keyed(camera, { key: "ArrowLeft" }), rotated(camera, 5, 0));
+  assert.deepEqual(keyed(camera, { key: "ArrowUp", shiftKey: true }), panned(camera, 0, 0.05));
+  assert.deepEqual(keyed(camera, { key: "-" }), nearer(camera, 1 / 1.1));
+  assert.equal(keyed(camera, { key: "a" }), undefined);
+  assert.deepEqual(dragged("dolly", camera, [5, 5], [5, 55], [100, 100]), nearer(camera, 1.1 ** 10));
+});
+
+test("a narrow window sees all of a picture, a wide one what it is given", () => {
+  assert.equal(fitted(camera, 2, [200, 100]), camera);
+  const { view_angle } = fitted(camera, 2, [100, 100]);
+  const tangent = (angle) => Math.tan((angle * Math.PI) / 360);
+  assert.ok(Math.abs(tangent(view_angle) - 2 * tangent(30)) < 1e-12);
+  assert.equal(fitted({ ...camera, parallel_scale: 3, view_angle: undefined }, 2, [100, 100]).parallel_scale, 6);
+});
+
+test("rays of pixels go through what is seen there", () => {
+  const seen = { camera: { ...camera, position: [5, 1, 2] }, bounds: [-1, 1, -1, 1, -1, 1], depthOrigin: 4, windowSize: [40, 30] };
+  for (const view of [seen.camera, { ...seen.camera, view_angle: undefined, parallel_scale: 2 }]) {
+    const frame = frameOf(seen), rays = pixelRays(frame, view, [40, 30]);
+    const middle = pointAlong(frame, rays, [0, 0], 0); // on the line from the eye to the focal point
+    const [toEye, toPoint] = [view.position, middle].map((p) => p.map((x) => x / Math.hypot(...p)));
+    assert.ok(Math.hypot(...toEye.map((x, k) => x - toPoint[k])) < 1e-9);
+    const [[x0, x1], [y0, y1]] = pixelsOfBounds(frame, view, [40, 30]);
+    assert.ok(x0 >= 0 && x1 <= 40 && y0 >= 0 && y1 <= 30 && x1 - x0 > 10);
   }
+  const { range, depths: [a, b, c, d], reciprocals: [e, f] } = listSpace(frameOf(seen), seen);
+  const z = (a * range[1] + b) / (c * range[1] + d); // of the farthest corner
+  assert.ok(Math.abs(1 / (e + f * z) - (range[1] + 4 * frameOf(seen).scale)) < 1e-12);
+});
+
+test("bytes come in pieces, also as text that ends anywhere", () => {
+  const bytes = Uint8Array.from({ length: 200000 }, (_, k) => k * k % 251), growing = new GrowingBytes();
+  const text = Buffer.from(bytes.subarray(1000)).toString("base64");
+  growing.push(bytes.subarray(0, 1000));
+  growing.push(text.slice(0, 7));
+  assert.ok(growing.broken);
+  growing.push(` \n${text.slice(7)}`);
+  assert.ok(!growing.broken);
+  assert.deepEqual(growing.whole, bytes);
+  assert.throws(() => growing.push("????"), /no base64/);
+  assert.equal(crc32(new TextEncoder().encode("123456789")), 0xcbf43926);
 });
 
 test("a standard view sees all of a box", () => {
@@ -90,7 +145,7 @@ test("types and manifest have what the element has", () => {
   const members = new Set([...source.matchAll(/^  (?:async )?(?:[gs]et )?(\w+)\(.*\) \{$/gm)]
     .map(([, name]) => name).filter((name) => !/Callback$|^constructor$|^if$|^for$|^while$/.test(name)));
   // For what is beside the viewer in this package
-  for (const own of ["showBytes", "setPrepared", "invalidate"]) members.delete(own);
+  members.delete("showBytes");
   const names = told.members.map(({ name }) => name);
   assert.deepEqual([...members].sort(), names.toSorted());
   for (const name of names) assert.match(types, new RegExp(`\\b${name}[?]?[(:]`), name);

@@ -11,8 +11,7 @@
 #define LANES 16
 #include "lib/compositing.cl"
 #include "lib/transpose.cl"
-#include "cpu16/codes.cl"
-#include "raycasting/frame.cl"
+#include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Lane p * PACKET_BUNDLES + n has place p in the n-th bundle: vectors of bundles become vectors of
@@ -207,11 +206,8 @@ inline Real4 packet_media(const Lists *in, const PacketLists *lists, int k, Pack
 }
 
 KERNEL_OF_LANES void raycast_aligned_view(
-    __global const HEADER_T *headers, // these as of raycasting/raycast.cl; masks are not looked
-    __global const ulong *faces,      // at: lists say by themselves what is empty
-    __global const ulong *media, __global const float *forms, __global const float *opaque_depth,
-    __global const ulong *masks, Frame frame,
-    int2 origin, // the pixel of list (0, 0); maybe beside the window
+    VDI_PARAMETERS, // masks are not looked at: lists say by themselves what is empty
+    int2 origin,    // the pixel of list (0, 0); maybe beside the window
     __global float4 *image)
 {
     const int width = frame.width, height = frame.height;
@@ -236,7 +232,7 @@ KERNEL_OF_LANES void raycast_aligned_view(
     const PacketLists lists = packet_at(&in, i, j);
     if (lists.longest > 0) {
         Real t_end = INFINITY;
-        if (frame.has_opaque_depth) {
+        if (opaque_depth) {
             float ends[LANES];
             for (int lane = 0; lane < LANES; ++lane) {
                 const int dx = X_OF(lane), dy = Y_OF(lane);

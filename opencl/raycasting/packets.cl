@@ -15,8 +15,8 @@
 #include "lib/lanes.cl"
 typedef int Steps;
 typedef float Border;
-#include "cpu16/pixels.cl"
-#include "cpu16/rays.cl"
+#include "lib/pixels.cl"
+#include "raycasting/ray.cl"
 #include "raycasting/stepping.cl"
 #include "raycasting/supersegments.cl"
 #include "lib/compositing.cl"
@@ -233,9 +233,7 @@ __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays
 }
 
 KERNEL_OF_LANES void raycast_packets(
-    __global const HEADER_T *headers, // these as of raycasting/raycast.cl
-    __global const ulong *faces, __global const ulong *media, __global const float *forms,
-    __global const float *opaque_depth, __global const ulong *masks, Frame frame,
+    VDI_PARAMETERS,
     float4 epipole, // see across_strip
     int4 part,      // of the window: first strip, how many, number of each strip's first packet
     __global float4 *image)
@@ -257,10 +255,10 @@ KERNEL_OF_LANES void raycast_packets(
     if (!ANY(in_window))
         return;
     const Int x = UPRIGHT ? across : along, y = UPRIGHT ? along : across;
-    const Pixels pixels = pixels_at(x, y, in_window, frame.width, frame.height);
-    const Real t_end = frame.has_opaque_depth ? ends_at(&pixels, opaque_depth) : (Real)(INFINITY);
-    const ListRay rays = begin_rays(forms, &frame, offsets_from_middle(x, frame.width),
-                                    offsets_from_middle(y, frame.height), t_end, in_window);
+    const Int pixels = places_in_picture(x, y, in_window, frame.width, frame.height);
+    ListRay rays;
+    begin_ray(&rays, forms, &frame, offsets_from_middle(x, frame.width),
+              offsets_from_middle(y, frame.height), opaque_ends(pixels, opaque_depth), in_window);
     const Lists lists = LISTS_OF(frame);
     const Grid grid = GRID_OF(frame);
 
@@ -286,5 +284,5 @@ KERNEL_OF_LANES void raycast_packets(
             sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, &lists, &grid,
                   frame.depth_origin, frame.cutoff);
     }
-    write_pixels(image, &pixels, composited(&seen));
+    store_fours(image, pixels, composited(&seen));
 }

@@ -1,9 +1,10 @@
-"""The verb ``tradeoff``: what each setting of a VDI costs and gives, as JSON, tables and a plot."""
+"""The subcommands ``compare`` and ``tradeoff``: tables, pictures and JSON of what was measured."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.util import find_spec
@@ -14,7 +15,6 @@ import numpy as np
 
 from pyvista_vdi.cli.inputs import (
     classification,
-    has_vtk,
     measuring,
     output_files,
     read_volume,
@@ -23,52 +23,77 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.cli.text import write_text
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.io import write_png
 from pyvista_vdi.measure.bench import as_json
+from pyvista_vdi.measure.compare import contact_sheet, measure, table
 from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_tradeoff, sweep
 from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
-#: Frames and views, without and with ``--quick``.
+#: Frames and views of ``tradeoff``, without and with ``--quick``.
 _SIZES = ((640, 360), (320, 180))
 _ANGLES = ((5.0, 30.0, 60.0), (5.0, 30.0))
 
 
+def compare(options: argparse.Namespace) -> int:
+    """Compare a volume's pictures, and write a table, a picture, a JSON file and the VDI."""
+    if options.tf is None and options.cmap is None and options.opacity is None:
+        options.tf = "soft"
+    look = classification(options)
+    Classification.composited(look, "compare")  # refused before anything is read or written
+    standard = TRANSFER_FUNCTIONS[options.tf] if options.tf else {"": None}
+    named = options.tf if all(look.get(n, 0) == v for n, v in standard.items()) else "custom"
+    stem = f"{volume_name(options)}-{named}"
+    volume = read_volume(options)
+    names = ("angles", "max_supersegments", "precision", "sample_distance", "repeats", "device")
+    how = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
+    with output_files(options, stem, "vdi", "png", "json") as files, measuring("comparing") as bar:
+        how |= {"vtk": not options.no_vtk, "name": stem, "progress": bar}
+        report, vdi, images = measure(volume, look, options.size, **how)
+    vdi.save(files["vdi"], compression=options.compression)
+    report["sizes"]["file_bytes"] = files["vdi"].stat().st_size
+    write_png(contact_sheet(report, images), files["png"])
+    write_text(files["json"], json.dumps(as_json(report), indent=1) + "\n")
+    print(table(report))
+    say_written(Path(options.out) / path.name for path in files.values())
+    return 0
+
+
 def tradeoff(options: argparse.Namespace) -> int:
-    """Measure and write."""
-    arguments = classification(options)
-    Classification.composited(arguments, "tradeoff")  # refused before the volume is read
+    """Measure what each setting costs and gives, and write JSON, tables and a plot."""
+    look = classification(options)
+    Classification.composited(look, "tradeoff")  # refused before the volume is read
     # With --quick the last of an axis's usual values
-    usual = {n: values[-1:] if options.quick else values for n, values in AXES.items()}
+    quick = bool(options.quick)
+    usual = {n: values[-1:] if quick else values for n, values in AXES.items()}
     axes = dict(_axis(text, usual) for text in options.sweep or DEFAULT_AXES)
-    settings = sweep(axes, pairs=not options.quick)
+    settings = sweep(axes, pairs=not quick)
     name = options.name or volume_name(options)
     if Path(name).name != name:
         raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
     volume = read_volume(options)
-    if not set(arguments) - {"interpolation"} and not volume.rgba:
+    if not set(look) - {"interpolation"} and not volume.rgba:
         # A ramp from transparent black to opaque white, which needs no PyVista
         ramp = np.linspace(0.0, 1.0, 256)
-        table = TransferFunction(np.stack([ramp] * 3, axis=1), ramp, volume.finite_range())
-        table = table.replace(interpolation=arguments.get("interpolation", "nearest"))
-        arguments = {"transfer_function": table}
-    vtk = has_vtk(options)
+        function = TransferFunction(np.stack([ramp] * 3, axis=1), ramp, volume.finite_range())
+        interpolation = look.get("interpolation", "nearest")
+        look = {"transfer_function": function.replace(interpolation=interpolation)}
+    vtk = not options.no_vtk
+    if vtk and find_spec(BACKEND) is None:
+        print("VTK is not installed: its mappers are left out", file=sys.stderr)
+        vtk = False
+    how = {n: getattr(options, n) for n in ("repeats", "generations", "device")}
+    how |= {
+        "window_size": options.size or _SIZES[quick],
+        "angles": options.angles or _ANGLES[quick],
+    }
     with (
         output_files(options, f"tradeoff-{name}", "json", "md", "png") as files,
         measuring("tradeoff") as bar,
     ):
-        found = measure_tradeoff(
-            volume,
-            settings,
-            window_size=options.size or _SIZES[options.quick],
-            angles=options.angles or _ANGLES[options.quick],
-            repeats=options.repeats,
-            generations=options.generations,
-            vtk=vtk,
-            name=name,
-            device=options.device,
-            progress=bar,
-            **arguments,
-        )
+        found = measure_tradeoff(volume, settings, vtk=vtk, name=name, progress=bar, **how, **look)
     for kind in COSTS:
         print(f"{kind} against SSIM: {'; '.join(found.front(kind))}")
     for worse, better in found.dominated().items():

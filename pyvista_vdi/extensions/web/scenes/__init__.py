@@ -1,1 +1,0 @@
-"""Scenes of VTK and PyVista as pages: VDIs among meshes, lines, points and texts."""
