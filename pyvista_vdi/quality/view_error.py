@@ -59,32 +59,14 @@ _AT_CENTRE = 1e-6
 
 @dataclass(frozen=True)
 class ViewError:
-    """What is known of a VDI's error in a view.
+    """What is known of a VDI's error in a view."""
 
-    Parameters
-    ----------
-    ssim : float
-        Predicted SSIM of the VDI's picture against the volume's, 1 for equal pictures; NaN where
-        an edge of the window is below 11 pixels.
-    standard_error : float
-        Of ``ssim``, from how much the tiles differ from what was guessed.
-    angle : float
-        Degrees from the generating view, see :func:`angle_from_generating_view`.
-    magnification : float
-        Pixels per list, see :func:`magnification`.
-    tiles : int
-        Tiles that were rendered; 0 where the volume is not in view.
-    contrast : float
-        Of the VDI's picture within blocks of 4 x 4 pixels, over the volume's, in those tiles: below
-        1 where detail is missing, which SSIM hardly tells.
-    """
-
-    ssim: float
-    standard_error: float
-    angle: float
-    magnification: float
-    tiles: int
-    contrast: float = 1.0
+    ssim: float  # predicted, of the VDI's picture against the volume's; NaN below 11 pixels
+    standard_error: float  # of that, from how much the tiles differ from what was guessed
+    angle: float  # degrees, see angle_from_generating_view()
+    magnification: float  # pixels per list, see magnification()
+    tiles: int  # that were rendered; 0 where the volume is not in view
+    contrast: float = 1.0  # within 4 x 4 pixels over the volume's: below 1 where detail is missing
 
 
 class ViewErrorEstimator:
@@ -107,15 +89,7 @@ class ViewErrorEstimator:
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     **changes
-        Options by name, in place of those in ``medium``: sample_distance, lights,
-        ambient_occlusion, memory_limit; see :class:`~pyvista_vdi.model.options.MediumOptions`.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a number is out of range.
-    DeviceMemoryError
-        If the volume does not fit.
+        Options by name, in place of those in ``medium``.
 
     Notes
     -----
@@ -123,16 +97,9 @@ class ViewErrorEstimator:
     bounds (elsewhere both pictures are empty, and SSIM is 1). Both pictures are rendered at a
     fifth of the pixels along each edge to guess each cell's loss, 1 - SSIM, up to a factor. A
     systematic sample with probabilities in proportion to the guess is taken along a space-filling
-    curve through the cells [1]_. The factor is the ratio of what the tiles lost to what was
-    guessed for them, each weighted by one over its probability (the ratio estimator, [2]_). The
-    choice depends on the arguments alone, so that equal arguments give equal estimates.
-
-    References
-    ----------
-    .. [1] W. G. Madow, "On the theory of systematic sampling, II", Annals of Mathematical
-       Statistics 20(3), 1949.
-    .. [2] C.-E. Särndal, B. Swensson, J. Wretman, "Model Assisted Survey Sampling", Springer 1992,
-       section 5.6.
+    curve through the cells (Madow 1949). The factor is the ratio of what the tiles lost to what was
+    guessed for them, each weighted by one over its probability (the ratio estimator: Särndal,
+    Swensson and Wretman 1992, section 5.6). Equal arguments give equal estimates.
     """
 
     def __init__(
@@ -167,23 +134,11 @@ class ViewErrorEstimator:
     ) -> ViewError:
         """Estimate how similar the VDI's picture of a view is to the volume's.
 
-        Parameters
-        ----------
-        vdi : VDI
-            Of the same volume and look, or of former ones.
-        camera : Camera or vtkCamera or pyvista.Camera
-            The new view; its ``model_transform`` says where volume and VDI are now.
-        window_size : (int, int), optional
-            Width and height of the whole picture in pixels; by default the VDI's own.
-        clipping_planes, cropping, opacity_multiplier
-            As for :func:`pyvista_vdi.render`, of both pictures.
-        background : (float, float, float)
-            RGB that both pictures are blended over before they are compared.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If an argument cannot be used.
+        The view's ``model_transform`` says where volume and VDI are now, ``window_size`` (width,
+        height) is that of the whole picture, by default the VDI's own, and ``background`` the RGB
+        that both pictures are blended over before they are compared; planes, cropping and
+        multiplier are as for :func:`pyvista_vdi.render`, of both. InvalidArgumentError if an
+        argument cannot be used.
         """
         camera = Camera.from_any(camera)
         size = check_window_size(vdi.window_size if window_size is None else window_size)
@@ -242,16 +197,12 @@ class ViewErrorEstimator:
 
         ``lit_from`` is the view whose light falls on the volume, in place of the picture's.
         """
-        return [
-            self._picture(
-                request.replace(
-                    camera=request.camera.tile(request.size, corner, sample.size), size=sample.size
-                ),
-                vdi,
-                lit_from,
-            )
-            for corner in map(tuple, sample.corners.tolist())
-        ]
+        pictures = []
+        for column, row in sample.corners.tolist():
+            lens = request.camera.tile(request.size, (column, row), sample.size)
+            tile = request.replace(camera=lens, size=sample.size)
+            pictures.append(self._picture(tile, vdi, lit_from))
+        return pictures
 
     def _picture(
         self, request: FrameRequest, vdi: VDI | None, lit_from: Camera | None = None

@@ -151,7 +151,8 @@ class CornerTexts:
 
     def write(self, renderer: Any, status: Callable[[], VDIStatus]) -> None:
         """Show the status in the frame that this renderer is drawing."""
-        self._texts = [text for text in self._texts if text[0]() is not None]
+        if self._texts:
+            self._texts = [text for text in self._texts if text[0]() is not None]
         for text, where, corner in self._texts:
             if where() is not renderer:
                 continue
