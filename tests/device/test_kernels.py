@@ -34,6 +34,7 @@ __kernel void affine(
 }
 """
 
+
 @pytest.fixture
 def affine(monkeypatch):
     monkeypatch.setattr(programs, "expand", lambda path: SOURCE)
