@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from typing import Any, get_args
 
@@ -233,10 +233,6 @@ class Classification(Look, ArrayChoice):
         """Whether a transfer function or a property stands in place of ``add_volume``'s."""
         return any(getattr(self, name) is not None for name in IN_PLACE)
 
-    def changed(self, changes: Mapping[str, Any]) -> Classification:
-        """Return these arguments with some of them changed."""
-        return replace(self, **changes)
-
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
         """Return the transfer function that the arguments describe for a volume.
 
@@ -244,8 +240,16 @@ class Classification(Look, ArrayChoice):
         ``add_volume`` takes, MissingDependencyError if PyVista is needed to build it and not
         installed.
         """
-        if self.transfer_function is not None:
-            return _checked_transfer_function(self.transfer_function)
+        table: Any = self.transfer_function
+        if isinstance(table, TransferFunction):
+            return table
+        if table is not None:
+            meant = hasattr(table, "GetScalarOpacity")
+            raise InvalidArgumentError(
+                "transfer_function must be a pyvista_vdi.TransferFunction; got "
+                f"{type(table).__name__}"
+                + (": pass a vtkVolumeProperty as volume_property=" if meant else "")
+            )
         if self.volume_property is not None:
             from_property = registry.method("TransferFunction.from_property")
             return from_property(  # type: ignore[no-any-return]
@@ -264,20 +268,6 @@ class Classification(Look, ArrayChoice):
         return from_arguments(  # type: ignore[no-any-return]
             scalars, rgba=volume.rgba, **arguments
         )
-
-
-def _checked_transfer_function(table: object) -> TransferFunction:
-    if isinstance(table, TransferFunction):
-        return table
-    hint = (
-        ": pass a vtkVolumeProperty as volume_property="
-        if hasattr(table, "GetScalarOpacity")
-        else ""
-    )
-    raise InvalidArgumentError(
-        "transfer_function must be a pyvista_vdi.TransferFunction; "
-        f"got {type(table).__name__}{hint}"
-    )
 
 
 def _plain(value: Any) -> Any:

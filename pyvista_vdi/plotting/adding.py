@@ -44,8 +44,8 @@ from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import Refinement
 from pyvista_vdi.plotting.uniform import UniformGrid
 from pyvista_vdi.plotting.volumes import as_grid, held, require_grid
-from pyvista_vdi.quality.dial import refuse_settings
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
+from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource

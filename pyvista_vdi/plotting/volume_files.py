@@ -74,7 +74,7 @@ def _read(file: Path) -> Any:
     said = re.findall(r"(?s)(?:ERROR|(?i:warning)): In [^\n]*\n(.*?)(?=\n\n|\Z)", written)
     for text in (" ".join(one.split()).split("): ", 1)[-1] for one in said):
         if "rror" in text or "ERROR" in written:
-            raise InvalidVolumeError(f"{file} cannot be read as a volume: {text}: is it whole?")
+            raise InvalidVolumeError(f"{file} cannot be read as a volume: {text}: write it anew")
     return data
 
 
