@@ -41,7 +41,7 @@ def dicom(path: Path) -> list[VolumeInFile]:
             except Exception as error:  # damage shows at whatever pydicom comes to first
                 said = f"{file} cannot be read as a DICOM slice: {error}"
                 wrong.append((0, InvalidVolumeError(said)))
-        damaged = [error for count, error in wrong if not count]
+        damaged = [why for count, why in wrong if not count]
         for uid, those in series.items():
             try:
                 name = str(those[0].header.get("SeriesDescription") or uid)
@@ -54,9 +54,9 @@ def dicom(path: Path) -> list[VolumeInFile]:
     if damaged:
         left_out = f"{len(damaged)} of {len(files)} files in the folder {path} are left out"
         warn_external(f"{left_out}, as they are damaged; the first: {damaged[0]}")
-    for count, error in wrong:
+    for count, why in wrong:
         if count > 1:
-            warn_external(f"a series of {count} slices is left out: {error}")
+            warn_external(f"a series of {count} slices is left out: {why}")
     return found
 
 
