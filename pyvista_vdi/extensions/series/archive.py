@@ -23,7 +23,6 @@ from pyvista_vdi.io.vdi_file.description import from_json, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.classification import IN_PLACE, Look
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.registry import FileFormat
 
@@ -164,8 +163,7 @@ def write_to(
         archive.writestr(writer.stored(vdis.kind.head), head_bytes(vdis.kind, vdis.about))
         for i in range(len(vdis)):
             vdi, file = vdis[i].with_precision(precision), io.BytesIO()
-            lists, values = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
-            writer.write_to(file, lists, compression, level, coarse=False, deferred=values)
+            writer.write_to(file, vdi.lists, compression, level, coarse=False)
             archive.writestr(writer.stored(name_of(i)), file.getvalue())
             first = first or stream.tell()
             done()

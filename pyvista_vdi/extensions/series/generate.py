@@ -29,7 +29,7 @@ from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import bytes_of
+from pyvista_vdi.quality.targets import bytes_of
 
 _GRID = ("spacing", "origin")
 _RECORDS = (QualityTarget, Deferral, GenerationOptions)
