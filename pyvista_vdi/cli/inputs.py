@@ -180,7 +180,9 @@ def require_vdi(file: str, verb: str) -> None:
 
 def volume_name(options: argparse.Namespace) -> str:
     """Return a short name of the volume, for files and reports."""
-    return options.example or Path(options.file).resolve().name.split(".")[0]
+    if options.example is not None:
+        return str(options.example)
+    return Path(options.file).resolve().name.split(".")[0]
 
 
 @contextmanager

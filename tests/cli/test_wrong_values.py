@@ -72,6 +72,7 @@ WRONG = {
     "--focal-point": NO_XYZ,
     "--fps": (*NOT_ABOVE_0, "1e9"),
     "--frames": NO_COUNT,
+    "--full-fps": NOT_ABOVE_0,
     "--generations": NO_COUNT,
     "--half-angle": (*NOT_ABOVE_0, "181"),
     "--host": ("'no such host'", "999.1.1.1"),
@@ -193,6 +194,8 @@ def folder(tmp_path_factory):
         (path / f"empty{name}").touch()
     for name in ("vdi", "png", "gif", "exr", "vdis", "vdiset", "txt"):
         (path / f"old.{name}").write_text("what was here before")
+    for name in ("vdis", "vdiset"):
+        (path / f"old.{name}").write_bytes(b"PK\5\6" + bytes(18))  # a ZIP, which may be replaced
     return path
 
 
