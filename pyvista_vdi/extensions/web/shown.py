@@ -104,10 +104,10 @@ def file_of(
     """
     stream = io.BytesIO()
     if isinstance(shown, VDISeries | VDISet):
-        series = isinstance(shown, VDISeries)
-        kind, entries = (SERIES, {"times": shown.times}) if series else (SET, about(shown))
-        options = {"precision": precision, "compression": DEFLATE, "level": level}
-        first = write_several(stream, kind, entries, shown, progress=progress, **options)
+        kind = SET if isinstance(shown, VDISet) else SERIES
+        entries = about(shown) if isinstance(shown, VDISet) else {"times": shown.times}
+        how: dict[str, Any] = {"precision": precision, "compression": DEFLATE, "level": level}
+        first = write_several(stream, kind, entries, shown, progress=progress, **how)
         return stream.getvalue(), first
     lists, values = shown.with_precision(precision), None
     if isinstance(lists, DeferredVDI):
