@@ -15,10 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.api import render
 from pyvista_vdi.errors import InvalidVDIError, NoDeviceError, UnsupportedError
-from pyvista_vdi.extensions.series.archive import SERIES
 from pyvista_vdi.extensions.series.archive import write_to as write_several
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.files import SET, about
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.io import to_bytes
@@ -104,18 +102,16 @@ def file_of(
     """
     stream = io.BytesIO()
     if isinstance(shown, VDISeries | VDISet):
-        kind = SET if isinstance(shown, VDISet) else SERIES
-        entries = about(shown) if isinstance(shown, VDISet) else {"times": shown.times}
-        how: dict[str, Any] = {"precision": precision, "compression": DEFLATE, "level": level}
-        first = write_several(stream, kind, entries, shown, progress=progress, **how)
+        options: dict[str, Any] = {"precision": precision, "compression": DEFLATE, "level": level}
+        first = write_several(stream, shown, progress=progress, **options)
         return stream.getvalue(), first
-    lists, values = shown.with_precision(precision), None
-    if isinstance(lists, DeferredVDI):
-        kept, values = lists, lists.about
-        lists = copy.copy(kept.lists)
+    kept = shown.with_precision(precision)
+    lists = kept.lists
+    if isinstance(kept, DeferredVDI):
         begun = kept.classified() if seen is None else seen
+        lists = copy.copy(lists)
         lists.metadata = {**kept.metadata, "transfer_function": begun.metadata["transfer_function"]}
-    write_to(stream, lists, DEFLATE, level, progress, coarse=coarse, deferred=values)
+    write_to(stream, lists, DEFLATE, level, progress, coarse=coarse)
     with zipfile.ZipFile(stream) as archive:
         members = archive.infolist()
     behind = members[2 if members[1].filename == COARSE else 1]

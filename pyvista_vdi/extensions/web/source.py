@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
@@ -59,7 +60,7 @@ class Source:
             return as_volume(volumes[step], looks.scalars, looks.preference)
 
         def classify(step: int, look: tuple[tuple[str, Any], ...]) -> TransferFunction:
-            return looks.changed(dict(look)).transfer_function_of(self._volume(step))
+            return replace(looks, **look).transfer_function_of(self._volume(step))
 
         # Those that are kept on host and device
         self._volume = lru_cache(2)(load)
