@@ -60,7 +60,7 @@ class Source:
             return as_volume(volumes[step], looks.scalars, looks.preference)
 
         def classify(step: int, look: tuple[tuple[str, Any], ...]) -> TransferFunction:
-            return replace(looks, **look).transfer_function_of(self._volume(step))
+            return replace(looks, **dict(look)).transfer_function_of(self._volume(step))
 
         # Those that are kept on host and device
         self._volume = lru_cache(2)(load)
