@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -103,7 +104,7 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
         else:
             missing.append("all of it")
         # By the name that it was given, or else its class
-        name = names.get(prop, "").partition("(Addr")[0] or type(prop).__name__
+        name = re.split(r"\((?:Addr|0x)", names.get(prop, ""))[0] or type(prop).__name__
         left_out += [f"{what} ({name})" for what in missing]
     vdis.sort(key=lambda each: each[1] is None)
     boxes = [np.reshape(actor.GetBounds(), (3, 2)).T for actor, *_ in vdis]
