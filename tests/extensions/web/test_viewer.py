@@ -10,8 +10,8 @@ from rewriting import described
 from skimage.io import imread
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.web.placing import thinned
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.vdi import VDI
 
 #: Odd, so that no ray of a smaller picture runs along a border of lists.
 SIZE = (161, 91)
@@ -110,7 +110,11 @@ def test_looks_are_drawn_as_render_draws_them(vdi, ball):
         return np.abs(ball.screenshot(turned, SIZE) - expected).max()
 
     ball.evaluate("viewer.look = { opacity: 2.5 }")
-    dense = pvdi.render(thinned(vdi, 2.5), turned, SIZE) * 255
+    denser = VDI(
+        vdi.camera, SIZE, vdi.offsets, vdi.front, vdi.back, vdi.color, 2.5 * vdi.optical_depth,
+        vdi.bounds, depth_origin=vdi.depth_origin,
+    )  # fmt: skip
+    dense = pvdi.render(denser, turned, SIZE) * 255
     assert np.abs(dense - own).max() > 10
     assert off(dense) <= 1
     ball.evaluate("viewer.look = { brightness: 1.7 }")
