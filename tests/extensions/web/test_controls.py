@@ -76,7 +76,8 @@ def from_disk(open_page, tmp_path):
             path.write_bytes(page_of(shown))
         else:
             shown.save(path, transfer_function=look(START))
-        options = {"viewport": {"width": ROOM[0], "height": ROOM[1]}, **options}
+        if settings:
+            options = {"viewport": {"width": 300, "height": 420}, **options}
         page = open_page(url=path.as_uri() + hash_, **options)
         page.ready()
         if settings:
@@ -368,9 +369,9 @@ def test_mouse_and_keys_edit_and_a_link_has_it(kept, from_disk):
     names = tabbed(page)
     assert names == [*BAR, "Settings", *VIEWS, *EDITOR, *CLIPS, "As it was made"]
     assert not nameless(page)
-    slider = page.page.get_by_role("slider", name="Point 2 of 3")
-    slider.scroll_into_view_if_needed()
-    point, mouse = slider.bounding_box(), page.page.mouse
+    page.evaluate("viewer.shadowRoot.querySelector('.panel').scrollTop = 0")
+    point = page.page.get_by_role("slider", name="Point 2 of 3").bounding_box()
+    mouse = page.page.mouse
     x, y = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
     mouse.move(x, y)
     mouse.down()
