@@ -34,6 +34,7 @@ __kernel void affine(
 }
 """
 
+
 @pytest.fixture
 def affine(monkeypatch):
     monkeypatch.setattr(programs, "expand", lambda path: SOURCE)
@@ -149,6 +150,6 @@ def test_declarations_are_as_compilers_see_kernels(compiler, declaration, define
     assert list(seen) == list(parameters)
     for (name, parameter), kind in zip(parameters.items(), seen.values(), strict=True):
         pointed, star = parameter.kind.removesuffix("*"), "*" * parameter.kind.endswith("*")
-        of_file = parameter.number is None  # a type that the kernel's file has of its own
+        of_file = parameter.dtype is None  # a type that the kernel's file has of its own
         expected[name] = kind if of_file else f"{defines.get(pointed, pointed)}{star}"
     assert seen == expected
