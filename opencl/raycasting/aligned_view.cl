@@ -10,7 +10,8 @@
 // the depth coordinate, and a length is a difference of it over the reciprocal depths at both ends.
 #define LANES 16
 #include "lib/compositing.cl"
-#include "raycasting/lists.cl"
+#include "lib/transpose.cl"
+#include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Lane p * PACKET_BUNDLES + n has place p in the n-th bundle: vectors of bundles become vectors of
@@ -38,13 +39,15 @@ typedef struct {
     Int count;                       // of each lane; 0 beside the window
     int counts[PACKET_BUNDLES];      // of entries
     OFFSET_T firsts[PACKET_BUNDLES]; // entry; of a bundle that has none, another one's, if any
-    ListMet met;                     // of 8 bytes
+    OFFSET_T begin;                  // of 8 bytes: the packet's, and behind it:
+    Int first;                       // entry; of a list that has none, another one's, if any
+    Int origin, stride;
     Real per_code;
 } PacketLists;
 
 typedef struct {
     Real front, back; // depth coordinates
-    Words words;      // of 8 bytes, all
+    Uint words[2];    // if packed, what is loaded with them: extinction, colour; all of 8 bytes
 } PacketFaces;
 
 // Four bundles of lists from list (i, j) on.
@@ -78,12 +81,36 @@ inline PacketLists lists_in_row(const Lists *in, int i, int j)
     lists.longest = 0;
     if (i < 0 || i >= in->wide || j < 0 || j >= in->high)
         return lists;
-    const Int there = i + LANE_X < in->wide;
-    lists.met = list_met(in, i + LANE_X, (Int)(j), there);
-    lists.count = select((Int)(0), lists.met.count, there);
-    lists.longest = largest_lane(lists.count);
-    const Int scales = select((Int)(0), lists.met.first - 1, lists.count > 0);
-    lists.per_code = AS_REAL(words_at(in->faces, scales).low);
+    const int wide = min(in->wide - i, PACKET_WIDE);
+    __global const HEADER_T *const begins = in->headers + ((size_t)j * in->wide + i);
+    lists.begin = (OFFSET_T)begins[0];
+    if (begins[wide] == begins[0])
+        return lists;
+    int counts[LANES], firsts[LANES], origins[LANES], strides[LANES];
+    float per_codes[LANES];
+    int any_lane = 0;
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int dx = X_OF(lane);
+        const int first = dx < wide ? (int)((OFFSET_T)begins[dx] - lists.begin) + LIST_HEADER : 0;
+        counts[lane] =
+            dx < wide ? max((int)((OFFSET_T)begins[dx + 1] - lists.begin) - first, 0) : 0;
+        firsts[lane] = first;
+        any_lane = counts[lane] > 0 ? lane : any_lane;
+        lists.longest = max(lists.longest, counts[lane]);
+    }
+    for (int lane = 0; lane < LANES; ++lane) {
+        firsts[lane] = firsts[counts[lane] > 0 ? lane : any_lane];
+        __global const uint2 *const scale =
+            (__global const uint2 *)in->faces + lists.begin + firsts[lane] - LIST_HEADER;
+        origins[lane] = as_int(scale[0].x);
+        strides[lane] = as_int(scale[0].y);
+        per_codes[lane] = as_float(scale[1].x);
+    }
+    lists.count = vload16(0, counts);
+    lists.first = vload16(0, firsts);
+    lists.origin = vload16(0, origins);
+    lists.stride = vload16(0, strides);
+    lists.per_code = vload16(0, per_codes);
     return lists;
 }
 
@@ -105,10 +132,11 @@ inline void fetch_lines(__global const ulong *words, OFFSET_T first, OFFSET_T en
 inline void fetch(const Lists *in, const PacketLists *lists, int depth)
 {
     if (PACKED) {
-        const Places firsts = {lists->met.first};
-        const Places ends = {lists->met.first + min(lists->count, depth)};
+        int firsts[LANES], ends[LANES];
+        vstore16(lists->first, 0, firsts);
+        vstore16(lists->first + min(lists->count, depth), 0, ends);
         for (int lane = 0; lane < LANES; ++lane)
-            fetch_lines(in->faces, firsts.each[lane], ends.each[lane]);
+            fetch_lines(in->faces, lists->begin + firsts[lane], lists->begin + ends[lane]);
         return;
     }
     for (int n = 0; n < PACKET_BUNDLES; ++n) {
@@ -144,12 +172,20 @@ inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k
 {
     PacketFaces at;
     if (PACKED) {
-        const Int entry = select((Int)(0), lists->met.first + k, k < lists->count);
-        at.words = words_at(in->faces, entry);
-        at.front =
-            depths_of_codes(in, lists->met.origin, lists->met.stride, at.words.low, depth_origin);
-        at.back = depths_of_codes(in, lists->met.origin, lists->met.stride, at.words.low >> 14,
-                                  depth_origin);
+        int at_lane[LANES];
+        vstore16(lists->first + select((Int)(0), (Int)(k), k < lists->count), 0, at_lane);
+        __global const ulong *const from = in->faces + lists->begin;
+        const Uint low_lanes = as_uint16(
+            (ulong8)(from[at_lane[0]], from[at_lane[1]], from[at_lane[2]], from[at_lane[3]],
+                     from[at_lane[4]], from[at_lane[5]], from[at_lane[6]], from[at_lane[7]]));
+        const Uint high_lanes = as_uint16(
+            (ulong8)(from[at_lane[8]], from[at_lane[9]], from[at_lane[10]], from[at_lane[11]],
+                     from[at_lane[12]], from[at_lane[13]], from[at_lane[14]], from[at_lane[15]]));
+        at.words[0] = (Uint)(low_lanes.even, high_lanes.even);
+        at.words[1] = (Uint)(low_lanes.odd, high_lanes.odd);
+        at.front = depths_of_codes(in, lists->origin, lists->stride, at.words[0], depth_origin);
+        at.back =
+            depths_of_codes(in, lists->origin, lists->stride, at.words[0] >> 14, depth_origin);
     } else {
         const Real of_01 = (Real)(faces_of_bundle(in->faces, lists, 0, k),
                                   faces_of_bundle(in->faces, lists, 1, k));
@@ -166,7 +202,7 @@ inline Real4 packet_media(const Lists *in, const PacketLists *lists, int k, Pack
 {
     if (!PACKED)
         return numbers_at(in->media, lists, k);
-    return media_of_words(at.words.low, at.words.high, lists->per_code);
+    return media_of_words(at.words[0], at.words[1], lists->per_code);
 }
 
 KERNEL_OF_LANES void raycast_aligned_view(

@@ -96,7 +96,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     in_vectors = device.is_cpu and not double_float and compensated < 2
     in_blocks = in_vectors and suit_blocks
     uncropped = in_vectors and not cropped
-    if uncropped and (suit_blocks or not prepared.packed) and scene.aligned is not None:
+    if uncropped and scene.aligned is not None:
         kernel, own = kernels.RAYCAST_ALIGNED_VIEW, {"origin": scene.aligned.origin}
         items = scene.aligned.items
         return Variant(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)

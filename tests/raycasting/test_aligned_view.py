@@ -171,14 +171,18 @@ def test_what_is_beside_the_lists_is_not_drawn(runtime, precision, monkeypatch):
     assert not around.any()
 
 
-def test_offsets_of_64_bits(runtime):
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_offsets_of_64_bits(runtime, precision):
     """As a VDI of more than 2^30 supersegments has them."""
     rng = np.random.default_rng(3)
-    vdi = strategies.random_vdi(rng, window=(21, 9))
+    vdi = strategies.random_vdi(rng, window=(21, 9)).with_precision(precision)
     prepared = PreparedVDI(runtime, vdi)
     images = []
     for long_offsets in (False, True):
         prepared.long_offsets = long_offsets
+        if long_offsets and precision == "8-byte":  # whose headers are offsets
+            headers = runtime.download(prepared.headers).astype(np.int64)
+            prepared.headers = runtime.upload(headers, "list headers")
         with runtime.buffer((9, 21, 4), name="image") as image:
             draw(prepared, vdi.camera, vdi.window_size, image)
             images.append(runtime.download(image).copy())
