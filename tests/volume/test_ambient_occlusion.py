@@ -33,7 +33,7 @@ TOLERANCE = 1e-5
 def nodes_of(runtime, volume, function, occlusion):
     """Mean transmittance at the nodes, by the device, (nz, ny, nx)."""
     medium = DeviceVolume(runtime, volume, function, ambient_occlusion=occlusion)
-    return runtime.download(medium.medium_arguments(Camera((0, 0, 9), (0, 0, 0)))["ambient"])
+    return runtime.download(medium.medium_arguments(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)))["ambient"])
 
 
 def homogeneous(opacity, unit_distance=1.0):
