@@ -33,7 +33,8 @@ TOLERANCE = 1e-5
 def nodes_of(runtime, volume, function, occlusion):
     """Mean transmittance at the nodes, by the device, (nz, ny, nx)."""
     medium = DeviceVolume(runtime, volume, function, ambient_occlusion=occlusion)
-    return runtime.download(medium.medium_arguments(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)))["ambient"])
+    camera = Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))  # lights have no part in it
+    return runtime.download(medium.medium_arguments(camera)["ambient"])
 
 
 def homogeneous(opacity, unit_distance=1.0):
