@@ -191,7 +191,7 @@ class DeviceVolume:
         return math.ceil(self.grid.length / self.sample_distance) + 1
 
     def medium_arguments(self, camera: Camera) -> dict[str, Any]:
-        """Return the arguments ``kernels.MEDIUM`` of the kernels that march.
+        """Return the arguments ``MEDIUM_PARAMETERS`` (``volume/medium.cl``) of kernels that march.
 
         ``camera`` is the view: lights may move with it.
         """
