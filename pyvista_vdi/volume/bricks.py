@@ -237,9 +237,9 @@ class DeviceBricks:
 class StepSampler:
     """Samples the steps of rays in a volume that is on the device brick by brick.
 
-    ``medium``: arguments ``MEDIUM_PARAMETERS``; ``variant``: what kernels are compiled for; ``room``:
-    most steps of all rays at a time; ``ends``: where each ray ends in t, top row first. ``samples``
-    are those of the steps that were sampled last, for kernels that march.
+    ``medium``: arguments ``MEDIUM_PARAMETERS``; ``variant``: what kernels are compiled for;
+    ``room``: most steps of all rays at a time; ``ends``: where each ray ends in t, top row first.
+    ``samples`` are those of the steps that were sampled last, for kernels that march.
     """
 
     def __init__(
