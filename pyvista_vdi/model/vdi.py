@@ -223,9 +223,11 @@ class VDI(Lists):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the arrays and of what makes them, as far as these are in memory."""
-        arrays = self._arrays or ()
-        return sum(array.nbytes for array in arrays) + getattr(self.late, "nbytes", 0)
+        """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
+        if self._arrays is None:
+            return getattr(self.late, "nbytes", 0)
+        packed = 0 if self.packing is None else self.packing.nbytes
+        return sum(array.nbytes for array in self._arrays) + packed
 
     @property
     def precision(self) -> str:
