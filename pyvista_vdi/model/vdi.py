@@ -394,10 +394,11 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
 
 
 def _read_only(arrays: Arrays) -> Arrays:
-    views: Any = Arrays(*(array.view() for array in arrays))  # type: ignore[arg-type]
+    given: Any = arrays
+    views = Arrays(*map(np.ndarray.view, given))
     for view in views:
         view.setflags(write=False)  # the caller's own stay writable
-    return views  # type: ignore[no-any-return]
+    return views
 
 
 def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: float) -> None:

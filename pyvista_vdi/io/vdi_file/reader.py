@@ -275,11 +275,6 @@ class _OpenFile:
             if d["chunk_rows"] != CHUNK_ROWS:
                 self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {CHUNK_ROWS}")
             n_lists = window_size[0] * window_size[1]
-            if d.get("precision") == "16-byte":
-                raise VDIFileError(
-                    f"{self._path} has supersegments of 16 bytes, which are no longer read: "
-                    "generate it again, with the precision '8-byte' or 'exact'"
-                )
             precision = check_precision(d["precision"]) if d["version"] >= 3 else "exact"
             packed_bytes = {"exact": 0, "8-byte": 8 * n + 6 * n_lists}
             return FileInfo(
