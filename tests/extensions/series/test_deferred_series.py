@@ -198,7 +198,8 @@ def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
 def test_what_is_said_of_values_is_checked(wrong, alone, tmp_path, monkeypatch):
     series = pvdi.VDISeries(alone)
     with monkeypatch.context() as patched:
-        patched.setattr(pvdi.DeferredVDI, "about", wrong)
+        for step in series:
+            patched.setattr(step.lists, "kept", wrong)
         path = series.save(tmp_path / "run.vdis")
     with pytest.raises(VDIFileError, match="damaged|upgrade"):
         pvdi.read(path)[0]
