@@ -20,7 +20,7 @@ from pyvista_vdi.measure.bench import accuracy
 from pyvista_vdi.model.metrics import list_edges, list_places
 from pyvista_vdi.model.options import QUALITIES, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.quality.probe import turned
+from pyvista_vdi.quality.targets import turned
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 

@@ -59,7 +59,7 @@ class ListsOnDevice:
                 found = []
                 for name, (_, item) in _ARRAYS.items():
                     array = np.empty((n, *item), np.float32)
-                    runtime.download(self._buffers[name], array, count=array.size)
+                    runtime.download(self._buffers[name], array)
                     found.append(array)
                 self._arrays = Arrays(self.offsets, *found)
                 self._release()
@@ -223,7 +223,7 @@ class GrowingLists:
             if not in_place:
                 array.reserve(made, self._most)
             filled = array.part(self._begin, made)
-            self._runtime.download(target, filled, count=filled.size)
+            self._runtime.download(target, filled)
         if in_place:
             self._release_targets()
 

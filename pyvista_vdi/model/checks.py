@@ -81,11 +81,8 @@ class Number:
         if self.none and value is None:
             return None
         number = as_whole(value) if self.whole else as_number(value)
-        inside = self.low < number if self.open_ended else self.low <= number
-        below = (
-            number < self.high if self.open_ended or self.high == math.inf else number <= self.high
-        )
-        if not (inside and below):
+        at_end = number in (self.low, self.high) and self.open_ended
+        if not self.low <= number <= self.high or number == math.inf or at_end:
             raise not_taken(value)(f"{self.name} must be {self.wanted}; got {value!r}")
         return int(number) if self.whole else number
 

@@ -95,9 +95,7 @@ class ArrayChoice(Described):
     blending: Blending = option(
         "composite",
         "what becomes of the scalars along a ray",
-        'As in ``add_volume``; a VDI has ``"composite"`` alone. Of the others the greatest or the '
-        "least is classified; or opacity times scalar, which is 0 to 1 over the volume's range, is "
-        "averaged or integrated over opacity unit distances, as a grey value.",
+        'As in ``add_volume``; a VDI has ``"composite"`` alone.',
         check=_blending,
         takes="Blending | str | int",
     )
@@ -150,9 +148,8 @@ class Look(Described):
     shade: bool = option(
         False,
         "light the volume",
-        "A shaded VDI has the lights of its generating view: a plotter's, as they stand there, so "
-        "that lights that follow the camera move in the picture when the VDI is regenerated; other "
-        "lights, and another place among lights of the scene, regenerate it.",
+        "A shaded VDI has the lights as they stand at its generating view; other lights, and "
+        "another place among lights of the scene, regenerate it.",
     )
     ambient: float | None = option(None, "ambient light that is reflected, where shaded")
     diffuse: float | None = option(0.7, "diffuse light that is reflected, where shaded")

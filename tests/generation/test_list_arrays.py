@@ -32,9 +32,7 @@ def make(runtime):
 
 @pytest.mark.parametrize("camera", [CAMERA, HALF_BESIDE], ids=["inside", "half beside"])
 @pytest.mark.parametrize("memory", ["as it is", "copied", "little", "least"])
-def test_slices_make_the_same_vdi_however_memory_is_had(
-    monkeypatch, runtime, make, camera, memory
-):
+def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, runtime, make, camera, memory):
     whole = make(camera)
     assert whole.n_supersegments > 100
     grown = set()
