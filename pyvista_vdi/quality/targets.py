@@ -93,8 +93,8 @@ class Setting:
 
     def applied_to(self, request: GenerationRequest) -> GenerationRequest:
         """Return a request with what this rung says."""
-        chosen = {"max_supersegments": self.max_supersegments, "precision": self.precision}
-        options = replace(request.options, **chosen)
+        longest, precision = self.max_supersegments, self.precision
+        options = replace(request.options, max_supersegments=longest, precision=precision)
         return request.replace(options=options, window_size=self.window_size(request.window_size))
 
 

@@ -326,11 +326,11 @@ class VDIMapperMethods(ArrayChoiceMethods):
 
     def AutoAdjustSampleDistancesOn(self) -> None:
         """Draw previews."""
-        self.SetAutoAdjustSampleDistances(True)
+        self.driver.set(adjust=True)
 
     def AutoAdjustSampleDistancesOff(self) -> None:
         """Draw every frame in full."""
-        self.SetAutoAdjustSampleDistances(False)
+        self.driver.set(adjust=False)
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
