@@ -324,13 +324,13 @@ class VDIMapperMethods(ArrayChoiceMethods):
     # In VTK's GPU mapper SetAutoAdjustSampleDistances would draw VTK's own volume into a smaller
     # framebuffer, so its own switch stays off, and what is called from Python keeps ours.
 
-    def AutoAdjustSampleDistancesOn(self) -> None:
+    def AutoAdjustSampleDistancesOn(self: Any) -> None:
         """Draw previews."""
-        self.driver.set(adjust=True)
+        self.SetAutoAdjustSampleDistances(True)
 
-    def AutoAdjustSampleDistancesOff(self) -> None:
+    def AutoAdjustSampleDistancesOff(self: Any) -> None:
         """Draw every frame in full."""
-        self.driver.set(adjust=False)
+        self.SetAutoAdjustSampleDistances(False)
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
