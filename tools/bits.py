@@ -24,6 +24,8 @@ from typing import Any
 import numpy as np
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.raycasting.raycast import render_fitting
 
 #: A case makes something; its hash is what is kept.
 Case = Callable[[], Any]
@@ -265,11 +267,19 @@ def frame_options(bounds: Any, camera: pvdi.Camera, size: tuple[int, int]) -> di
         "box": {"cropping": third},
         "regions": {"cropping": (third, 0x2A5F0C3)},
         "thick": {"opacity_multiplier": 6.0},
+        "no-skip": {"skip_empty": False},
         "all": {"opaque_depth": ends, "clipping_planes": [plane], "cropping": (third, "fence")},
         "cutoff": {"settings": pvdi.Settings(transmittance_cutoff=0.5)},
         "preview-30": {"preview_samples": 30, "opaque_depth": ends, "clipping_planes": [plane]},
         "preview-9000": {"preview_samples": 9000},
     }
+
+
+def picture(vdi: pvdi.VDI, view: pvdi.Camera, size: tuple[int, int], **options: Any) -> Any:
+    """Return a frame, also of options that are not public."""
+    if "skip_empty" not in options:
+        return pvdi.render(vdi, view, size, **options)
+    return render_fitting(vdi, FrameRequest(view, size, RenderOptions(**options)))
 
 
 def frame_cases() -> Cases:
@@ -295,7 +305,7 @@ def frame_cases() -> Cases:
         if option == "preview-9000" or name == "wide":
             views = ((own, (40, 30)), (own.azimuth(20), (30, 20)))
         return [
-            pvdi.render(vdi, view, size, **frame_options(vdi.bounds, view, size)[option])
+            picture(vdi, view, size, **frame_options(vdi.bounds, view, size)[option])
             for view, size in views
         ]
 

@@ -277,6 +277,10 @@ def render_volume(
         Width and height in pixels.
     opaque_depth : array_like of float32, shape (H, W), optional
         As for :func:`render`.
+    blending : {"composite", "maximum", "minimum", "average", "additive"}
+        What becomes of the scalars along a ray, as in ``add_volume``: the greatest or the least is
+        classified; or opacity times scalar, 0 to 1 over the volume's range, is averaged or
+        integrated over opacity unit distances, as a grey value.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
     device : str, int or device, optional

@@ -78,7 +78,7 @@ def convert(options: argparse.Namespace) -> int:
         if page:
             arguments |= look  # that the page begins with
         elif look:
-            vdi = vdi.classified(**look)
+            vdi = vdi.classified(**look)  # type: ignore[union-attr]
         vdi.save(target, progress=inputs.part(bar, 0.5, 1.0, "writing"), **arguments)
     inputs.say_vdi(options, vdi)
     return 0

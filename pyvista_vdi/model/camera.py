@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
-from pyvista_vdi.model.checks import as_flag, as_float, as_floats
+from pyvista_vdi.model.checks import as_flag, as_float, as_floats, as_vector
 
 Matrix: TypeAlias = NDArray[np.float64]
 
@@ -110,17 +110,17 @@ class Camera:
         model_transform: ArrayLike | None = None,
     ) -> None:
         checked = {
-            "focal_point": _vector("focal_point", focal_point, 3),
+            "focal_point": as_vector(focal_point, "focal_point", 3, InvalidCameraError),
             "model_transform": _affine(model_transform),
             "parallel_projection": as_flag(parallel_projection, "parallel_projection"),
             "parallel_scale": as_float(parallel_scale),
-            "position": _vector("position", position, 3),
+            "position": as_vector(position, "position", 3, InvalidCameraError),
             "use_horizontal_view_angle": as_flag(
                 use_horizontal_view_angle, "use_horizontal_view_angle"
             ),
             "view_angle": as_float(view_angle),
-            "view_up": _vector("view_up", view_up, 3),
-            "window_center": _vector("window_center", window_center, 2),
+            "view_up": as_vector(view_up, "view_up", 3, InvalidCameraError),
+            "window_center": as_vector(window_center, "window_center", 2, InvalidCameraError),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -479,13 +479,6 @@ class Camera:
         turned = arm * math.cos(angle) + _cross(axis, arm) * math.sin(angle)
         turned = turned + axis * (axis @ arm) * (1 - math.cos(angle))
         return self.replace(position=np.asarray(self.focal_point) + turned)
-
-
-def _vector(name: str, value: ArrayLike, length: int) -> tuple[float, ...]:
-    array = as_floats(value)
-    if array.shape != (length,) or not np.isfinite(array).all():
-        raise InvalidCameraError(f"{name} must be {length} finite numbers; got {value!r}")
-    return tuple(array.tolist())
 
 
 def _affine(value: ArrayLike | None) -> Matrix:

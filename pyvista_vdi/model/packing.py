@@ -113,14 +113,16 @@ class Packed8:
         """Return the values that it stands for."""
         n, counts = len(self.words), lengths_of_lists(self.offsets)
         front, back, tau = (aligned_empty(n, np.float32) for _ in range(3))
-        color = aligned_empty((n, 3), np.float32)
+        color, bits_of_color = aligned_empty((n, 3), np.float32), np.array(_COLOR_BITS, np.uint32)
         for lists, part in _pieces(counts):
             codes = self.codes(part)
             own = np.repeat(np.arange(lists.start, lists.stop), counts[lists])
             front[part], back[part] = (self.depths(own, code) for code in codes[:2])
             bits = np.where(codes.tau > 0, codes.tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
             tau[part] = bits.astype(np.uint32).view(np.float32)
-            color[part] = unpacked_color(codes.color)
+            # One multiplication, which every device rounds alike
+            steps = codes.color[:, np.newaxis] >> bits_of_color & np.uint32(_COLOR_STEPS)
+            color[part] = steps.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
         return Arrays(self.offsets, front, back, color, tau)
 
     def depths(self, lists: NDArray[np.int64], codes: NDArray[np.uint32]) -> NDArray[np.float32]:
@@ -165,8 +167,9 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         bits = tau.view(np.uint32).astype(np.int64)
         upper = (bits + 0x7FFF + (bits >> 16 & 1)) >> 16
         codes = np.where(tau < _LEAST_TAU, 0, np.clip(upper - TAU_BASE + 1, 1, TAU_CODES))
-        packed = packed_color(arrays.color[part])
-        words[part] = Codes(front, back, codes.astype(np.uint32), packed).words()
+        steps = np.rint(arrays.color[part] * np.float32(_COLOR_STEPS)).astype(np.uint32)
+        red, green, blue = (steps << np.array(_COLOR_BITS, np.uint32)).T
+        words[part] = Codes(front, back, codes.astype(np.uint32), red | green | blue).words()
     return Packed8(step, arrays.offsets, origins, strides, words)
 
 
@@ -179,22 +182,6 @@ def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
         last = int(ends[last_list - 1])
         yield slice(first_list, last_list), slice(first, last)
         first_list, first = last_list, last
-
-
-def packed_color(color: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """Return straight RGB, float32 (n, 3), in whole steps; uint32 (n,)."""
-    packed = aligned_empty(len(color), np.uint32)
-    packed[...] = 0
-    for channel, first_bit in enumerate(_COLOR_BITS):
-        code = np.rint(color[:, channel] * np.float32(_COLOR_STEPS)).astype(np.uint32)
-        packed |= code << np.uint32(first_bit)
-    return packed
-
-
-def unpacked_color(packed: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Return straight RGB, float32 (n, 3); one multiplication, which every device rounds alike."""
-    code = packed[:, np.newaxis] >> np.array(_COLOR_BITS, np.uint32) & np.uint32(_COLOR_STEPS)
-    return code.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
 
 
 def _depth_codes(

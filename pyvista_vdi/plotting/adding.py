@@ -13,7 +13,12 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    UnsupportedError,
+    warn_external,
+)
 from pyvista_vdi.generation.deferred import kept_range
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
@@ -38,7 +43,7 @@ from pyvista_vdi.plotting.prepared import prepared
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import Refinement
 from pyvista_vdi.plotting.uniform import UniformGrid
-from pyvista_vdi.plotting.volumes import as_image, held, require_grid
+from pyvista_vdi.plotting.volumes import as_grid, held, require_grid
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
@@ -49,6 +54,9 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
 
 #: What ``add_actor`` understands as culling, besides nothing.
 _CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
+
+#: ``add_volume``'s names of VTK's mappers.
+_MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
@@ -72,6 +80,16 @@ def _culling(given: Any) -> str | bool:
     return "backface" if given is True else given
 
 
+def _note_mapper(name: Any) -> None:
+    if name not in (None, *_MAPPERS):
+        raise InvalidArgumentTypeError(
+            f"mapper={name!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
+            "its own: leave it out"
+        )
+    if name is not None:
+        warn_external(f"mapper={name!r} chooses among VTK's volume mappers and is ignored")
+
+
 @record
 @dataclass(frozen=True, eq=False)
 class Placement(Options):
@@ -82,6 +100,11 @@ class Placement(Options):
     culling: bool | str = option(False, "of faces, which a volume has none of", check=_culling)
     multi_colors: bool = option(
         False, "give each block of a ``MultiBlock`` a colour map of its own"
+    )
+    mapper: str | None = option(
+        None,
+        "of VTK's volume mappers; a VDI has its own, and none means a thing",
+        check=_note_mapper,
     )
     scalar_bar_args: Mapping[str, Any] = option(
         None,
@@ -375,7 +398,7 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source, preference = VDISource(), asked.array.preference
     uniform = volume if isinstance(volume, UniformGrid) else None
     if uniform is None:
-        image, array_name = as_image(volume, asked.array.scalars, asked.making.resolution)
+        image, array_name = as_grid(volume, asked.array.scalars, asked.making.resolution)
         data = held(image)
     else:
         data, array_name = uniform.image, uniform.name

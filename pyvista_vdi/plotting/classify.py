@@ -43,9 +43,6 @@ _IN_TABLES = {"clim", "n_colors", "opacity", "cmap", "flip_scalars", "log_scale"
 _made: dict[tuple[Any, ...], TransferFunction] = {}
 _MOST_MADE = 64
 
-#: ``add_volume``'s names of VTK's mappers.
-_MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
-
 
 def _categories(count: Any) -> bool | int:
     if count and not isinstance(count, int | np.integer):
@@ -181,18 +178,6 @@ def transfer_function_from_arguments(
             _made.clear()
         _made[made_of] = made
     return made
-
-
-def note_mapper(mapper: str) -> None:
-    """Warn that a name of VTK's mappers means nothing here, and refuse another."""
-    if mapper not in _MAPPERS:
-        raise InvalidArgumentTypeError(
-            f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
-            "its own: leave it out"
-        )
-    warn_external(
-        f"mapper={mapper!r} chooses among VTK's volume mappers and is ignored: a VDI has its own"
-    )
 
 
 def stored_table(vdi: VDI) -> pv.LookupTable | None:

@@ -14,7 +14,6 @@ from pyvista_vdi.model.arguments import takes
 from pyvista_vdi.model.types import AnyVolume
 from pyvista_vdi.plotting.actor import PlotterVDIActor
 from pyvista_vdi.plotting.adding import Addition, added
-from pyvista_vdi.plotting.classify import note_mapper
 from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.vtk_pipeline.vtk import weakly
 
@@ -38,9 +37,7 @@ class AddVDI(Component):
         order=inspect.signature(pv.Plotter.add_volume).parameters,
         aliases={"rng": "clim", "colormap": "cmap", "backface_culling": "culling"},
     )
-    def __call__(
-        self, volume: AnyVolume, asked: Addition, *, mapper: str | None = None
-    ) -> PlotterVDIActor | list[Any]:
+    def __call__(self, volume: AnyVolume, asked: Addition) -> PlotterVDIActor | list[Any]:
         """Add a volume that turns fluently: frames are raycast from its VDI where it serves.
 
         All arguments of ``Plotter.add_volume`` are taken, with its names, defaults and meaning;
@@ -67,8 +64,6 @@ class AddVDI(Component):
             from the VDI's own view, ``plotter.camera = vdi.camera.to_pyvista()``. A
             :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``,
             ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
-        mapper : str, optional
-            Names of VTK's volume mappers are taken and mean nothing: a VDI has its own.
 
         Returns
         -------
@@ -99,8 +94,6 @@ class AddVDI(Component):
         >>> actor = plotter.add_vdi(pyvista_vdi.examples.load_brain(), cmap="bone")
         >>> plotter.show()  # doctest: +SKIP
         """
-        if mapper is not None:
-            note_mapper(mapper)
         asked = replace(asked, look=replace(asked.look, theme=self._plotter._theme))
         made = added(self._plotter, volume, asked)
         self._remember(made)

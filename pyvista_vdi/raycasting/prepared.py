@@ -305,7 +305,7 @@ class PreparedVDI:
             else:
                 made_on: Any = getattr(vdi.late, "on", None)
                 if made_on is not None:
-                    held = stack.enter_context(made_on(runtime))
+                    held |= stack.enter_context(made_on(runtime))
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     held = {name: upload(array, what) for (name, what), array in arrays}

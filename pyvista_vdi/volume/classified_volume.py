@@ -285,7 +285,8 @@ class _Classes:
                 table = _media_of_scalars(runtime, table, *ends)
             made = cls(table, visible, distances)
             runtime.finish()  # a thread with another queue may use them next
-            uploads.classified[runtime] = key, made
+            if voxels.buffer is not None:  # or the memory is for bricks
+                uploads.classified[runtime] = key, made
             return made
 
 

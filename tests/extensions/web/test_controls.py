@@ -1,48 +1,60 @@
-"""The bar of a viewer: names, keys, fingers, and what each control does to the picture."""
-
-import io
-import json
+"""The bar of a viewer and its settings: names, keys, fingers, the editor, links, pictures."""
 
 import numpy as np
 import pytest
-from browsers import assert_axe_finds_nothing, picture
+from browsers import assert_axe_finds_nothing, file_of, picture
+from in_node import in_node
 from PIL import Image
+from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.extensions.web import _LOOK
 from pyvista_vdi.extensions.web.page import page as page_of
-from pyvista_vdi.extensions.web.placing import thinned
+from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import declared
+from pyvista_vdi.model.standard_cases import filling_camera
 
-#: Of pictures that are compared, and of viewers: large enough for a bar.
-SIZE, ROOM = (161, 91), (420, 340)
+#: Of pictures that are compared, and of viewers: large enough for a bar and its settings.
+SIZE, ROOM = (161, 91), (420, 480)
+PHONE = {"viewport": {"width": 390, "height": 700}, "has_touch": True, "is_mobile": True}
 
-BAR = [
-    *("Reset the view", "View and marks", "Brightness, opacity and clipping"),
-    *("Save the picture (PNG)", "Full screen", "Keys and gestures"),
+BAR = ["Reset the view", "Save the picture (PNG)", "Full screen", "Settings"]
+AXES = {"+x": (1, 0, 0), "\u2212x": (-1, 0, 0), "+y": (0, 1, 0), "\u2212y": (0, -1, 0)}
+AXES |= {"+z": (0, 0, 1), "\u2212z": (0, 0, -1), "iso": (1, 1, 1)}
+VIEWS = [f"Seen from {name}" for name in AXES]
+CLIPS = [f"Clip {axis} {end}" for axis in "xyz" for end in ("from", "to")]
+FACTORS = ["Brightness", "Opacity"]
+PRESETS = [f"Opacity: {name}" for name in ("Ramp", "Soft", "Peak", "Step")]
+EDITOR = [
+    *(f"Point {k} of 3" for k in (1, 2, 3)),
+    *("Add a point", "Remove the point", "Colours", "Level", "Window", *PRESETS),
 ]
-VIEWS = [
-    *("Seen from +x", "Seen from \u2212x", "Seen from +y", "Seen from \u2212y"),
-    *("Seen from +z", "Seen from \u2212z", "Seen iso, from between the axes"),
-]
-MARKS = ["Axes", "Orientation cube", "Bounds", "Colour bar", "Position under the pointer"]
-SLIDERS = [
-    *("Brightness", "Opacity"),
-    *(f"Clip {axis} {end}" for axis in "xyz" for end in ("from", "to")),
-]
-
-#: The axis that a view is along.
-SEEN_FROM = """(() => {
-  const { position, focal_point } = viewer.camera;
-  const arm = position.map((x, k) => x - focal_point[k]), length = Math.hypot(...arm);
-  const k = arm.findIndex((x) => Math.abs(x) > 0.999 * length);
-  return k < 0 ? "between" : `${arm[k] > 0 ? "+" : "-"}${"xyz"[k]}`;
-})()"""
 
 #: What a screen reader says of what has the focus.
 FOCUSED = """(() => {
   const at = viewer.shadowRoot.activeElement;
-  return at && (at.getAttribute("aria-label") ?? at.closest("label")?.textContent ?? "");
+  return at && (at.getAttribute("aria-label") ?? at.labels?.[0]?.children[0].textContent ?? "");
 })()"""
+
+RANGE = (0.0, 192.0)
+START = [0, 0, 0.5, 0.125, 1, 0.5]
+OTHERS = [([0, 0, 0.25, 0.4, 0.5, 0, 0.75, 0.8, 1, 0.2], RANGE), ([0, 0, 0.5, 0, 1, 1], (60, 100))]
+
+
+def look(points, clim=RANGE):
+    """From red to yellow, with points (x, opacity) at multiples of a 64th."""
+    x = np.linspace(0, 1, 65)
+    colors = np.stack([np.ones(65), x, np.zeros(65)], axis=1)
+    return pvdi.TransferFunction(colors, np.interp(x, points[::2], points[1::2]), clim)
+
+
+@pytest.fixture(scope="module")
+def kept(default_runtime):
+    """A ball that keeps its values."""
+    volume = soft_ball()
+    camera = filling_camera(volume.bounds, SIZE)
+    return pvdi.generate(volume, camera, SIZE, classification="deferred", value_range=RANGE)
 
 
 @pytest.fixture
@@ -50,8 +62,36 @@ def ball(data, open_page):
     """A page that shows the ball, in a viewer of this test's own."""
     page = open_page(ROOM)
     page.page.mouse.move(0, 0)
-    page.evaluate("(bytes) => viewer.load(Uint8Array.from(bytes)).then(() => true)", list(data))
+    page.load(data)
     return page
+
+
+@pytest.fixture
+def from_disk(open_page, tmp_path):
+    """Open a page of a VDI, or of one that keeps values, with ``settings`` open or not."""
+
+    def from_disk(shown, *, settings=False, hash_="", **options):
+        path = tmp_path / "a.html"
+        if isinstance(shown, pvdi.VDI):
+            path.write_bytes(page_of(shown))
+        else:
+            shown.save(path, transfer_function=look(START))
+        options = {"viewport": {"width": ROOM[0], "height": ROOM[1]}, **options}
+        page = open_page(url=path.as_uri() + hash_, **options)
+        page.ready()
+        if settings:
+            opened(page)
+        return page
+
+    return from_disk
+
+
+def opened(page):
+    """Open the settings, by keys."""
+    opener = page.page.get_by_label("Settings", exact=True).first
+    opener.focus()
+    page.page.keyboard.press("Enter")
+    page.wait_for("viewer.shadowRoot.querySelector('details').open")
 
 
 def pressed(page, name, *keys):
@@ -63,80 +103,50 @@ def pressed(page, name, *keys):
 def tabbed(page):
     """Where Tab goes from the picture, until it leaves the viewer or is back, as in windows."""
     page.evaluate("viewer.shadowRoot.querySelector('canvas').focus()")
-    picture, names = page.evaluate(FOCUSED), []
+    begun, names = page.evaluate(FOCUSED), []
     while True:
         page.page.keyboard.press("Tab")
         name = page.evaluate(FOCUSED)
-        if name in (None, picture):
+        if name in (None, begun):
             return names
         names.append(name)
         assert len(names) < 50
 
 
 def nameless(page):
-    """Parts of the accessibility tree that are used and have no name, or the same as another."""
+    """Parts of the accessibility tree that are used and have no name."""
     session = page.page.context.new_cdp_session(page.page)
     nodes = session.send("Accessibility.getFullAXTree")["nodes"]
-    kinds = {"button", "slider", "checkbox", "spinbutton", "combobox", "group", "image", "Canvas"}
+    kinds = {"button", "slider", "checkbox", "combobox", "group", "image", "Canvas"}
     seen = [node for node in nodes if not node["ignored"] and node["role"]["value"] in kinds]
     assert seen
     return [node["role"]["value"] for node in seen if not node.get("name", {}).get("value")]
 
 
-def test_keys_reach_every_control_and_each_has_a_name(ball):
+def points_of(page):
+    return page.evaluate("(viewer.look.transfer ?? viewer.values.start).points")
+
+
+# -- names, keys and fingers -----------------------------------------------------------------------
+
+
+def test_keys_reach_and_use_every_control(vdi, ball):
     assert tabbed(ball) == BAR
+    opened(ball)
+    assert tabbed(ball) == [*BAR, "Settings", *VIEWS, *FACTORS, *CLIPS, "As it was made"]
     assert not nameless(ball)
-    for opener, inside in (
-        ("View and marks", [*VIEWS, *MARKS]),
-        ("Brightness, opacity and clipping", [*SLIDERS, "As it was made"]),
-        ("Keys and gestures", ["Keys and gestures"]),
-    ):
-        pressed(ball, opener, "Enter")
-        assert tabbed(ball) == [*BAR, *inside]
-        assert not nameless(ball)
-        ball.page.get_by_label(opener, exact=True).first.focus()
-        ball.page.keyboard.press("Escape")
-    assert tabbed(ball) == BAR
-
-
-def test_keys_use_every_control(vdi, ball):
     camera = ball.evaluate("viewer.camera")
     centre = np.reshape(vdi.bounds, (3, 2)).mean(axis=1)
-    pressed(ball, "View and marks", "Enter")
-    directions = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
-    towards = [np.multiply(sign, one) for one in directions for sign in (1, -1)] + [np.ones(3)]
-    for name, direction in zip(VIEWS, towards, strict=True):
+    for name, direction in zip(VIEWS, AXES.values(), strict=True):
         pressed(ball, name, "Enter")
         seen = ball.evaluate("viewer.camera")
         arm = np.subtract(seen["position"], seen["focal_point"])
         np.testing.assert_allclose(seen["focal_point"], centre, atol=1e-9)
         length = np.linalg.norm(direction) * np.linalg.norm(arm)
         assert direction @ arm == pytest.approx(length, rel=1e-12), name
-    marks = "viewer.shadowRoot.querySelector('canvas:not([role]):not([hidden])') !== null"
-    for name in MARKS[:4]:
-        pressed(ball, name, "Space")
-        ball.wait_for(marks)
-        pressed(ball, name, "Space")
-        ball.wait_for(f"!({marks})")
-    pressed(ball, "Axes", "Escape")
-    assert ball.evaluate(FOCUSED) == "View and marks"
     pressed(ball, "Reset the view", "Enter")
     assert ball.evaluate("viewer.camera") == camera
-
-    pressed(ball, "View and marks", "Enter")
-    pressed(ball, "Orientation cube", "Space")
-    x, y = 47, ROOM[1] - 47
-    for face, place in (("+z", (x, y - 18)), ("+x", (x - 15, y + 9)), ("+y", (x + 15, y + 9))):
-        pressed(ball, "View and marks", *(["Enter"] if face != "+z" else []))
-        pressed(ball, "Seen iso, from between the axes", "Enter")
-        ball.page.mouse.click(*place)
-        assert ball.evaluate(SEEN_FROM) == face
-    ball.page.mouse.click(200, 200)  # beside it
-    assert ball.evaluate(SEEN_FROM) == "+y"
-    pressed(ball, "Reset the view", "Enter")
-
-    pressed(ball, "Brightness, opacity and clipping", "Enter")
-    for name in SLIDERS:
+    for name in (*FACTORS, *CLIPS):
         before = ball.evaluate("viewer.look")
         pressed(ball, name, "ArrowLeft" if name.endswith("to") else "ArrowRight")
         assert ball.evaluate("viewer.look") != before, name
@@ -145,20 +155,65 @@ def test_keys_use_every_control(vdi, ball):
     pressed(ball, "As it was made", "Enter")
     whole = {"brightness": 1, "opacity": 1, "clip": [0, 1, 0, 1, 0, 1]}
     assert ball.evaluate("viewer.look") == whole
-
-    canvas = ball.page.locator("canvas[role]")
-    canvas.press("?")
-    keys = ball.page.get_by_role("group", name="Keys and gestures")
-    assert "back to the first view" in keys.inner_text()
-    canvas.press("Escape")
-    assert keys.count() == 0
-    canvas.press("f")
+    pressed(ball, "As it was made", "Escape")
+    assert ball.evaluate(FOCUSED) == "Settings"
+    assert tabbed(ball) == BAR
+    ball.page.locator("canvas[role]").press("f")
     ball.wait_for("document.fullscreenElement === viewer")
     pressed(ball, "Full screen", "Enter")
     ball.wait_for("document.fullscreenElement === null")
 
 
-def test_a_saved_picture_is_what_is_seen(vdi, ball):
+@pytest.mark.parametrize("width", [390, 1400])
+def test_settings_do_not_cover_the_picture_of_a_narrow_page(width, kept, from_disk):
+    viewport = {"width": width, "height": 700}
+    options = {"viewport": viewport, "color_scheme": "dark", "reduced_motion": "reduce"}
+    page = from_disk(kept, settings=True, **options)
+    style = """(name) => {
+      const { backgroundColor, color, transitionDuration } =
+        getComputedStyle(viewer.shadowRoot.querySelector(name));
+      const numbers = (text) => text.match(/[\\d.]+/g).map(Number);
+      return [backgroundColor, color, transitionDuration].map(numbers);
+    }"""
+    behind, ink, fades = page.evaluate(style, ".bar")
+    assert fades == [0]
+    assert ink[0] - behind[0] > 150
+    panel, bar, canvas = (
+        page.page.locator(f"vdi-viewer {name}").bounding_box()
+        for name in (".panel", ".bar", "canvas[role]")
+    )
+    for box in (panel, bar):
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= width
+        assert box["y"] + box["height"] <= 700
+    assert panel["y"] >= bar["y"] + bar["height"]
+    if width == 390:  # it stands below the picture, which is drawn as high as that is
+        assert canvas["y"] + canvas["height"] <= panel["y"]
+        page.wait_for("viewer.shadowRoot.querySelector('canvas').height === 350")
+        page.page.emulate_media(media="print")
+        assert page.page.locator("vdi-viewer canvas[role]").bounding_box()["height"] == 700
+
+
+def test_fingers_reach_it(kept, from_disk):
+    page = from_disk(kept, **PHONE)
+    page.page.get_by_label("Settings", exact=True).first.tap()
+    before = picture(page, SIZE)
+    page.page.get_by_role("button", name="Seen from iso").tap()
+    page.evaluate("viewer.resetCamera()")
+    point = page.page.get_by_role("slider", name="Point 2 of 3").bounding_box()
+    x, y = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
+    session = page.page.context.new_cdp_session(page.page)
+    for kind, up in (("touchStart", 0), ("touchMove", 20), ("touchMove", 40)):
+        at = [{"x": x, "y": y - up}]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    assert points_of(page)[3] == pytest.approx(0.125 + 40 / 120, abs=0.03)
+    assert np.abs(picture(page, SIZE) - before.astype(float)).max() > 10
+    page.page.get_by_role("button", name="Opacity: Ramp").tap()
+    assert points_of(page) == [0, 0, 1, 1]
+
+
+def test_a_saved_picture_is_what_is_seen(ball):
     ball.evaluate("viewer.background = [0.2, 0.4, 0.6], document.title = 'A ball: soft/1'")
     before = picture(ball, ROOM).astype(float)
     expected = before[..., :3] + (1 - before[..., 3:] / 255) * [51, 102, 153]
@@ -170,266 +225,17 @@ def test_a_saved_picture_is_what_is_seen(vdi, ball):
     assert (saved[..., 3] == 255).all()
     assert np.abs(saved[..., :3] - expected).max() <= 2  # straight colours have eight bits, too
 
-    # The same by the right button, which moves the view when it is dragged
-    ball.page.mouse.click(100, 100, button="right")
-    assert ball.evaluate(FOCUSED) == "Save the picture (PNG)"
-    with ball.page.expect_download():
-        ball.page.keyboard.press("Enter")
-    assert ball.page.get_by_role("group", name="Picture", exact=True).count() == 0
-    camera = ball.evaluate("viewer.camera")
-    ball.page.mouse.move(100, 100)
-    ball.page.mouse.down(button="right")
-    ball.page.mouse.move(100, 130)
-    ball.page.mouse.up(button="right")
-    assert ball.evaluate("viewer.camera") != camera
-    assert ball.page.get_by_role("group", name="Picture", exact=True).count() == 0
 
-
-def test_looks_are_drawn_as_render_draws_them(vdi, ball):
-    turned = vdi.camera.azimuth(25)
-    own = ball.screenshot(turned, SIZE).astype(float)
-
-    def off(expected):
-        return np.abs(ball.screenshot(turned, SIZE) - expected).max()
-
-    ball.evaluate("viewer.look = { opacity: 2.5 }")
-    dense = thinned(vdi, 2.5)
-    assert np.abs(pvdi.render(dense, turned, SIZE) * 255 - own).max() > 10
-    assert off(pvdi.render(dense, turned, SIZE) * 255) <= 1
-
-    ball.evaluate("viewer.look = { brightness: 1.7 }")
-    exact = pvdi.render(vdi, turned, SIZE) * 255
-    bright = exact.copy()
-    bright[..., :3] = np.minimum(1.7 * exact[..., :3], exact[..., 3:])
-    assert off(bright) <= 1
-
-    ball.evaluate("viewer.look = { clip: [0.25, 1, 0, 0.6, 0, 1] }")
-    low, high = np.reshape(vdi.bounds, (3, 2)).T
-    x, y = low[0] + 0.25 * (high - low)[0], low[1] + 0.6 * (high - low)[1]
-    planes = [(x, 0, 0, 1, 0, 0), (0, y, 0, 0, -1, 0)]
-    cut = pvdi.render(vdi, turned, SIZE, clipping_planes=planes) * 255
-    assert np.abs(cut - own).max() > 10
-    assert off(cut) <= 1
-    ball.evaluate("viewer.look = {}")
-    np.testing.assert_array_equal(ball.screenshot(turned, SIZE), own)  # to the last bit
-
-
-@pytest.mark.parametrize(
-    ("look", "why"),
-    [
-        ("{ brightness: 0 }", "brightness is a factor from 1/16 to 16; got 0"),
-        ("{ opacity: NaN }", "opacity is a factor"),
-        ("{ clip: [0, 1] }", "clip is six finite numbers"),
-        ("{ clip: [0.6, 0.5, 0, 1, 0, 1] }", "from a lower to a higher share"),
-    ],
-)
-def test_looks_that_are_none_are_refused(look, why, open_page):
-    page = open_page(SIZE)
-    told = page.evaluate(
-        f"() => {{ try {{ viewer.look = {look} }} catch (e) {{ return String(e) }} }}"
-    )
-    assert told.startswith("TypeError")
-    assert why in told
-
-
-@pytest.mark.parametrize("parallel", [False, True])
-def test_the_point_under_the_pointer_has_half_of_what_is_seen_before_it(parallel, vdi, ball):
-    lens = "parallel_scale: 1.2" if parallel else "view_angle: viewer.camera.view_angle"
-    x, y = ROOM[0] // 2 + 20, ROOM[1] // 2 - 10
-    point = ball.evaluate(
-        f"""async () => {{
-          const {{ position, focal_point, view_up }} = viewer.camera;
-          viewer.camera = {{ position, focal_point, view_up, {lens} }};
-          for (let point; ; await new Promise((next) => setTimeout(next, 20))) {{
-            if ((point = viewer.pointAt({x}, {y}))) return point;
-          }}
-        }}"""
-    )
-    assert ball.evaluate("viewer.pointAt(1, 1)") is None
-    shown = int(picture(ball, ROOM)[y, x, 3])
-    assert shown > 100
-    low, high = np.reshape(vdi.bounds, (3, 2)).T
-    assert (low <= point).all()
-    assert (point <= high).all()
-    # It lies on the pixel's ray: moved by a pixel along the picture it is under the next one
-    camera = ball.evaluate("viewer.camera")
-    forward = np.subtract(camera["focal_point"], camera["position"])
-    forward /= np.linalg.norm(forward)
-    up = np.array(camera["view_up"]) - (camera["view_up"] @ forward) * forward
-    up /= np.linalg.norm(up)
-    arm = np.subtract(point, camera["position"])
-    tangent = np.tan(np.radians(camera["view_angle"] / 2)) if not parallel else 0
-    half = camera["parallel_scale"] if parallel else tangent * (arm @ forward)
-    seen = np.array([arm @ np.cross(forward, up), arm @ up]) / half * ROOM[1] / 2
-    np.testing.assert_allclose(seen, (x + 0.5 - ROOM[0] / 2, ROOM[1] / 2 - y - 0.5), atol=1e-2)
-    # No more than half of it is seen before the supersegment that begins there
-    plane = {"origin": (point - 1e-3 * forward).tolist(), "normal": (-forward).tolist()}
-    ball.evaluate("(plane) => { viewer.clippingPlanes = [plane] }", plane)
-    assert int(picture(ball, ROOM)[y, x, 3]) <= shown / 2 + 1
-    # And more than half as soon as there are many of them: behind the middle there is too little
-    assert (point - (low + high) / 2) @ forward < 0.1 * np.linalg.norm(high - low)
-
-
-@pytest.mark.parametrize("width", [390, 1400])
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_panels_fit_the_page_and_are_read_on_it(scheme, width, vdi, open_page, tmp_path):
-    (tmp_path / "a.html").write_bytes(page_of(vdi))
-    viewport = {"width": width, "height": 700}
-    page = open_page(
-        url=(tmp_path / "a.html").as_uri(),
-        viewport=viewport,
-        color_scheme=scheme,
-        reduced_motion="reduce",
-    )
-    page.ready()
-    style = """(name) => {
-      const { backgroundColor, color, transitionDuration } =
-        getComputedStyle(viewer.shadowRoot.querySelector(name));
-      const numbers = (text) => text.match(/[\\d.]+/g).map(Number);
-      return [backgroundColor, color, transitionDuration].map(numbers);
-    }"""
-    page.page.mouse.move(200, 300)
-    behind, ink, fades = page.evaluate(style, ".bar")
-    assert fades == [0]
-    assert (ink[0] - behind[0] > 150) if scheme == "dark" else (behind[0] - ink[0] > 150)
-    for name in ("View and marks", "Brightness, opacity and clipping", "Keys and gestures"):
-        page.page.get_by_role("button", name=name).click()
-        box = page.page.get_by_role("group", name=name).bounding_box()
-        bar = page.page.get_by_role("group", name="Controls of the picture").bounding_box()
-        for each in (box, bar):
-            assert each["x"] >= 0
-            assert each["x"] + each["width"] <= width
-            assert each["y"] + each["height"] <= 700
-        assert box["y"] >= bar["y"] + bar["height"]
-    assert page.evaluate("document.scrollingElement.scrollWidth") == width
-
-
-def test_fingers_use_it_and_do_not_touch_what_has_faded(vdi, open_page, tmp_path):
-    (tmp_path / "a.html").write_bytes(page_of(vdi))
-    page = open_page(
-        url=(tmp_path / "a.html").as_uri(),
-        viewport={"width": 390, "height": 700},
-        has_touch=True,
-        is_mobile=True,
-    )
-    page.ready()
-    tap = page.page.touchscreen.tap
-    opener = page.page.get_by_role("button", name="View and marks")
-    box = opener.bounding_box()
-    at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    page.evaluate("void document.body.append(document.createElement('vdi-viewer'))")
-    page.page.wait_for_timeout(3500)  # that of a viewer which waits for its data has not faded
-    page.wait_for("!viewer.shadowRoot.querySelector('.frame.awake')")
-    waiting = "document.body.lastChild"
-    assert page.evaluate(f"!!{waiting}.shadowRoot.querySelector('.frame.awake')")
-    page.evaluate(f"{waiting}.remove()")
-    tap(*at)
-    page.page.wait_for_timeout(500)
-    assert opener.get_attribute("aria-expanded") == "false"
-    for _ in range(20):  # on a busy machine it may have faded again
-        if opener.get_attribute("aria-expanded") == "true":
-            break
-        tap(*at)
-        page.page.wait_for_timeout(500)
-    assert opener.get_attribute("aria-expanded") == "true"
-    assert min(box["width"], box["height"]) >= 36
-    before = page.evaluate("viewer.camera")
-    page.page.get_by_role("button", name="Seen iso, from between the axes").tap()
-    assert page.evaluate("viewer.camera") != before
-    page.page.get_by_label("Position under the pointer").tap()
-    page.evaluate("viewer.ready.then(() => true)")
-    tap(195, 350)
-    page.wait_for("/^x .* y .* z /.test(viewer.shadowRoot.querySelector('.place').textContent)")
-
-
-@pytest.mark.slow
-def test_fingers_reach_and_use_every_control(vdi, open_page, tmp_path):
-    """Of a page of a series, which has them all."""
-    pages = pvdi.VDISeries([vdi, thinned(vdi, 0.2)], [0.0, 1.0]).save(tmp_path / "a.html")
-    viewport = {"width": 390, "height": 700}
-    page = open_page(url=pages.as_uri(), viewport=viewport, has_touch=True, is_mobile=True)
-    page.ready()
-    used = set()
-
-    def tap(name, role, along=0.5):
-        used.add(name)
-        box = page.page.get_by_role(role, name=name, exact=True).bounding_box()
-        assert box["height"] >= 18
-        page.page.touchscreen.tap(box["x"] + along * box["width"], box["y"] + box["height"] / 2)
-
-    def tap_until(name, done, role="button"):
-        """More than once where the bar has faded, which a first touch wakes."""
-        for _ in range(20):
-            tap(name, role)
-            page.page.wait_for_timeout(500)
-            if page.evaluate(done):
-                return
-        raise AssertionError(name)
-
-    def is_open(name):
-        expanded = "b.getAttribute('aria-expanded') === 'true'"
-        opener = f"[...viewer.shadowRoot.querySelectorAll('button')].find((b) => {expanded})"
-        return f"({opener}?.getAttribute('aria-label') === '{name}')"
-
-    tap_until("View and marks", is_open("View and marks"))
-    for name in VIEWS:
-        before = page.evaluate("viewer.camera")
-        tap(name, "button")
-        page.wait_for(
-            f"JSON.stringify(viewer.camera) !== '{json.dumps(before, separators=(',', ':'))}'"
-        )
-    for name in MARKS:
-        tap(name, "checkbox")
-        assert page.page.get_by_role("checkbox", name=name).is_checked()
-    page.page.touchscreen.tap(47, 700 - 40 - 47 - 18)  # the face above of the cube
-    page.wait_for(f"{SEEN_FROM} === '+z'")
-    assert not page.evaluate(is_open("View and marks"))  # by a touch beside the panel
-    tap_until("Brightness, opacity and clipping", is_open("Brightness, opacity and clipping"))
-    for name in SLIDERS:
-        before = page.evaluate("JSON.stringify(viewer.look)")
-        tap(name, "slider", 0.7 if name.endswith("to") else 0.3)
-        page.wait_for(f"JSON.stringify(viewer.look) !== '{before}'")
-    tap("As it was made", "button")
-    page.wait_for("viewer.look.clip[0] === 0 && viewer.look.brightness === 1")
-    tap_until("Keys and gestures", is_open("Keys and gestures"))
-    tap_until("Keys and gestures", f"!{is_open('Keys and gestures')}")
-    said = "viewer.shadowRoot.querySelector('.hint')"
-    tap_until("Copy a link to what is seen", f"/link/.test({said}.textContent)")
-    begins = "JSON.stringify(viewer.camera) === JSON.stringify(viewer.home)"
-    tap_until("Reset the view", begins)
-    with page.page.expect_download():
-        tap_until("Save the picture (PNG)", "true")
-    tap_until("Full screen", "document.fullscreenElement === viewer")
-    tap_until("Full screen", "document.fullscreenElement === null")
-    tap("Time", "slider", 0.9)
-    page.wait_for("viewer.time === 1")
-    tap("Play", "button")
-    page.wait_for("viewer.playing")
-    tap("Pause", "button")
-    page.wait_for("!viewer.playing")
-    openers = {"View and marks", "Brightness, opacity and clipping", "Keys and gestures"}
-    known = "input, button:not(.menu *)"
-    labels = page.evaluate(
-        f"""[...viewer.shadowRoot.querySelectorAll("{known}")].map((each) =>
-          each.getAttribute("aria-label") ?? each.closest("label").textContent)"""
-    )
-    assert used | openers >= set(labels)
-
-
-def test_without_controls_there_are_none(vdi, open_page, tmp_path):
-    (tmp_path / "a.html").write_bytes(page_of(vdi, controls="none"))
-    page = open_page(url=(tmp_path / "a.html").as_uri(), viewport={"width": 390, "height": 300})
-    page.ready()
-    assert page.page.get_by_role("button").count() == 0
-    canvas = page.page.locator("canvas[role]")
-    before = page.evaluate("viewer.camera")
-    canvas.press("ArrowLeft")
-    assert page.evaluate("viewer.camera") != before
-    canvas.press("?")
-    page.page.mouse.click(100, 100, button="right")
-    assert page.page.get_by_role("group").count() == 0
-    page.evaluate("viewer.removeAttribute('controls')")
-    assert page.page.get_by_role("button").count() == len(BAR) + 1  # and the link's
+def test_without_controls_there_are_none(ball):
+    ball.evaluate("viewer.setAttribute('controls', 'none')")
+    assert ball.page.get_by_role("button").count() == 0
+    before = ball.evaluate("viewer.camera")
+    ball.page.locator("canvas[role]").press("ArrowLeft")
+    assert ball.evaluate("viewer.camera") != before
+    ball.page.locator("canvas[role]").press("f")
+    assert ball.evaluate("document.fullscreenElement") is None
+    ball.evaluate("viewer.removeAttribute('controls')")
+    assert ball.page.get_by_role("button").count() >= 3
 
 
 @pytest.mark.parametrize("kind", ["html", "series"])
@@ -442,23 +248,252 @@ def test_other_controls_are_refused_before_anything_is_written(kind, vdi, tmp_pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_axe_finds_nothing(scheme, vdi, open_page, tmp_path):
-    (tmp_path / "a.html").write_bytes(page_of(vdi))
-    url, viewport = (tmp_path / "a.html").as_uri(), {"width": 390, "height": 700}
-    page = open_page(url=url, viewport=viewport, color_scheme=scheme, reduced_motion="reduce")
-    page.ready()
-    for name in (None, "View and marks", "Brightness, opacity and clipping", "Keys and gestures"):
-        if name:
-            page.page.get_by_role("button", name=name).click()
-        assert_axe_finds_nothing(page)
+@pytest.mark.parametrize("of", ["colours", "values"])
+def test_axe_finds_nothing(of, scheme, vdi, kept, from_disk):
+    options = {"viewport": PHONE["viewport"], "color_scheme": scheme, "reduced_motion": "reduce"}
+    page = from_disk(vdi if of == "colours" else kept, **options)
+    assert_axe_finds_nothing(page)
+    opened(page)
+    assert_axe_finds_nothing(page)
 
 
-def test_marks_are_in_the_picture_that_is_saved(ball):
-    pressed(ball, "View and marks", "Enter")
-    pressed(ball, "Bounds", "Space")
-    with ball.page.expect_download() as found:
-        pressed(ball, "Save the picture (PNG)", "Enter")
-    saved = np.asarray(Image.open(io.BytesIO(found.value.path().read_bytes()))).astype(int)
-    own = picture(ball, ROOM)
-    outside = own[..., 3] == 0
-    assert saved[outside][:, :3].max() > 200  # lines of the box, over black
+# -- keys that are the page's ----------------------------------------------------------------------
+
+#: A page with shortcuts of its own, which hears keys before and after what has the focus.
+LISTENING = """
+window.reached = [];
+for (const kind of ["keydown", "keypress", "keyup"]) {
+  for (const capture of [true, false]) {
+    document.addEventListener(kind, ({ key, defaultPrevented }) => {
+      if (!["Shift", "Control", "Alt", "Meta"].includes(key)) {
+        reached.push([kind, capture, key, defaultPrevented]);
+      }
+    }, { capture });
+  }
+}
+"""
+
+ARROWS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"]
+TAKEN = [*ARROWS, *(f"Shift+{key}" for key in ARROWS), "+", "=", "-", "r", "Shift+R"]
+NOT_TAKEN = [
+    *("a", "b", "d", "m", "x", "z", "1", "Escape", "Enter", "Delete", "Home", "PageDown", "Space"),
+    *(",", ".", "Shift+Enter", "Control+Enter", "Control+s", "Control+b", "Alt+r", "Meta+r"),
+    *("Control+ArrowLeft", "Alt+ArrowUp", "Control+=", "Control+-", "Control+Shift+ArrowUp"),
+]
+
+
+def test_keys_that_it_takes_reach_nothing_else_and_others_do(vdi, open_page):
+    """What is typed elsewhere is none of its, and arrows that it takes do not scroll the page."""
+    page = open_page(SIZE, data=file_of(vdi), before=LISTENING)
+    page.evaluate("document.body.append(...['input', 'p'].map((n) => document.createElement(n)))")
+    page.evaluate("document.querySelector('p').tabIndex = 0, document.body.style.height = '5000px'")
+    canvas = "viewer.shadowRoot.querySelector('canvas')"
+
+    def told(at, *keys):
+        page.evaluate(f"{at}.focus({{ preventScroll: true }}), reached.length = 0")
+        for key in keys:
+            page.page.keyboard.press(key)
+        return page.evaluate("reached")
+
+    camera = page.evaluate("viewer.camera")
+    for key in TAKEN:
+        page.evaluate("(camera) => { viewer.camera = camera }", camera)
+        if key in ("r", "Shift+R"):
+            told(canvas, "ArrowLeft")
+            assert page.evaluate("viewer.camera") != camera
+        assert told(canvas, key) == [], key
+        assert (page.evaluate("viewer.camera") == camera) == (key in ("r", "Shift+R")), key
+    assert page.evaluate("scrollY") == 0
+    elsewhere = "document.querySelector('p')"
+    for key in NOT_TAKEN:
+        assert told(canvas, key) == told(elsewhere, key) != [], key
+    keys = [*"rR+-= ,.", *ARROWS]
+    assert told("document.querySelector('input')", *keys) == told(elsewhere, *keys)
+    assert page.evaluate("document.querySelector('input').value") == "rR+-= ,."
+    assert page.evaluate("viewer.camera") == camera
+    page = open_page(SIZE, before=LISTENING)  # with nothing to be turned
+    page.evaluate("document.body.append(document.createElement('p'))")
+    page.evaluate("document.querySelector('p').tabIndex = 0")
+    assert told(canvas, *TAKEN) == told(elsewhere, *TAKEN)
+
+
+# -- the editor ------------------------------------------------------------------------------------
+
+
+def assert_like(page, vdi, camera, most=1.0):
+    expected = pvdi.render(vdi, camera, SIZE) * 255.0
+    off = np.abs(page.screenshot(camera, SIZE) - expected)
+    assert off.max() <= most, off.max()
+
+
+def edit(page, points, clim):
+    page.evaluate(
+        "(transfer) => { viewer.look = { transfer }; }", {"clim": list(clim), "points": points}
+    )
+
+
+def test_pictures_of_values_are_those_of_render(kept, from_disk):
+    # 8 bits, and float32 of two devices
+    page, packed, turned = from_disk(kept), kept.with_precision("8-byte"), kept.camera.azimuth(20)
+    for camera in (kept.camera, turned):
+        assert_like(page, packed.classified(transfer_function=look(START)), camera)
+    for points, clim in OTHERS:
+        edit(page, points, clim)
+        assert_like(page, packed.classified(transfer_function=look(points, clim)), turned)
+
+
+@pytest.mark.slow
+def test_exact_values_are_shown_and_a_file_without_a_look_has_a_ramp(kept, open_page, tmp_path):
+    page = open_page(SIZE)
+    page.load(kept.save(tmp_path / "kept.vdi").read_bytes())
+    assert points_of(page) == [0, 0, 1, 1]
+    assert page.evaluate("viewer.values.range") == list(RANGE)
+    lengths = page.evaluate("[...viewer.values.histogram]")
+    places = (np.arange(len(lengths)) + 0.5) / len(lengths)
+    mean = np.average(kept.mean, weights=kept.steps)
+    assert np.average(places, weights=lengths) == pytest.approx(mean, abs=0.5 / len(lengths))
+    # Means are looked up to a 3825th of the range, spreads to a 16th of themselves
+    edit(page, *OTHERS[0])
+    x = np.linspace(0, 1, 256)
+    colors = page.evaluate("viewer.transferFunction.colors")
+    opacities = np.interp(x, OTHERS[0][0][::2], OTHERS[0][0][1::2])
+    told = pvdi.TransferFunction(colors, opacities, RANGE)
+    assert_like(page, kept.classified(transfer_function=told), kept.camera, 2.0)
+
+
+def test_mouse_and_keys_edit_and_a_link_has_it(kept, from_disk):
+    page = from_disk(kept, settings=True)
+    made = picture(page, SIZE)
+    assert points_of(page) == START
+    names = tabbed(page)
+    assert names == [*BAR, "Settings", *VIEWS, *EDITOR, *CLIPS, "As it was made"]
+    assert not nameless(page)
+    slider = page.page.get_by_role("slider", name="Point 2 of 3")
+    slider.scroll_into_view_if_needed()
+    point, mouse = slider.bounding_box(), page.page.mouse
+    x, y = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x + 9, y - 30, steps=3)
+    mouse.up()
+    moved = points_of(page)
+    assert len(moved) == 6
+    assert moved[2] > 0.5
+    assert moved[3] == pytest.approx(0.125 + 30 / 120, abs=0.02)
+    assert np.abs(picture(page, SIZE) - made.astype(float)).max() > 10
+    mouse.click(x + 40, y - 60)
+    assert len(points_of(page)) == 8
+    pressed(page, "As it was made", "Enter")
+    np.testing.assert_array_equal(picture(page, SIZE), made)
+
+    pressed(page, "Point 2 of 3", "ArrowUp", "Shift+ArrowUp", "ArrowRight")
+    np.testing.assert_allclose(points_of(page)[2:4], (0.51, 0.235), atol=1e-9)
+    pressed(page, "Point 2 of 3", "Home")
+    assert points_of(page)[2] == 0  # not beyond its neighbour
+    pressed(page, "Point 2 of 3", "+")
+    assert len(points_of(page)) == 8
+    assert page.evaluate(FOCUSED) == "Point 3 of 4"
+    pressed(page, "Point 3 of 4", "Delete")
+    assert len(points_of(page)) == 6
+    pressed(page, "Window", "ArrowLeft")
+    pressed(page, "Level", "ArrowRight")
+    low, high = page.evaluate("viewer.look.transfer.clim")
+    assert high - low < RANGE[1]
+    page.page.get_by_label("Colours").last.select_option("viridis")
+    pressed(page, "Opacity: Peak", "Enter")
+    assert page.evaluate("viewer.look.transfer.cmap") == "viridis"
+    assert page.evaluate("viewer.transferFunction.colors[0]") != [1, 0, 0]
+
+    page.wait_for("location.hash.includes('points')")
+    seen, link = picture(page, SIZE), page.evaluate("location.hash")
+    other = from_disk(kept, hash_=link)
+    assert other.evaluate("viewer.look") == page.evaluate("viewer.look")
+    np.testing.assert_array_equal(picture(other, SIZE), seen)
+    other.evaluate("location.hash = ''")
+    other.wait_for("!viewer.look.transfer")
+
+
+def test_colour_maps_are_those_of_matplotlib():
+    matplotlib = pytest.importorskip("matplotlib")
+    maps = in_node(
+        """async () => {
+          const { COLORMAPS, colorsOf } = await from("colormaps.js");
+          return COLORMAPS.map((name) => [name, colorsOf(name)]);
+        }"""
+    )
+    for name, colors in maps:
+        expected = matplotlib.colormaps[name](np.linspace(0, 1, 256))[:, :3]
+        assert np.abs(np.array(colors) - expected).max() <= 2.01 / 255, name
+
+
+def test_a_page_takes_the_words_of_classified():
+    light = {"shade", "ambient", "diffuse", "specular", "specular_power"}
+    assert set(declared(Classification)) - set(_LOOK) - light == {
+        *("scalars", "preference", "interpolation", "blending"),
+    }
+
+
+# -- links -----------------------------------------------------------------------------------------
+
+INFOS = """
+window.infos = [];
+console.info = (text) => infos.push(text);
+"""
+
+
+def link_of(page):
+    page.evaluate("viewer.ready.then(() => new Promise((next) => setTimeout(next, 500)))")
+    return page.evaluate("location.href")
+
+
+def test_a_link_shows_what_was_seen_and_the_address_is_followed(vdi, from_disk):
+    page = from_disk(vdi, hash_="#other=1", before=INFOS)
+    begun, home = link_of(page), page.evaluate("viewer.camera")
+    assert begun.endswith("a.html#other=1")  # nothing is said of what the page begins with
+    length = page.evaluate("history.length")
+    page.evaluate(
+        """() => {
+          viewer.camera = { ...viewer.camera, position: [2.1, 1 / 3, -1.7], view_angle: 41 };
+          viewer.look = { brightness: 1.5, opacity: 2, clip: [0.1, 1, 0, 1, 0, 0.7] };
+        }"""
+    )
+    link = link_of(page)
+    assert link.startswith(f"{begun}&view=position:2.1,0.3333333333333333,-1.7/focal_point:")
+    assert page.evaluate("history.length") == length
+    shown = picture(page, SIZE)
+    other = from_disk(vdi, hash_=link.removeprefix(begun.partition("#")[0]), before=INFOS)
+    assert other.evaluate("viewer.look.clip") == [0.1, 1, 0, 1, 0, 0.7]
+    np.testing.assert_array_equal(picture(other, SIZE), shown)
+    assert link_of(other) == link
+    other.evaluate("location.hash = location.hash.replace('opacity:2', 'opacity:3')")
+    other.wait_for("viewer.look.opacity === 3")
+    other.evaluate("location.hash = '#elsewhere'")  # a place in the page, say
+    other.evaluate("location.hash = '#view=position:1,2'")
+    other.wait_for("infos.length === 1")
+    assert "is not followed: The position" in other.evaluate("infos[0]")
+    assert other.evaluate("viewer.look.opacity") == 3
+    other.evaluate("location.hash = ''")
+    other.wait_for("viewer.look.opacity === 1")
+    assert other.evaluate("viewer.camera") == home
+
+
+def test_of_several_viewers_the_first_of_a_key_is_followed(vdi, open_page):
+    page = open_page(SIZE, attributes='hash="left"', files={"ball.vdi": file_of(vdi)})
+    page.evaluate(
+        """async () => {
+          for (const key of ["left", "right", null]) {
+            const viewer = document.createElement("vdi-viewer");
+            if (key) viewer.setAttribute("hash", key);
+            document.body.append(viewer);
+          }
+          window.all = [...document.querySelectorAll("vdi-viewer")];
+          await Promise.all(all.map((each) => each.load("ball.vdi")));
+          all.forEach((each, k) => (each.look = { opacity: k + 2 }));
+          await new Promise((next) => setTimeout(next, 500));
+        }"""
+    )
+    parts = dict(part.split("=") for part in page.evaluate("location.hash")[1:].split("&"))
+    assert sorted(parts) == ["left", "right"]
+    assert parts["left"].endswith("/opacity:2")
+    assert parts["right"].endswith("/opacity:4")
+    page.evaluate("history.replaceState(null, '', '#')")

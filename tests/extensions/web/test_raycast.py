@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import strategies
 from browsers import COUNTING, array_of, file_of, in_base64
-from fewer_lists import lists_crossed, subsampled_lists
 from oracle import explain
 from real_data import require_data
 
@@ -45,7 +44,7 @@ function texture(format, width, height) {
   return made;
 }
 
-window.picture = (camera, width, height, clippingPlanes, depth, few) => {
+window.picture = (camera, width, height, clippingPlanes, depth) => {
   const target = texture(gl.RGBA32F, width, height);
   let depthTexture = null;
   if (depth) {
@@ -76,7 +75,7 @@ class Raycaster:
     def give(self, vdi):
         self.page.evaluate("(text) => give(text)", in_base64(file_of(vdi)))
 
-    def draw(self, camera, size, *, clipping_planes=(), opaque_depth=None, few=False):
+    def draw(self, camera, size, *, clipping_planes=(), opaque_depth=None):
         """Premultiplied RGBA, float32 (H, W, 4), top row first."""
         planes = [
             {"origin": [float(x) for x in plane[:3]], "normal": [float(x) for x in plane[3:]]}
@@ -84,7 +83,7 @@ class Raycaster:
         ]
         depth = None if opaque_depth is None else in_base64(opaque_depth[::-1].tobytes())
         text = self.page.evaluate(
-            "(given) => picture(...given)", [camera.to_dict(), *size, planes, depth, few]
+            "(given) => picture(...given)", [camera.to_dict(), *size, planes, depth]
         )
         return array_of(text, np.float32).reshape(size[1], size[0], 4)[::-1]
 
@@ -94,7 +93,7 @@ def raycaster(open_page):
     """One that tests share."""
     page = open_page(script=SCRIPT)
     yield Raycaster(page)
-    page.evaluate("() => { delete raycaster.thinning; gl.disable(gl.SCISSOR_TEST); }")
+    page.evaluate("() => gl.disable(gl.SCISSOR_TEST)")
 
 
 def check(raycaster, vdi, camera, size, name, **ends):
@@ -129,58 +128,6 @@ def test_every_pixel_is_within_the_range_of_the_moved_ray(cases, precision, rayc
                 pixels += result.pixels
     assert drawn > pixels / 10
     assert moved <= 0.005 * pixels
-
-
-def shells(size, **options):
-    """A ball of shells, nothing in the corners, in many lists; and where it was seen from."""
-    axis = np.linspace(-1, 1, 33)
-    z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
-    radius = np.sqrt(x**2 + y**2 + z**2)
-    values = np.where(radius < 1, 1 + np.cos(9 * radius + x), 0) * 100
-    volume = pvdi.Volume(values.astype(np.uint8), spacing=(1 / 16,) * 3, origin=(-1, -1, -1))
-    view = Camera((4.5, 1, 0.5), (0, 0, 0), (0, 0, 1), view_angle=35)
-    return view, pvdi.generate(volume, view, size, cmap="viridis", opacity="linear", **options)
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("precision", PRECISIONS)
-def test_every_second_list_is_drawn_as_a_vdi_of_those(precision, raycaster):
-    """The shader's thinning against the oracle's picture of those; odd windows, too."""
-    drawn, picture = 0, (28, 21)
-    for tilt, steps, size in ((20, (2, 1), (70, 45)), (0, (1, 2), (64, 41)), (0, (2, 2), (51, 37))):
-        view, vdi = shells(size, max_supersegments=6)
-        vdi = vdi.with_precision(precision)
-        raycaster.give(vdi)
-        raycaster.page.evaluate(
-            "(steps) => { raycaster.thinning = () => steps; }", [k - 1 for k in steps]
-        )
-        for angle in (0, 25, 70, 200):
-            camera = view.azimuth(angle).elevation(tilt)
-            image = raycaster.draw(camera, picture, few=True)
-            name = f"steps {steps}, {angle} degrees, {precision}"
-            result = explain(
-                subsampled_lists(vdi, *steps),
-                camera,
-                picture,
-                image,
-                name=name,
-                tolerance=TOLERANCE,
-            )
-            assert not result.failures, "\n".join(result.failures)
-            drawn += result.drawn
-    assert drawn > 1400
-
-
-def test_every_second_list_is_taken_where_it_is_worth_it(raycaster):
-    """The edge that most lists are crossed along, as by Python; none near the generating view."""
-    view, vdi = shells((200, 150))
-    raycaster.give(vdi)
-    for camera in (view, view.azimuth(2), view.azimuth(40), view.azimuth(-90), view.elevation(50)):
-        crossed = lists_crossed(vdi, camera)
-        expected = [int(crossed.max() >= 16 and n >= crossed.max() / 2) for n in crossed]
-        found = raycaster.page.evaluate("(camera) => raycaster.thinning(camera)", camera.to_dict())
-        assert found == expected, crossed
-    assert max(expected) == 1
 
 
 @pytest.mark.parametrize(

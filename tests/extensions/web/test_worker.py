@@ -10,10 +10,6 @@ from threading import Thread
 
 import pytest
 from browsers import LONG
-from plugin_scenes import soft_ball
-
-import pyvista_vdi as pvdi
-from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (64, 36)
 
@@ -29,19 +25,10 @@ BUNDLERS = {
 }
 
 
-@pytest.fixture(scope="module")
-def ball(default_runtime, tmp_path_factory):
-    """A file with a VDI."""
-    volume = soft_ball()
-    vdi = pvdi.generate(volume, filling_camera(volume.bounds, SIZE), SIZE, cmap="viridis")
-    path = tmp_path_factory.mktemp("ball") / "ball.vdi"
-    return vdi.save(path, precision="8-byte", compression="deflate")
-
-
 @pytest.fixture
-def folder(ball, tmp_path):
+def folder(data, tmp_path):
     """A folder with a VDI and the viewer's modules."""
-    shutil.copy(ball, tmp_path)
+    (tmp_path / "ball.vdi").write_bytes(data)
     with resources.as_file(resources.files("pyvista_vdi.extensions.web") / "viewer") as viewer:
         shutil.copytree(viewer, tmp_path / "viewer")
     return tmp_path
@@ -91,42 +78,25 @@ def workers_and_warnings(chromium, url):
     return workers, [text for text in warnings if "vdi-viewer" in text]
 
 
-def assert_a_worker_starts(chromium, url):
-    workers, warnings = workers_and_warnings(chromium, url)
-    assert workers
-    assert not warnings
-
-
-POLICIES = ["default-src 'self'", "", "worker-src 'self'"]
-
-
-@pytest.mark.every(9)
-@pytest.mark.parametrize("policy", POLICIES)
-def test_modules_of_the_pages_own_origin_start_it(policy, folder, serve, chromium):
-    (folder / "index.html").write_text(PAGE.format(script="viewer/element.js"))
-    url = serve(folder, [("Content-Security-Policy", policy)] if policy else [])
-    assert_a_worker_starts(chromium, url)
-
-
-def test_modules_of_another_origin_start_it(folder, serve, chromium):
+def test_modules_start_it_and_where_none_may_be_that_is_said_once(folder, serve, chromium):
+    """Of the page's own origin, of another one, and under policies."""
     elsewhere = serve(folder, [("Access-Control-Allow-Origin", "*")])
-    (folder / "index.html").write_text(PAGE.format(script=f"{elsewhere}viewer/element.js"))
-    assert_a_worker_starts(chromium, serve(folder))
-
-
-@pytest.mark.every(9)
-@pytest.mark.parametrize("policy", ["worker-src 'none'", "script-src 'self'; worker-src x.test"])
-def test_where_no_worker_may_be_started_that_is_said_once(policy, folder, serve, chromium):
-    (folder / "index.html").write_text(PAGE.format(script="viewer/element.js"))
-    url = serve(folder, [("Content-Security-Policy", policy)])
-    workers, (warning,) = workers_and_warnings(chromium, url)
-    assert not workers
-    assert "decodes on the page's own thread" in warning
-    assert "worker-src" in warning
+    for script, policy, starts in (
+        ("viewer/element.js", "default-src 'self'", True),
+        (f"{elsewhere}viewer/element.js", "", True),
+        ("viewer/element.js", "worker-src 'none'", False),
+    ):
+        (folder / "index.html").write_text(PAGE.format(script=script))
+        url = serve(folder, [("Content-Security-Policy", policy)] if policy else [])
+        workers, warnings = workers_and_warnings(chromium, url)
+        assert bool(workers) == starts, policy
+        assert len(warnings) == (not starts)
+        assert all("decodes on the page's own thread" in text for text in warnings)
+        assert all("worker-src" in text and "worker.js" in text for text in warnings)
 
 
 @pytest.mark.parametrize("bundler", BUNDLERS)
-def test_bundlers_take_it_with_them(bundler, folder, serve, chromium):
+def test_bundlers_take_it_with_them(bundler, folder, serve, request):
     command = shutil.which(bundler)
     if command is None:
         pytest.skip(f"needs {bundler} in the path: npm install --global {bundler}")
@@ -137,18 +107,6 @@ def test_bundlers_take_it_with_them(bundler, folder, serve, chromium):
     shutil.copy(folder / "ball.vdi", out)
     if bundler != "vite":
         shutil.copy(folder / "index.html", out)
-    assert_a_worker_starts(chromium, serve(out))
-
-
-def test_a_bundle_without_it_says_so(folder, serve, chromium):
-    """What esbuild makes where the worker is not named as well: its file is not there."""
-    command = shutil.which("esbuild")
-    if command is None:
-        pytest.skip("needs esbuild in the path: npm install --global esbuild")
-    bundle = ["viewer/element.js", "--bundle", "--format=esm", "--outfile=out/main.js"]
-    subprocess.run([command, *bundle], cwd=folder, check=True, timeout=LONG)
-    shutil.copy(folder / "ball.vdi", folder / "out")
-    (folder / "out" / "index.html").write_text(PAGE.format(script="./main.js"))
-    workers, (warning,) = workers_and_warnings(chromium, serve(folder / "out"))
-    assert not workers
-    assert "worker.js" in warning
+    workers, warnings = workers_and_warnings(request.getfixturevalue("chromium"), serve(out))
+    assert workers
+    assert not warnings

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from pyvista_vdi.model.options import MAX_SUPERSEGMENTS, Deferral, GenerationOptions, declared
+import math
+
+from pyvista_vdi.model.checks import Number
+from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
 
 #: Value of the property View that means the camera properties.
 CAMERA = 1
@@ -84,11 +87,14 @@ def _sentence(option: str, more: str = "") -> str:
     return f"{what[0].upper()}{what[1:]}{more}."
 
 
-def _number(option: str, name: str, bounds: str, more: str = "") -> str:
+def _number(option: str, more: str = "") -> str:
     """Return the property of an option that is a number; 0 stands for ``None``."""
-    default = _DECLARED[option].default
-    kind = "Int" if isinstance(default, int) else "Double"
+    default, check = _DECLARED[option].default, _DECLARED[option].check
+    kind, name = "Int" if isinstance(default, int) else "Double", option.title().replace("_", "")
     panel = "default" if option == "max_supersegments" else "advanced"
+    bounds = 'min="0"'
+    if isinstance(check, Number) and math.isfinite(check.high):
+        bounds = f'min="{check.low:g}" max="{check.high:g}"'
     return f"""
 <{kind}VectorProperty name="{name}" command="Set{_COMMANDS.get(name, name)}" number_of_elements="1"
                       default_values="{default or 0:g}" panel_visibility="{panel}">
@@ -178,10 +184,10 @@ SOURCE_XML = f"""
   <Documentation>{_sentence("importance", ": pairs of a scalar and a weight")}</Documentation>
   {_WHERE_DEFERRED}
 </DoubleVectorProperty>
-{_number("max_supersegments", "MaxSupersegments", f'min="1" max="{MAX_SUPERSEGMENTS}"')}
-{_number("sample_distance", "SampleDistance", 'min="0"', ". 0: half the smallest spacing")}
-{_number("tolerance", "Tolerance", 'min="0"')}
-{_number("view_cone", "ViewCone", 'min="0" max="90"')}
+{_number("max_supersegments")}
+{_number("sample_distance", ". 0: the default")}
+{_number("tolerance")}
+{_number("view_cone")}
 <StringVectorProperty name="Coverage" command="SetCoverage" number_of_elements="1"
                       default_values="view">
   <StringListDomain name="list"><String value="view" /><String value="bounds" /></StringListDomain>

@@ -101,7 +101,7 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
     htmlElement("dl", {}, ...keys));
 
   const opener = htmlElement("summary", { title: "Settings", label: "Settings" }, strokes(ICONS.settings));
-  const settings = htmlElement("details", {}, opener, panel);
+  const settings = htmlElement("details", { label: "Settings of the picture" }, opener, panel);
   settings.addEventListener("toggle", () => show());
   canvas.addEventListener("pointerdown", () => (settings.open = false), { signal });
   frame.replaceChildren(htmlElement("div", { className: "bar", role: "group", label: "Controls of the picture" },

@@ -1,5 +1,5 @@
 // A VDI's arrays to what the shader reads: textures as typed arrays, made off the main thread.
-import { frameOf, listSpace } from "./rays.js";
+import { frameOf, listSpace, modelPoint, pixelRays } from "./rays.js";
 
 /** Texels in a row of the textures that hold supersegments. */
 export const TEXTURE_WIDTH = 4096;
@@ -21,7 +21,7 @@ export function prepare(vdi) {
   const { windowSize, camera, bounds, level, precision, pictureSize, metadata } = vdi;
   return {
     windowSize, camera, bounds, level, precision, pictureSize, metadata, n, frame, space, packed,
-    ...arrays, step: packed ? vdi.depthStep * frame.scale : 0,
+    ...arrays, boxes: occupiedBoxes(vdi, frame, space, arrays), step: packed ? vdi.depthStep * frame.scale : 0,
     ...(vdi.values && { values: preparedValues(vdi, frame, space) }),
   };
 }
@@ -155,6 +155,23 @@ function occupancy({ windowSize, depthOrigin }, frame, space) {
       if (last >= 32) masks[at + 1] |= bits(Math.max(first - 32, 0), last - 32);
     },
   };
+}
+
+// Corners, model', of a box in list space for each row of stacks that has something.
+function occupiedBoxes({ windowSize, camera, depthOrigin }, frame, space, { masks, stacks: [wide, high] }) {
+  const rays = pixelRays(frame, camera, windowSize), boxes = [];
+  const ends = (axis, first, last) => [first << STACK_SHIFT, (last + 1) << STACK_SHIFT]
+    .map((list, k) => Math.min(list, windowSize[axis]) - windowSize[axis] / 2 + 2 * k - 1);
+  const depths = space.range.map((offset) => offset + depthOrigin * frame.scale)
+    .map((depth) => (space.parallel ? depth : Math.max(depth, 0)) - rays.reference);
+  for (let row = 0; row < high; ++row) {
+    const has = (k) => masks[2 * (row * wide + k)] | masks[2 * (row * wide + k) + 1];
+    const here = Array.from({ length: wide }, (_, k) => k).filter(has);
+    if (!here.length) continue;
+    boxes.push(depths.flatMap((t) => ends(0, here[0], here.at(-1)).flatMap((a) =>
+      ends(1, row, row).map((b) => modelPoint(rays, [a, b], t)))));
+  }
+  return boxes;
 }
 
 // Bits first to last of a word, both included.

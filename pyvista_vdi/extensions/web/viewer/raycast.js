@@ -3,13 +3,15 @@ import { filledTexture, programOf } from "./graphics.js";
 import { AS_MADE } from "./look.js";
 import { TEXTURE_WIDTH } from "./prepare.js";
 import {
-  frameForms, frameOf, isParallel, pixelRays, pixelsOfBounds, pointAlong,
+  frameForms, frameOf, isParallel, pixelRays, pixelsOfBoxes, pointAlong,
 } from "./rays.js";
 import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
 import { MEAN_STEPS, SPREADS, fillTable } from "./values.js";
 
 /** A ray ends where less transmittance than this is left. */
 const TRANSMITTANCE_CUTOFF = 1e-6;
+/** Rows of pixels that are drawn at once. */
+const STRIP = 16;
 /** Opacity, of 255, below which a ray sees too little for its place to be asked for. */
 const LEAST_SEEN = 4;
 
@@ -113,7 +115,7 @@ export class Raycaster {
       gl.uniform1i(u[name], unit);
     });
     gl.bindVertexArray(this.vertices);
-    this.drawWithin(pixelsOfBounds(frame, camera, [width, height]), corner);
+    this.drawStrips(pixelsOfBoxes(frame, camera, [width, height], vdi.boxes), corner, height);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
   }
@@ -146,17 +148,23 @@ export class Raycaster {
     return pointAlong(vdi.frame, rays, [x + 0.5 - width / 2, y + 0.5 - height / 2], t);
   }
 
-  // Draw only where the bounds are seen, within the scissor that is set.
-  drawWithin([[x0, x1], [y0, y1]], [left, bottom]) {
+  // Draw only where something may be seen: strip by strip, from the first to the last such pixel,
+  // within the scissor that is set.
+  drawStrips(boxes, [left, bottom], height) {
     const { gl } = this;
     const set = gl.isEnabled(gl.SCISSOR_TEST) ? gl.getParameter(gl.SCISSOR_BOX) : null;
-    const [firstX, firstY, wide, high] = set ?? [left, bottom, Infinity, Infinity];
-    const [fromX, fromY] = [Math.max(left + x0, firstX), Math.max(bottom + y0, firstY)];
-    const [toX, toY] = [Math.min(left + x1, firstX + wide), Math.min(bottom + y1, firstY + high)];
-    if (fromX >= toX || fromY >= toY) return;
+    const [firstX, firstY, wide, high] = set ?? [left, bottom, Infinity, height];
     gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(fromX, fromY, toX - fromX, toY - fromY);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    for (let row = 0; row < height; row += STRIP) {
+      const here = boxes.filter(([, [y0, y1]]) => y0 < row + STRIP && y1 > row).map(([x]) => x);
+      const x0 = Math.max(left + Math.min(...here.map(([x]) => x)), firstX);
+      const x1 = Math.min(left + Math.max(...here.map(([, x]) => x)), firstX + wide);
+      const y0 = Math.max(bottom + row, firstY);
+      const y1 = Math.min(bottom + Math.min(row + STRIP, height), firstY + high);
+      if (!here.length || x0 >= x1 || y0 >= y1) continue;
+      gl.scissor(x0, y0, x1 - x0, y1 - y0);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    }
     if (set) gl.scissor(...set);
     else gl.disable(gl.SCISSOR_TEST);
   }

@@ -160,11 +160,16 @@ export function formOf(rays, normal, offset) {
   return form;
 }
 
-/** The world's point at view depth t, less the reference, along the ray of a pixel (a, b). */
-export function pointAlong(frame, rays, [a, b], t) {
+/** A point, model', at view depth t, less the reference, along the ray of a pixel (a, b). */
+export function modelPoint(rays, [a, b], t) {
   const [from, towards] = [rays.origin, rays.direction].map(([one, ofA, ofB]) =>
     add(add(one, ofA, a), ofB, b));
-  const point = add(from, towards, t);
+  return add(from, towards, t);
+}
+
+/** The same in the world. */
+export function pointAlong(frame, rays, pixel, t) {
+  const point = modelPoint(rays, pixel, t);
   return times(add(frame.linear.map((row) => dot(row, point)), frame.offset), 1 / frame.scale);
 }
 
@@ -200,20 +205,22 @@ export function frameForms(frame, space, windowSize, rays, parallel, clippingPla
 }
 
 /**
- * The pixels that a VDI's bounds are seen in by a camera: ends along the width and the height, two more
- * to each side, row 0 at the bottom; all of the window where they are not in front of the eye.
+ * The pixels that boxes of eight points, model', are seen in by a camera: ends along the width and the
+ * height of each, two more to each side, row 0 at the bottom; all of the window where one is not in
+ * front of the eye.
  */
-export function pixelsOfBounds(frame, camera, size) {
+export function pixelsOfBoxes(frame, camera, size, boxes) {
   const toView = modelToView(frame, camera);
   const half = halfExtentIn(frame, camera, size), centre = windowCentre(camera);
   const parallel = isParallel(camera);
-  const corners = Array.from({ length: 8 }, (_, corner) =>
-    [...frame.half.map((edge, k) => (corner >> k & 1 ? edge : -edge)), 1]);
-  const seen = corners.map((corner) => toView.map((row) => dot(row, corner)));
-  return [0, 1].map((axis) => {
-    const at = seen.map((point) =>
-      (point[axis] / (parallel ? 1 : point[2]) / half[axis] - centre[axis] + 1) * size[axis] / 2);
-    if (!parallel && seen.some(([, , depth]) => depth <= NEAREST_DEPTH)) return [0, size[axis]];
-    return [Math.max(Math.floor(Math.min(...at) - 2), 0), Math.min(Math.ceil(Math.max(...at) + 2), size[axis])];
+  return boxes.map((corners) => {
+    const seen = corners.map((corner) => toView.map((row) => dot(row, [...corner, 1])));
+    return [0, 1].map((axis) => {
+      const at = seen.map((point) =>
+        (point[axis] / (parallel ? 1 : point[2]) / half[axis] - centre[axis] + 1) * size[axis] / 2);
+      if (!parallel && seen.some(([, , depth]) => depth <= NEAREST_DEPTH)) return [0, size[axis]];
+      return [Math.max(Math.floor(Math.min(...at) - 2), 0),
+        Math.min(Math.ceil(Math.max(...at) + 2), size[axis])];
+    });
   });
 }

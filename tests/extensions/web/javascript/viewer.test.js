@@ -8,7 +8,7 @@ const { inShort } = await viewerModule("html.js");
 const { dragOf, dragged, keyed } = await viewerModule("interaction.js");
 const { textOfView, viewOfText } = await viewerModule("link.js");
 const { AS_MADE, checkedLook, isAsMade } = await viewerModule("look.js");
-const { frameOf, listSpace, pixelRays, pixelsOfBounds, pointAlong } = await viewerModule("rays.js");
+const { frameOf, listSpace, pixelRays, pixelsOfBoxes, pointAlong } = await viewerModule("rays.js");
 const { checkedTransfer, editedFrom } = await viewerModule("values.js");
 const { GrowingBytes, crc32 } = await viewerModule("bytes.js");
 
@@ -106,7 +106,8 @@ test("rays of pixels go through what is seen there", () => {
     const middle = pointAlong(frame, rays, [0, 0], 0); // on the line from the eye to the focal point
     const [toEye, toPoint] = [view.position, middle].map((p) => p.map((x) => x / Math.hypot(...p)));
     assert.ok(Math.hypot(...toEye.map((x, k) => x - toPoint[k])) < 1e-9);
-    const [[x0, x1], [y0, y1]] = pixelsOfBounds(frame, view, [40, 30]);
+    const corners = Array.from({ length: 8 }, (_, k) => frame.half.map((edge, axis) => (k >> axis & 1 ? edge : -edge)));
+    const [[[x0, x1], [y0, y1]]] = pixelsOfBoxes(frame, view, [40, 30], [corners]);
     assert.ok(x0 >= 0 && x1 <= 40 && y0 >= 0 && y1 <= 30 && x1 - x0 > 10);
   }
   const { range, depths: [a, b, c, d], reciprocals: [e, f] } = listSpace(frameOf(seen), seen);
