@@ -119,8 +119,7 @@ def on_cluster(options: Any) -> dict[str, Any]:
                 cluster = stack.enter_context(LocalCluster(n_workers=n, **given))
                 clients[str(n)] = client = stack.enter_context(Client(cluster))
                 for k, at in enumerate(client.nthreads()):
-                    core = {cores[k % len(cores)]}
-                    client.run(lambda core=core: os.sched_setaffinity(0, core), workers=[at])
+                    client.run(os.sched_setaffinity, 0, {cores[k % len(cores)]}, workers=[at])
             before, seconds = client.run(peak), {n: [] for n in clients}
             for turn in range(options.repeats + 1):
                 for n, client in clients.items():
