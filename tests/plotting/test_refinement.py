@@ -119,7 +119,7 @@ def test_what_memory_cannot_hold_is_not_read(store, plotter, monkeypatch):
     def refuse(nbytes, what, remedy):
         raise pvdi.DeviceMemoryError(f"{what} needs {nbytes} bytes: {remedy}")
 
-    monkeypatch.setattr(refinement, "require_free_memory", refuse)
+    monkeypatch.setattr(refinement, "require_host_memory", refuse)
     look_from(plotter, 40)
     with pytest.warns(pvdi.VDIWarning, match="level 0 of .* bytes"):
         picture(plotter)
