@@ -73,7 +73,7 @@ class Source:
         self._options, self._lists = options, lists
         # What is wrong with the look or the step is refused now, not to a client
         first, table = self._volume(0), self._transfer_function(0, ())
-        begun = {"cmap": looks.cmap, "opacity": looks.opacity}
+        begun: dict[str, Any] = {"cmap": looks.cmap, "opacity": looks.opacity}
         checked_sample_distance(first, options.sample_distance)
         free = find_spec("pyvista") is not None and not first.rgba and not looks.in_place
         self.offer: dict[str, Any] = {
