@@ -98,6 +98,7 @@ class Driver:
         self._astray = False  # whether something else than the actor draws
         # What the last frame showed, and by what
         self._images, self._last = Images(), NOTHING
+        self._stand_in = False  # whether that was a volume whose VDI is to come
         self._texture, self._no_depth, self._scissor = ImageTexture(), NoDepth(), Scissor()
         self._selection, self._scene_at_hand = Selection(), SceneAtHand(self._say_not_exported)
         self._view: View | None = None
@@ -276,6 +277,7 @@ class Driver:
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image: one that is kept, or a new one."""
         frame = self._showing(Frame.current(renderer, self._actor(), mapper))
+        self._stand_in = frame is not None and frame.stand_in
         if frame is None:
             return self._last
         window, settings = self.window, self.settings
@@ -824,7 +826,7 @@ class Driver:
             progress=self._background.progress,
             generation=self._generation,
             vdi=vdi,
-            stand_in=last.stand_in,
+            stand_in=self._stand_in,
             drawn=last.way,
             time=None if player is None else player.time,
             level=self.level,
