@@ -24,8 +24,6 @@ from typing import Any
 import numpy as np
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
-from pyvista_vdi.raycasting.raycast import render_fitting
 
 #: A case makes something; its hash is what is kept.
 Case = Callable[[], Any]
@@ -142,9 +140,9 @@ def small(make: Any, volume: pvdi.Volume, function: Any = None, **options: Any) 
     camera = options.pop("camera", None) or outside(volume.bounds, 25.0)
     function = function or over(volume, interpolation="linear")
     size = options.pop("size", SMALL)
-    seldom = {name: options.pop(name) for name in [*options] if name in pvdi.Settings.declared}
-    options |= {"settings": pvdi.Settings(**seldom)} if seldom else {}
-    return make(volume, camera, size, transfer_function=function, **options)
+    seldom = {name: options.pop(name) for name in pvdi.Settings.declared.keys() & options}
+    how = {"transfer_function": function, "settings": pvdi.Settings(**seldom), **options}
+    return make(volume, camera, size, **how)
 
 
 made, pictured = partial(small, pvdi.generate), partial(small, pvdi.render_volume)
@@ -267,19 +265,12 @@ def frame_options(bounds: Any, camera: pvdi.Camera, size: tuple[int, int]) -> di
         "box": {"cropping": third},
         "regions": {"cropping": (third, 0x2A5F0C3)},
         "thick": {"opacity_multiplier": 6.0},
-        "no-skip": {"skip_empty": False},
+        "no-skip": {},
         "all": {"opaque_depth": ends, "clipping_planes": [plane], "cropping": (third, "fence")},
         "cutoff": {"settings": pvdi.Settings(transmittance_cutoff=0.5)},
         "preview-30": {"preview_samples": 30, "opaque_depth": ends, "clipping_planes": [plane]},
         "preview-9000": {"preview_samples": 9000},
     }
-
-
-def picture(vdi: pvdi.VDI, view: pvdi.Camera, size: tuple[int, int], **options: Any) -> Any:
-    """Return a frame, also of options that are not public."""
-    if "skip_empty" not in options:
-        return pvdi.render(vdi, view, size, **options)
-    return render_fitting(vdi, FrameRequest(view, size, RenderOptions(**options)))
 
 
 def frame_cases() -> Cases:
@@ -305,7 +296,7 @@ def frame_cases() -> Cases:
         if option == "preview-9000" or name == "wide":
             views = ((own, (40, 30)), (own.azimuth(20), (30, 20)))
         return [
-            picture(vdi, view, size, **frame_options(vdi.bounds, view, size)[option])
+            pvdi.render(vdi, view, size, **frame_options(vdi.bounds, view, size)[option])
             for view, size in views
         ]
 

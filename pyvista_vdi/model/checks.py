@@ -83,7 +83,8 @@ class Number:
         number = as_whole(value) if self.whole else as_number(value)
         at_end = number in (self.low, self.high) and self.open_ended
         if not self.low <= number <= self.high or number == math.inf or at_end:
-            raise not_taken(value)(f"{self.name} must be {self.wanted}; got {value!r}")
+            error = InvalidArgumentTypeError if math.isnan(number) else InvalidArgumentError
+            raise error(f"{self.name} must be {self.wanted}; got {value!r}")
         return int(number) if self.whole else number
 
 

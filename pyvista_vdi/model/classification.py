@@ -19,7 +19,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.model.arguments import refuse_unknown
-from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.checks import Number, one_of
 from pyvista_vdi.model.options import Options, declared, option, record
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
@@ -127,7 +127,12 @@ class Look(Described):
     clim: RangeLike | None = option(
         None, "range of the colour map; that of all values by default", aliases=("rng",)
     )
-    n_colors: int = option(256, "entries of the colour map")
+    n_colors: int = option(
+        256,
+        "entries of the colour map",
+        # Building more takes PyVista time by the square, some seconds here
+        check=Number("a whole number from 1 to 16384", 1, 16384, whole=True),
+    )
     opacity: OpacityLike = option(
         "linear",
         "name, one opacity, or opacities",
@@ -142,6 +147,7 @@ class Look(Described):
         None,
         "length over which opacities are reached, model units; the volume's diagonal over its mean "
         "number of cells by default",
+        check=Number("a positive length in model units", open_ended=True),
         aliases=("unit_distance",),
     )
     log_scale: bool = option(False, "map values to colours by their logarithm")

@@ -264,6 +264,8 @@ class MediumOptions(Options):
 class GenerationOptions(MediumOptions):
     """How a VDI is made."""
 
+    elsewhere = "it says how a VDI is made: give it to generate, or to add_vdi with a volume"
+
     max_supersegments: int = option(
         20,
         f"longest list, 1 to {MAX_SUPERSEGMENTS}",
@@ -374,6 +376,8 @@ class Deferral(Options):
 @dataclass(frozen=True)
 class QualityTarget(Options):
     """What is asked of a VDI in place of settings, which are chosen to reach it: docs/dial.md."""
+
+    elsewhere = GenerationOptions.elsewhere
 
     quality: Quality | None = option(
         None,

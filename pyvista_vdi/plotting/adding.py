@@ -242,52 +242,55 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
         shown = _deferred(first, asked)
     else:
         shown = _volume_shown(first, asked, plotter, stored)
-    actor = PlotterVDIActor()
+    actor, mapper = PlotterVDIActor(), _mapper(shown, asked, plotter._theme)
     if shown.prop is not None:
         actor.prop = shown.prop
-    mapper = _mapper(shown, asked, plotter._theme)
     thing = shown.thing if several is None else several
-    if isinstance(thing, VDI | VDICollection | DeferredInput):
+    if isinstance(thing, VDISource):
+        mapper.SetInputConnection(thing.GetOutputPort())
+        mapper.driver.input.of_scene = True
+    else:
         mapper.SetInputData(thing)
         if shown.prop is not None:  # which classifies what keeps values
             mapper.driver.input.prop = shown.prop
         if isinstance(first, DeferredVDI):
             mapper.driver.input.vdi()  # refuse now what cannot be classified, and warn once
-    else:
-        mapper.SetInputConnection(thing.GetOutputPort())
-        mapper.driver.input.of_scene = True
     actor.mapper = mapper
-    place = asked.place
-    actor.user_matrix = np.eye(4) if place.user_matrix is None else place.user_matrix
+    matrix = asked.place.user_matrix
+    actor.user_matrix = np.eye(4) if matrix is None else matrix
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
-    render = not plotter._first_time if place.render is None else place.render
-    camera = plotter.renderer.camera  # plotter.camera would set it
-    touched = camera.is_set or camera.parallel_projection
-    own = _own(first, several)
-    opens = own is not None and place.reset_camera is not False and not touched
     with _all_or_nothing(plotter, actor):
-        plotter.add_actor(
-            actor,
-            reset_camera=False if opens else place.reset_camera,
-            name=place.name,
-            culling=place.culling,
-            pickable=place.pickable,
-            render=render and not opens,
-        )
-        if opens:  # from its own view: others may show little of it
-            aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
-            if place.reset_camera:
-                plotter.reset_camera(render=False)
-            plotter.renderer.reset_camera_clipping_range()
-            if render:
-                plotter.render()
-        themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
-        if themed if shown.bar is None else shown.bar:
-            plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
+        _put(plotter, actor, _own(first, several), shown, asked.place)
     if stored is not None:
         actor._refinement = Refinement(actor, plotter.renderer, stored)
     plotter.renderer.Modified()
     return actor
+
+
+def _put(plotter: Any, actor: Any, own: Any, shown: _Shown, place: Placement) -> None:
+    """Put an actor and its scalar bar into a plotter, which opens from the view of its ``own``."""
+    render = not plotter._first_time if place.render is None else place.render
+    camera = plotter.renderer.camera  # plotter.camera would set it
+    touched = camera.is_set or camera.parallel_projection
+    opens = own is not None and place.reset_camera is not False and not touched
+    plotter.add_actor(
+        actor,
+        reset_camera=False if opens else place.reset_camera,
+        name=place.name,
+        culling=place.culling,
+        pickable=place.pickable,
+        render=render and not opens,
+    )
+    if opens:  # from its own view: others may show little of it
+        aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
+        if place.reset_camera:
+            plotter.reset_camera(render=False)
+        plotter.renderer.reset_camera_clipping_range()
+        if render:
+            plotter.render()
+    themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
+    if themed if shown.bar is None else shown.bar:
+        plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
 
 
 def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
