@@ -380,15 +380,15 @@ class Driver:
         vdi = source.last()
         if vdi is None:
             return None
+        shown = frame.showing(vdi, number_of(vdi))
         if self.settings.regenerate == "auto":
-            seen = self._as_made(vdi, frame.showing(vdi, number_of(vdi)))
+            seen = self._as_made(vdi, shown)
             cone = vdi.metadata.get("view_cone")
             cone = cone if isinstance(cone, int | float) else _VIEW_CONE
             for cause, message in lacking(seen, cone, source.remedy):
                 # Once for all VDIs of one view, such as the steps of a series
                 self._warnings.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
-        full = not self.window.previews(self.settings)
-        return replace(frame.showing(vdi, number_of(vdi)), full=full)
+        return replace(shown, full=not self.window.previews(self.settings))
 
     def _planned(
         self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool
