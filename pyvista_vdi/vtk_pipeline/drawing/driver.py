@@ -100,6 +100,7 @@ class Driver:
         self._images, self._last = Images(), NOTHING
         self._stand_in = False  # whether that was a volume whose VDI is to come
         self._texture, self._no_depth, self._scissor = ImageTexture(), NoDepth(), Scissor()
+        self._style: tuple[bool, bool] | None = None  # how the shader shows it, in no selection
         self._selection, self._scene_at_hand = Selection(), SceneAtHand(self._say_not_exported)
         self._view: View | None = None
         self._counted = self._generation = 0  # the VDI that was shown last, and how many were
@@ -142,7 +143,7 @@ class Driver:
                 "this VDIMapper is already behind another VDIActor: give each actor its own "
                 "(the VDI itself can be shared)"
             )
-        self._actor = weakly(actor)
+        self._actor, self._style = weakly(actor), None
 
     def leave_actor(self, actor: Any) -> None:
         """Forget that actor, if it is this one."""
@@ -247,8 +248,10 @@ class Driver:
         effects = effects_without(renderer)
         for text in effects.values():
             self._warnings.warn(text)
-        peeled = "vtkDualDepthPeelingPass" in effects
-        self._selection.leave(actor, occluded="vtkSSAOPass" in effects, peeled=peeled)
+        style = ("vtkSSAOPass" in effects, "vtkDualDepthPeelingPass" in effects)
+        if style != self._style:
+            self._selection.leave(actor, occluded=style[0], peeled=style[1])
+            self._style = style
         with suppress(VDIError):  # which what is drawn says
             self.box.Update()
         drawn = self._last = self._guarded(self._paint, mapper, renderer) or self._last
@@ -918,7 +921,7 @@ class Driver:
 
     def _select(self, mapper: Any, renderer: Any) -> None:
         """Draw what can be picked of what the last frame showed, or the first would show."""
-        actor, selection = self._actor(), self._selection
+        actor, selection, self._style = self._actor(), self._selection, None
         selection.enter(actor, renderer.GetSelector())
         seen = None
         try:
