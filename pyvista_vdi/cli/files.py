@@ -71,7 +71,7 @@ def convert(options: argparse.Namespace) -> int:
     if options.thickness is not None:
         foreign["thickness"] = options.thickness
     with inputs.measuring("converting") as bar:
-        vdi = read(options.file, progress=inputs.part(bar, 0.0, 0.5, "reading"), **foreign)
+        vdi: Any = read(options.file, progress=inputs.part(bar, 0.0, 0.5, "reading"), **foreign)
         page = inputs.keeps_values(vdi) and getattr(format_named(target), "page", False)
         colors = target.suffix != ".vdi" and not page
         look = inputs.look_for(options, vdi, options.file, colors=colors)

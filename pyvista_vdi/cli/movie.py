@@ -70,7 +70,7 @@ def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], li
     shown: Any
     draw: Any = render_volume if inputs.is_volume(options) else render
     if draw is render:
-        shown = read(options.file)
+        shown: Any = read(options.file)
         if look := inputs.look_for(options, shown, options.file):
             shown = shown.classified(**look)
         steps = None if getattr(shown, "times", None) is None else len(shown)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.devices import Candidate, DeviceInfo, bytes_text
+from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.launches import Runtime
 from pyvista_vdi.device.programs import KernelDeclaration
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
@@ -39,8 +39,7 @@ def list_devices() -> list[DeviceInfo]:
     MissingDependencyError
         If pyopencl cannot be imported.
     """
-    candidates, _ = devices.find_candidates()
-    return [_probe(candidate)[0] for candidate in candidates]
+    return [_probe(info)[0] for info in devices.find_devices()[0]]
 
 
 def get_runtime(device: Any = None) -> Runtime:
@@ -86,7 +85,7 @@ def describe_devices() -> str:
     MissingDependencyError
         If pyopencl cannot be imported.
     """
-    infos, (_, notes) = list_devices(), devices.find_candidates()
+    infos, (_, notes) = list_devices(), devices.find_devices()
     best, variable = default_device(infos), devices.DEVICE_VARIABLE
     selector = os.environ.get(variable, "").strip()
     if selector:
@@ -121,9 +120,9 @@ def describe_devices() -> str:
 def _best() -> Runtime:
     """Find the first device that passes the probe, and remember it: the drivers' list is fixed."""
     global _default
-    candidates, notes = devices.find_candidates()
-    for candidate in sorted(candidates, key=lambda c: devices.preference(c.info)):
-        _default = _probe(candidate)[1]
+    infos, notes = devices.find_devices()
+    for info in sorted(infos, key=devices.preference):
+        _default = _probe(info)[1]
         if _default is not None:
             return _default
     raise NoDeviceError(devices.no_device_message(list_devices(), notes))
@@ -131,16 +130,13 @@ def _best() -> Runtime:
 
 def _named(device: Any, origin: str) -> Runtime:
     """Return the runtime of a device that is asked for in any way."""
-    candidates, _ = devices.find_candidates()
-    infos = [candidate.info for candidate in candidates]
+    infos, _ = devices.find_devices()
     same = [
-        each.info
-        for each in candidates
-        if getattr(device, "int_ptr", None) == each.device.int_ptr
-        or (
-            getattr(device, "full_name", None) == each.info.full_name
-            and device.index == each.info.index
-        )
+        info
+        for info in infos
+        if getattr(device, "int_ptr", None) == devices.handles[info.index].int_ptr
+        or (getattr(device, "full_name", None) == info.full_name
+        and device.index == info.index)
     ]
     if isinstance(device, str):
         same = [devices.select(infos, device, origin)]
@@ -154,7 +150,7 @@ def _named(device: Any, origin: str) -> Runtime:
             f"the device {getattr(device, 'full_name', device)} does not exist in this process (a "
             f"sub-device, or a context?); there is {devices.listing(infos)}"
         )
-    probed, runtime = _probe(next(each for each in candidates if each.info.index == same[0].index))
+    probed, runtime = _probe(same[0])
     if runtime is None:
         raise NoDeviceError(_unusable(probed, f"{origin}{device!r}"))
     return runtime
@@ -167,22 +163,21 @@ def _unusable(info: DeviceInfo, asked: str) -> str:
     )
 
 
-def _probe(candidate: Candidate) -> tuple[DeviceInfo, Runtime | None]:
+def _probe(info: DeviceInfo) -> tuple[DeviceInfo, Runtime | None]:
     """Run the probe kernel, once per device and process."""
     with _lock:
-        index = candidate.info.index
-        if index not in _probed:
+        if info.index not in _probed:
             runtime, reason = None, ""
             try:
-                runtime = Runtime(candidate)
+                runtime = Runtime(info)
                 reason = run_probe(runtime)
             except VDIError as exc:
                 reason = f"the probe kernel failed: {exc}"
-            info = replace(candidate.info, usable=not reason, reason=reason)
+            info = replace(info, usable=not reason, reason=reason)
             if runtime is not None:
                 runtime.info = info
-            _probed[index] = (info, None if reason else runtime)
-        return _probed[index]
+            _probed[info.index] = (info, None if reason else runtime)
+        return _probed[info.index]
 
 
 def run_probe(runtime: Runtime) -> str:

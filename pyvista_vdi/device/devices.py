@@ -1,6 +1,6 @@
 """The devices that exist, what is known of each, and which one a selector or the default means.
 
-Everything here but :func:`find_candidates` works on plain :class:`DeviceInfo` lists and needs no
+Everything here but :func:`find_devices` works on plain :class:`DeviceInfo` lists and needs no
 driver.
 """
 
@@ -90,14 +90,6 @@ class DeviceInfo:
     def index(self) -> tuple[int, int]:
         """Platform index and device index: what identifies a device in this process."""
         return (self.platform_index, self.device_index)
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A device that a driver lists: what is known of it, and the driver's own object."""
-
-    info: DeviceInfo
-    device: Any
 
 
 def preference(info: DeviceInfo) -> tuple[int, ...]:
@@ -202,7 +194,9 @@ def bytes_text(nbytes: int) -> str:
 
 
 _lock = threading.RLock()
-_found: tuple[list[Candidate], list[str]] | None = None
+_found: tuple[list[DeviceInfo], list[str]] | None = None
+#: The driver's own object of each device, by its index.
+handles: dict[tuple[int, int], Any] = {}
 #: What to do where no device will do; what is installed already is not advised.
 advice = REMEDY
 #: Whether drivers are here that the threads they work with did not follow into a fork.
@@ -237,7 +231,7 @@ def opencl() -> ModuleType:
 
     MissingDependencyError if it, or the OpenCL loader that it needs, cannot be imported.
     """
-    find_candidates()
+    find_devices()
     # Once it is there without the import system, whose locks a finalizer that frees device memory
     # must not ask for in the middle of an import (Python 3.10 raises KeyError)
     return sys.modules.get("pyopencl") or _import_pyopencl()
@@ -260,7 +254,7 @@ def _import_pyopencl() -> ModuleType:
     return cl
 
 
-def find_candidates() -> tuple[list[Candidate], list[str]]:
+def find_devices() -> tuple[list[DeviceInfo], list[str]]:
     """Return every device of every platform, unprobed, in the drivers' order, listed once.
 
     Also notes on how they were looked for. MissingDependencyError if pyopencl cannot be imported,
@@ -275,15 +269,15 @@ def find_candidates() -> tuple[list[Candidate], list[str]]:
             with drivers_visible() as discovery, pocl_cache_at_hand():
                 early = "pyopencl" in sys.modules
                 cl = _import_pyopencl()
-                candidates, notes = _list(cl)
+                infos, notes = _list(cl)
                 discovery = after_listing(discovery) if early else discovery
             advice = discovery.note if discovery.hidden else REMEDY
-            _found = candidates, [discovery.note, *notes]
+            _found = infos, [discovery.note, *notes]
         return _found
 
 
-def _list(cl: ModuleType) -> tuple[list[Candidate], list[str]]:
-    notes, infos, handles = [], [], []
+def _list(cl: ModuleType) -> tuple[list[DeviceInfo], list[str]]:
+    notes, infos = [], []
     try:
         platforms = cl.get_platforms()
     except cl.Error as exc:  # PLATFORM_NOT_FOUND_KHR: the loader knows no driver
@@ -297,10 +291,10 @@ def _list(cl: ModuleType) -> tuple[list[Candidate], list[str]]:
         for device_index, device in enumerate(devices):
             try:
                 infos.append(_describe(cl, device, platform_index, device_index))
-                handles.append(device)
+                handles[infos[-1].index] = device
             except cl.Error as exc:
                 notes.append(f"device {platform_index}:{device_index} cannot be queried: {exc}")
-    return list(map(Candidate, with_selectors(infos), handles)), notes
+    return with_selectors(infos), notes
 
 
 def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: int) -> DeviceInfo:

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.device.devices import Candidate
+from pyvista_vdi.device.devices import DeviceInfo
 from pyvista_vdi.device.memory import DeviceBuffer, Memory
 from pyvista_vdi.device.programs import Define, Kernel, KernelDeclaration, ProgramCache
 from pyvista_vdi.device.scheduling import Worker
@@ -161,8 +161,8 @@ class Runtime(Memory):
     must have ended before the interpreter does: drivers do not survive use at exit.
     """
 
-    def __init__(self, candidate: Candidate) -> None:
-        super().__init__(candidate)
+    def __init__(self, info: DeviceInfo) -> None:
+        super().__init__(info)
         self._programs = ProgramCache(self._context, self._device)
 
     def bind(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.devices import Candidate, DeviceInfo, bytes_text
+from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
@@ -150,13 +150,12 @@ class Memory(Turns):
 
     allocated = peak_allocated = 0
 
-    def __init__(self, candidate: Candidate) -> None:
+    def __init__(self, info: DeviceInfo) -> None:
         super().__init__()
         self.cl: Any = devices.opencl()
-        self.info: DeviceInfo = candidate.info
-        self.is_cpu = candidate.info.kind == "CPU"
-        self._device = candidate.device
-        self.vector_floats = int(candidate.device.native_vector_width_float)
+        self.info, self.is_cpu = info, info.kind == "CPU"
+        self._device = devices.handles[info.index]
+        self.vector_floats = int(self._device.native_vector_width_float)
         with self.failing("making a context"):
             self._context = self.cl.Context([self._device])
         self._queues: list[Any] = []  # that of all threads first

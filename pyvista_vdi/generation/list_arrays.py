@@ -46,6 +46,7 @@ class ListsOnDevice:
     ) -> None:
         offsets.setflags(write=False)
         self.offsets, self._runtime, self._buffers = offsets, runtime, buffers
+        self.nbytes = offsets.nbytes + SUPERSEGMENT_BYTES * int(offsets[-1])
         self._arrays: Arrays | None = None
         self._lock = threading.Lock()
         _latest[runtime] = weakref.ref(self)

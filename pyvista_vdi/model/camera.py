@@ -84,7 +84,7 @@ class Camera:
         parallel to the direction of projection, or ``model_transform`` cannot be inverted.
     """
 
-    __slots__ = ("_axes", "_key", "_model_to_view", *_STATE)
+    __slots__ = ("_key", "_model_to_view", "axes", *_STATE)
 
     position: tuple[float, float, float]
     focal_point: tuple[float, float, float]
@@ -95,6 +95,8 @@ class Camera:
     window_center: tuple[float, float]
     use_horizontal_view_angle: bool
     model_transform: Matrix
+    #: Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows.
+    axes: Matrix
 
     def __init__(
         self,
@@ -126,7 +128,7 @@ class Camera:
             object.__setattr__(self, name, value)
         checked["model_transform"] = self.model_transform.tobytes()
         object.__setattr__(self, "_key", tuple(checked.values()))
-        object.__setattr__(self, "_axes", self._checked_axes())
+        object.__setattr__(self, "axes", self._checked_axes())
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Camera cannot be changed (tried to set {name!r}): use replace()")
@@ -314,11 +316,6 @@ class Camera:
         )
 
     @property
-    def axes(self) -> Matrix:
-        """Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows."""
-        return self._axes  # type: ignore[attr-defined, no-any-return]
-
-    @property
     def view_matrix(self) -> Matrix:
         """World to view space (X right, Y up, Z forward, world units), float64 (4, 4)."""
         axes = self.axes
@@ -456,16 +453,17 @@ class Camera:
         if not np.any(self.view_up):
             raise InvalidCameraError("view_up is the zero vector: give the direction that is up")
         # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
-        if _length(_cross(_unit(forward), _unit(np.asarray(self.view_up)))) < 1e-12:
+        across = _cross(_unit(forward), _unit(np.asarray(self.view_up)))
+        if math.sqrt(across @ across) < 1e-12:
             raise InvalidCameraError(
                 f"view_up {self.view_up} is parallel to the direction of projection "
                 f"{tuple(_unit(forward).tolist())}: choose another up direction"
             )
         # By a power of two, which rounds nothing: squares may overflow
         forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
-        forward = forward / _length(forward)
+        forward = forward / math.sqrt(forward @ forward)
         right = _cross(forward, _unit(np.asarray(self.view_up)))
-        right /= _length(right)
+        right /= math.sqrt(right @ right)
         axes = np.array([right, _cross(right, forward), forward])
         axes.setflags(write=False)
         return axes
@@ -505,15 +503,11 @@ def _affine(value: ArrayLike | None) -> Matrix:
 def _unit(vector: Matrix) -> Matrix:
     # Scaled first: the square of a component may overflow or vanish though the vector does not
     vector = vector / np.abs(vector).max()
-    return np.asarray(vector / _length(vector))
+    return np.asarray(vector / math.sqrt(vector @ vector))
 
 
-# For three numbers each, of which a frame has dozens: np.cross takes 50 times as long, and
-# np.linalg.norm five times. The same bits.
-
-
-def _length(vector: Matrix) -> float:
-    return math.sqrt(vector @ vector)
+# For three numbers, of which a frame has dozens: np.cross takes 50 times as long, and
+# np.linalg.norm, in place of the root of a product, five times. The same bits.
 
 
 def _cross(a: Matrix, b: Matrix) -> Matrix:

@@ -107,13 +107,7 @@ class Light:
 
     @classmethod
     def from_any(cls, light: Any) -> Light:
-        """Return a ``Light``, ``vtkLight`` or ``pyvista.Light`` as a :class:`Light`.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none of them.
-        """
+        """Return a ``Light``, ``vtkLight`` or ``pyvista.Light`` as a :class:`Light`."""
         if isinstance(light, Light):
             return light
         if not hasattr(light, "GetTransformedPosition"):

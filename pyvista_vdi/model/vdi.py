@@ -223,9 +223,11 @@ class VDI(Lists):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the arrays and of what makes them, as far as these are in memory."""
-        arrays = self._arrays or ()
-        return sum(array.nbytes for array in arrays) + getattr(self.late, "nbytes", 0)
+        """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
+        if self._arrays is None:
+            return getattr(self.late, "nbytes", 0)
+        packed = 0 if self.packing is None else self.packing.nbytes
+        return sum(array.nbytes for array in self._arrays) + packed
 
     @property
     def precision(self) -> str:
@@ -392,10 +394,11 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
 
 
 def _read_only(arrays: Arrays) -> Arrays:
-    views: Any = Arrays(*(array.view() for array in arrays))  # type: ignore[arg-type]
+    given: Any = arrays
+    views = Arrays(*map(np.ndarray.view, given))
     for view in views:
         view.setflags(write=False)  # the caller's own stay writable
-    return views  # type: ignore[no-any-return]
+    return views
 
 
 def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: float) -> None:

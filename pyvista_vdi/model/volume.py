@@ -31,15 +31,16 @@ class Geometry:
     #: multi-scale store has the finest level's, so that all levels look the same; model units.
     unit_distance: float | None = None
 
-    @property
+    @functools.cached_property
     def index_to_model(self) -> NDArray[np.float64]:
         """Point index (x, y, z) to model coordinates, float64 (4, 4)."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.direction * np.asarray(self.spacing)
         matrix[:3, 3] = self.origin
+        matrix.setflags(write=False)
         return matrix
 
-    @property
+    @functools.cached_property
     def bounds(self) -> tuple[float, float, float, float, float, float]:
         """Axis-aligned bounds in the model frame: x0, x1, y0, y1, z0, z1; model units."""
         axes = self.index_to_model[:3, :3] * (np.asarray(self.dimensions) - 1)

@@ -383,7 +383,7 @@ class Cells:
         self._size = size
         self._edges = [min(edge, s - 2 * REACH) for s in size]
         axes = zip(region.first, region.extent, self._edges, size, strict=True)
-        columns, rows = self._starts = [_cell_starts(*of, s - REACH) for *of, s in axes]
+        columns, rows = self._starts = [_cell_starts(f, n, e, s - REACH) for f, n, e, s in axes]
         self._order = _along_curve(len(columns), len(rows))
         column, row = self._order.T
         self.corners = np.stack([columns[column], rows[row]], axis=1) - REACH

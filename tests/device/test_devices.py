@@ -114,9 +114,7 @@ def test_environment_names_the_device(runtime, monkeypatch):
 
 
 def test_every_form_of_device_gives_the_same_runtime(runtime):
-    (device,) = (
-        c.device for c in devices.find_candidates()[0] if c.info.index == runtime.info.index
-    )
+    device = devices.handles[runtime.info.index]
     for form in (runtime, runtime.info, device):
         assert ocl.get_runtime(form) is runtime
     with pytest.raises(NoDeviceError, match="does not exist in this process .*or a context"):
@@ -289,10 +287,10 @@ def test_once_listed_devices_come_without_a_lock():
         "threading.RLock = lambda: made.append(make()) or made[-1]\n"
         "from pyvista_vdi.device import devices\n"
         "threading.RLock = make\n"
-        "devices.find_candidates()\n"
+        "devices.find_devices()\n"
         "found = []\n"
         "asks = threading.Thread(\n"
-        "    target=lambda: found.extend([devices.opencl().__name__, devices.find_candidates()]),\n"
+        "    target=lambda: found.extend([devices.opencl().__name__, devices.find_devices()]),\n"
         "    daemon=True)\n"
         "with contextlib.ExitStack() as held:\n"
         "    assert made\n"

@@ -123,9 +123,7 @@ def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
     assert not list(tmp_path.glob("*.cl"))
     # Where the device can, divisions are rounded correctly; and nothing is relaxed
     cl = devices.opencl()
-    (device,) = (
-        c.device for c in devices.find_candidates()[0] if c.info.index == runtime.info.index
-    )
+    device = devices.handles[runtime.info.index]
     offered = device.single_fp_config & cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
     assert ("-cl-fp32-correctly-rounded-divide-sqrt" in error.options) == bool(offered)
     assert "relaxed" not in error.options

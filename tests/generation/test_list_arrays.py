@@ -95,7 +95,7 @@ def test_lists_stay_in_a_devices_own_memory_until_somebody_wants_them(
     vdi = make(camera)
     monkeypatch.setattr(Runtime, "upload", noted)
     assert np.array_equal(render(vdi, camera, WINDOW, device=runtime), picture)
-    assert vdi.nbytes == 0
+    assert vdi.nbytes == wanted.nbytes
     assert not uploaded & {"list offsets", "front depths", "supersegment colours"}
     before = runtime.allocated
     second = make(camera)
@@ -103,6 +103,9 @@ def test_lists_stay_in_a_devices_own_memory_until_somebody_wants_them(
     third = make(camera)
     assert third.counts.sum() == vdi.n_supersegments
     assert np.array_equal(render(second, camera, WINDOW, device=runtime), picture)
+    before = runtime.allocated
+    assert third.equals(wanted)
+    assert runtime.allocated < before
     assert vdi.equals(wanted)
     assert vdi.with_precision("8-byte").equals(wanted.with_precision("8-byte"))
 

@@ -40,6 +40,9 @@ FLAGS = (
 #: Where pages are, and the viewer's modules beside them; nothing leaves the machine.
 SITE = "http://vdi.test/"
 
+#: The window of a page that has all of it, unless a test says another: pixels take time.
+SMALL = {"width": 320, "height": 200}
+
 #: Milliseconds after which something that should have happened has not.
 LONG = 120_000
 
@@ -344,6 +347,8 @@ def open_page(chromium, shared_pages):
         **options,
     ):
         shared = not (options or name or url)
+        if name or url:
+            options = {"viewport": SMALL} | options
         page = shared_pages.get((script, before)) if shared else None
         fresh = page is None
         if fresh:

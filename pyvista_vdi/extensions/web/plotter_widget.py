@@ -39,7 +39,7 @@ class PlotterWidget(VDIWidget):
         self._renderer = weakref.ref(renderer)  # another one may be active later
         self._picture = picture
         self._rest: asyncio.TimerHandle | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._loop: Any = None
         with suppress(RuntimeError):  # none runs: then the plotter is rendered by who holds it
             self._loop = asyncio.get_running_loop()
         self._look = None if scene.actor is None else look_of(scene.actor)
@@ -49,7 +49,12 @@ class PlotterWidget(VDIWidget):
         self.observe(self._turn, "camera")
         self.observe(self._play, "time")
         me = weakref.ref(self)
-        renderer.AddObserver("EndEvent", lambda *_: (widget := me()) and widget._follow())
+
+        def drawn(*_: Any) -> None:
+            if (widget := me()) is not None:
+                widget._follow()
+
+        renderer.AddObserver("EndEvent", drawn)
         browser.follow(self)
 
     @property
@@ -60,9 +65,9 @@ class PlotterWidget(VDIWidget):
 
     def draw(self) -> None:
         """Render the plotter, if it is there."""
-        self._rest = None
-        if self.window is not None:
-            self._plotter().render()
+        self._rest, plotter = None, self._plotter()
+        if plotter is not None and plotter.render_window is not None:
+            plotter.render()
 
     def _turn(self, change: Any) -> None:
         """Set the renderer's camera to the one that has changed in the browser, or here."""

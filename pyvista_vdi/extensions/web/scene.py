@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -50,6 +51,11 @@ class Scene:
     left_out: list[str]  # what is not shown, by name
 
 
+def is_vdi(prop: Any) -> bool:
+    """Whether a prop shows a VDI."""
+    return isinstance(prop, VDIActorMethods)
+
+
 def scenes_of(plotter: Any, where: str, *, follow: bool = False) -> list[Scene]:
     """Return what each renderer of a plotter that has been drawn shows; warn of what is left out.
 
@@ -72,14 +78,14 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     names = {prop: name for name, prop in getattr(renderer, "actors", {}).items()}
     left_out = _effects(renderer)
     meshes: list[dict[str, Any]] = []
-    vdis: list[tuple[Any, Any, VDI, dict[str, Any]]] = []
+    vdis: list[Any] = []  # tuples of the actor, the series or set, the VDI, and where it is seen
     flat: list[Any] = []
     of_this_view: list[Any] = []
 
     # Sort what is drawn into VDIs, meshes and what is flat
     for prop in filter(lambda prop: prop.GetVisibility(), renderer.GetViewProps()):
         missing: list[str] = []
-        if isinstance(prop, VDIActorMethods):
+        if is_vdi(prop):
             matrix, several = as_array(prop.GetMatrix()), prop.series or prop.vdi_set
             vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
             if vdi is not None:
@@ -98,7 +104,7 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
         else:
             missing.append("all of it")
         # By the name that it was given, or else its class
-        name = names.get(prop, "").partition("(Addr")[0] or type(prop).__name__
+        name = re.split(r"\((?:Addr|0x)", names.get(prop, ""))[0] or type(prop).__name__
         left_out += [f"{what} ({name})" for what in missing]
     vdis.sort(key=lambda each: each[1] is None)
     boxes = [np.reshape(actor.GetBounds(), (3, 2)).T for actor, *_ in vdis]
@@ -120,14 +126,14 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
             for k, (_, _, vdi, limits) in enumerate(vdis)
         ],
     }
-    actor, several, shown, _ = vdis[0] if vdis else (None, None, None, None)
+    first: Any = vdis[0] if vdis else (None, None, None, {"planes": []})
+    actor, several, shown, limits = first
     if several is not None:
         if several.value_range is not None:  # pages show colours
             several = several.classified(volume_property=actor.GetProperty())
         factor = actor.opacity_multiplier
         shown = several if factor == 1 else several._mapped(lambda vdi: _thinned(vdi, factor))
-    planes = vdis[0][3]["planes"] if vdis else []
-    return Scene(shown, actor, planes, _packed(head), _background(renderer), left_out)
+    return Scene(shown, actor, limits["planes"], _packed(head), _background(renderer), left_out)
 
 
 def state_of(renderer: Any) -> Any:
@@ -135,7 +141,7 @@ def state_of(renderer: Any) -> Any:
     states: list[Any] = []
     for prop in renderer.GetViewProps():
         own = prop.GetRedrawMTime()
-        if isinstance(prop, VDIActorMethods):  # its mapper is modified in each frame
+        if is_vdi(prop):  # its mapper is modified in each frame
             own = (look_of(prop), as_array(prop.GetMatrix()).tolist(), _planes(prop, []))
         states.append((prop.GetAddressAsString(""), bool(prop.GetVisibility()), own))
     others = [(other.GetAddressAsString(""), other.GetViewport()) for other in _around(renderer)]

@@ -371,8 +371,9 @@ def serve(
     several = hasattr(volume, "__len__") and hasattr(volume, "__getitem__") and not single
     steps: Any = volume if several else [volume]
     source = Source(steps, looks, options, lists=lists, device=device)
-    listening = {"host": host, "port": port, "token": token, "hosts": hosts}
-    server = Server(source, max_clients=max_clients, **listening).start()
+    server = Server(
+        source, host=host, port=port, token=token, hosts=hosts, max_clients=max_clients
+    ).start()
     if announce is not None:
         announce(f"Serving at {server.url} (Ctrl-C ends it)")
     if wait:

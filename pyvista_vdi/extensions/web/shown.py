@@ -102,7 +102,7 @@ def file_of(
     """
     stream = io.BytesIO()
     if isinstance(shown, VDISeries | VDISet):
-        options = {"precision": precision, "compression": DEFLATE, "level": level}
+        options: Any = {"precision": precision, "compression": DEFLATE, "level": level}
         first = write_several(stream, shown, progress=progress, **options)
         return stream.getvalue(), first
     kept = shown.with_precision(precision)

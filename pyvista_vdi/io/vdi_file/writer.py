@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
 from pyvista_vdi.io.vdi_file.coarse import coarser
+from pyvista_vdi.io.vdi_file.codes import channel_differences, stored_rows
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -29,7 +30,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     layouts,
     version_of,
 )
-from pyvista_vdi.model.packing import DEPTH_CODES, channel_differences, stored_rows
+from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.vdi import VDI, Lists
 from pyvista_vdi.model.whole_file import whole_file
 

@@ -121,7 +121,7 @@ class Driver:
         self._pictures, self._costs = Pictures(), Costs()
         self._seen: Seen | None = None  # the last frame that somebody watched
         self._stamp: Any = None  # of all that it depended on
-        self._moved_at, self._number = -math.inf, None
+        self._moved_at, self._number = -math.inf, (0, 0)  # and of what frame of which window
         self._pixels = 0.0  # of the last frame, in which the volume may be seen
         if failures:
             self._failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
@@ -553,11 +553,10 @@ class Driver:
                 for_view = not (seen.stale or seen.chosen)
                 self._making = Making(request.content, planned.make, for_view)
                 self._background.generate(request)
-        vdi, request = source.last(), source.source.GetCurrentRequest()
-        if planned.estimate == "background" and vdi is not None and request is not None:
-            made = seen.made
-            assert made is not None
-            self._background.estimate(made.number, vdi, request, seen.view, made.options)
+        if planned.estimate == "background":
+            vdi, of, made = source.last(), source.source.GetCurrentRequest(), seen.made
+            assert vdi is not None and of is not None and made is not None  # noqa: PT018
+            self._background.estimate(made.number, vdi, of, seen.view, made.options)
         if planned.update:
             self._update(source)
 
@@ -612,6 +611,8 @@ class Driver:
         self._background.drop_vdi()
         self._background.drop_estimate()
         self._making = None
+        if self.settings.draw == "vdi":
+            self._volume = None  # which stood in
 
     def _fail(self, error: BaseException) -> None:
         """Note that a VDI cannot be made of what there is now, and say it once."""

@@ -324,11 +324,11 @@ class VDIMapperMethods(ArrayChoiceMethods):
     # In VTK's GPU mapper SetAutoAdjustSampleDistances would draw VTK's own volume into a smaller
     # framebuffer, so its own switch stays off, and what is called from Python keeps ours.
 
-    def AutoAdjustSampleDistancesOn(self) -> None:
+    def AutoAdjustSampleDistancesOn(self: Any) -> None:
         """Draw previews."""
         self.SetAutoAdjustSampleDistances(True)
 
-    def AutoAdjustSampleDistancesOff(self) -> None:
+    def AutoAdjustSampleDistancesOff(self: Any) -> None:
         """Draw every frame in full."""
         self.SetAutoAdjustSampleDistances(False)
 

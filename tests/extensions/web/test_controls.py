@@ -16,8 +16,8 @@ from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.standard_cases import filling_camera
 
 #: Of pictures that are compared, and of viewers: large enough for a bar and its settings.
-SIZE, ROOM = (161, 91), (420, 480)
-PHONE = {"viewport": {"width": 390, "height": 700}, "has_touch": True, "is_mobile": True}
+SIZE, ROOM = (161, 91), (480, 330)
+PHONE = {"viewport": {"width": 390, "height": 500}, "has_touch": True, "is_mobile": True}
 
 BAR = ["Reset the view", "Save the picture (PNG)", "Full screen", "Settings"]
 AXES = {"+x": (1, 0, 0), "\u2212x": (-1, 0, 0), "+y": (0, 1, 0), "\u2212y": (0, -1, 0)}
@@ -76,7 +76,8 @@ def from_disk(open_page, tmp_path):
             path.write_bytes(page_of(shown))
         else:
             shown.save(path, transfer_function=look(START))
-        options = {"viewport": {"width": ROOM[0], "height": ROOM[1]}, **options}
+        if settings:
+            options = {"viewport": {"width": 300, "height": 420}, **options}
         page = open_page(url=path.as_uri() + hash_, **options)
         page.ready()
         if settings:
@@ -164,9 +165,9 @@ def test_keys_reach_and_use_every_control(vdi, ball):
     ball.wait_for("document.fullscreenElement === null")
 
 
-@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("width", [390, 600])
 def test_settings_do_not_cover_the_picture_of_a_narrow_page(width, kept, from_disk):
-    viewport = {"width": width, "height": 700}
+    viewport = {"width": width, "height": 400}
     options = {"viewport": viewport, "color_scheme": "dark", "reduced_motion": "reduce"}
     page = from_disk(kept, settings=True, **options)
     style = """(name) => {
@@ -185,13 +186,13 @@ def test_settings_do_not_cover_the_picture_of_a_narrow_page(width, kept, from_di
     for box in (panel, bar):
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= width
-        assert box["y"] + box["height"] <= 700
+        assert box["y"] + box["height"] <= 400
     assert panel["y"] >= bar["y"] + bar["height"]
     if width == 390:  # it stands below the picture, which is drawn as high as that is
         assert canvas["y"] + canvas["height"] <= panel["y"]
-        page.wait_for("viewer.shadowRoot.querySelector('canvas').height === 350")
+        page.wait_for("viewer.shadowRoot.querySelector('canvas').height === 200")
         page.page.emulate_media(media="print")
-        assert page.page.locator("vdi-viewer canvas[role]").bounding_box()["height"] == 700
+        assert page.page.locator("vdi-viewer canvas[role]").bounding_box()["height"] == 400
 
 
 def test_fingers_reach_it(kept, from_disk):
@@ -368,9 +369,9 @@ def test_mouse_and_keys_edit_and_a_link_has_it(kept, from_disk):
     names = tabbed(page)
     assert names == [*BAR, "Settings", *VIEWS, *EDITOR, *CLIPS, "As it was made"]
     assert not nameless(page)
-    slider = page.page.get_by_role("slider", name="Point 2 of 3")
-    slider.scroll_into_view_if_needed()
-    point, mouse = slider.bounding_box(), page.page.mouse
+    page.evaluate("viewer.shadowRoot.querySelector('.panel').scrollTop = 0")
+    point = page.page.get_by_role("slider", name="Point 2 of 3").bounding_box()
+    mouse = page.page.mouse
     x, y = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
     mouse.move(x, y)
     mouse.down()

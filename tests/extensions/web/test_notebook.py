@@ -394,7 +394,7 @@ def test_a_view_that_rests_gets_a_vdi_of_its_own(plotter):
     """As in a window on the screen, and seen by the viewer, in the loop that cells run in."""
 
     async def in_a_kernel():
-        actor = add_ball(plotter, settings=pvdi.Settings(regenerate_below=1.0))
+        actor = add_ball(plotter, draw="vdi", settings=pvdi.Settings(regenerate_below=1.0))
         widget = show(plotter)
         first, file = widget.vdi, file_of(widget)
         turned = viewer_camera(pvdi.Camera.from_any(plotter.camera).azimuth(70))

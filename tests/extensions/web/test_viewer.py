@@ -10,8 +10,8 @@ from rewriting import described
 from skimage.io import imread
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.web.placing import thinned
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.vdi import VDI
 
 #: Odd, so that no ray of a smaller picture runs along a border of lists.
 SIZE = (161, 91)
@@ -110,7 +110,11 @@ def test_looks_are_drawn_as_render_draws_them(vdi, ball):
         return np.abs(ball.screenshot(turned, SIZE) - expected).max()
 
     ball.evaluate("viewer.look = { opacity: 2.5 }")
-    dense = pvdi.render(thinned(vdi, 2.5), turned, SIZE) * 255
+    denser = VDI(
+        vdi.camera, SIZE, vdi.offsets, vdi.front, vdi.back, vdi.color, 2.5 * vdi.optical_depth,
+        vdi.bounds, depth_origin=vdi.depth_origin,
+    )  # fmt: skip
+    dense = pvdi.render(denser, turned, SIZE) * 255
     assert np.abs(dense - own).max() > 10
     assert off(dense) <= 1
     ball.evaluate("viewer.look = { brightness: 1.7 }")
@@ -258,7 +262,7 @@ def test_drags_are_in_the_viewer_s_own_pixels(transform, around):
 
 
 SCROLLED = "<p>above</p>{viewer}" + "<p>below</p>" * 20
-PHONE = {"viewport": {"width": 390, "height": 500}, "has_touch": True, "is_mobile": True}
+PHONE = {"viewport": {"width": 200, "height": 260}, "has_touch": True, "is_mobile": True}
 NARROW = '<meta name="viewport" content="width=device-width">'
 
 
@@ -276,28 +280,28 @@ def touch(page, *fingers):
 
 def test_fingers_turn_pinch_and_scroll_past_it(around):
     """What is under two fingers stays under them: twice as far apart is twice as near."""
-    page = around(SCROLLED, NARROW, size=(390, 500), **PHONE)
+    page = around(SCROLLED, NARROW, size=(200, 260), **PHONE)
     page.ready()
     still = page.evaluate(CAMERA)
-    turned = touch(page, [(195, 300), (345, 300)])
+    turned = touch(page, [(40, 150), (160, 150)])
     assert turned[0] == 0
     assert turned[1] != still
     before = page.evaluate("viewer.camera")
-    touch(page, [(170, 300), (145, 300)], [(220, 300), (245, 300)])
+    touch(page, [(85, 150), (70, 150)], [(115, 150), (130, 150)])
     after = page.evaluate("viewer.camera")
     apart = [np.subtract(c["position"], c["focal_point"]) for c in (before, after)]
     np.testing.assert_allclose(2 * apart[1], apart[0], rtol=1e-3)
     still = page.evaluate(CAMERA)
-    scrolled, camera = touch(page, [(195, 300), (195, 50)])
+    scrolled, camera = touch(page, [(100, 240), (100, 40)])
     assert scrolled > 100
     assert camera == still
     # Where nothing scrolls a finger turns all ways
     page = around(
-        "{viewer}", NARROW + "<style>body { margin: 0 }</style>", size=(390, 500), **PHONE
+        "{viewer}", NARROW + "<style>body { margin: 0 }</style>", size=(200, 260), **PHONE
     )
     page.ready()
     still = page.evaluate(CAMERA)
-    assert touch(page, [(195, 300), (195, 50)])[1] != still
+    assert touch(page, [(100, 240), (100, 40)])[1] != still
 
 
 @pytest.mark.every(3)

@@ -61,7 +61,7 @@ def serve():
 
 def workers_and_warnings(chromium, url):
     """Return how many workers a page of two viewers has, and what it warns of."""
-    page = chromium.new_page()
+    page = chromium.new_page(viewport={"width": 64, "height": 72})
     page.set_default_timeout(LONG)
     warnings = []
     page.on("console", lambda said: warnings.append(said.text) if said.type == "warning" else None)

@@ -334,7 +334,7 @@ export class VDIViewer extends HTMLElement {
 
   /** The time of the step that is shown, or will be when it is decoded; null without a series. */
   get time() {
-    return this.#player && this.#player.time;
+    return this.#player?.time ?? null;
   }
 
   set time(time) {
@@ -344,7 +344,7 @@ export class VDIViewer extends HTMLElement {
 
   /** Whether one step is shown after the other. */
   get playing() {
-    return this.#player !== null && this.#player.playing;
+    return this.#player?.playing ?? false;
   }
 
   /** Show one step after the other, `{rate, loop}`: so many a second, and from the first again. */
@@ -355,7 +355,7 @@ export class VDIViewer extends HTMLElement {
 
   /** Stay at the step that is shown. */
   pause() {
-    this.#player?.pause();
+    this.#player?.pause?.();
   }
 
   #played() {
@@ -381,7 +381,7 @@ export class VDIViewer extends HTMLElement {
     });
     series.changed = () => {
       this.#controls?.show();
-      player.grown?.();
+      if (series.views) player.resume();
       this.#comeToTime();
     };
     [this.#controls, this.#bar].forEach((each) => each?.show());

@@ -36,7 +36,7 @@ export class Player {
       came: (step) => step === this.step && this.#ahead.show(step),
       broken: (step, error) => step === this.step && !this.#playing && failed(error),
     });
-    this.#seek();
+    this.resume();
   }
 
   /** Index of the step that is shown, or will be as soon as it is decoded. */
@@ -47,7 +47,7 @@ export class Player {
   set step(step) {
     this.#place = Math.min(Math.max(Math.round(step), 0), this.#series.length - 1);
     [this.#from, this.#since] = [this.#place, null];
-    this.#seek();
+    this.resume();
     this.#changed();
   }
 
@@ -75,7 +75,7 @@ export class Player {
     this.#place = !loop && step === this.#series.length - 1 ? 0 : step;
     [this.#from, this.#since] = [this.#place, null];
     this.#playing = true;
-    this.#seek(); // what could not be fetched may come now
+    this.resume(); // what could not be fetched may come now
     this.#nextFrame();
     this.#changed();
   }
@@ -83,13 +83,8 @@ export class Player {
   pause() {
     if (!this.#playing) return;
     this.#playing = false;
-    this.#seek(); // where the step was not ready yet
+    this.resume(); // where the step was not ready yet
     this.#changed();
-  }
-
-  /** Go on with what was given up when it was closed. */
-  resume() {
-    this.#seek();
   }
 
   close() {
@@ -97,9 +92,9 @@ export class Player {
     this.#ahead.stop();
   }
 
-  // Have the step that is asked for decoded, unless it is, and shown.
-  #seek() {
-    if (this.#ahead.isReady(this.step)) this.#ahead.show(this.step);
+  /** Have the step that is asked for decoded, also what was given up when this was closed; show it. */
+  resume() {
+    if (this.#ahead.ready.has(this.step)) this.#ahead.show(this.step);
     this.#ahead.want([this.step], true);
   }
 
@@ -115,7 +110,7 @@ export class Player {
     const due = this.#dueAt(now);
     // Further back than a round the same steps come again
     for (let place = due; place > Math.max(this.#place, due - n); --place) {
-      if (this.#ahead.isReady(place % n)) {
+      if (this.#ahead.ready.has(place % n)) {
         this.#place = place;
         this.#ahead.show(place % n);
         this.#changed();
@@ -147,7 +142,7 @@ export class Player {
   #ended() {
     if (this.#loop || !this.#series.complete) return false;
     let last = this.#series.length - 1;
-    while (last > this.#place && this.#ahead.isBroken(last)) --last;
+    while (last > this.#place && this.#ahead.broken.has(last)) --last;
     return this.#place >= last;
   }
 }

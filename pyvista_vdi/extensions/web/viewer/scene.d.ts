@@ -1,6 +1,6 @@
 // What a plotter shows beside a VDI: docs/web.md, "Scenes".
 export class Scene {
-  /** @param bytes What pyvista_vdi.extensions.web.scenes.scene.scene_of makes. */
+  /** @param bytes What pyvista_vdi.extensions.web.scene.scene_of makes. */
   constructor(bytes: Uint8Array);
   readonly loaded: Promise<unknown>;
   readonly whole: Promise<void>;

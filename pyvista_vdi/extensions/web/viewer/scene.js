@@ -1,5 +1,5 @@
 // What a plotter shows beside a VDI: plain meshes, other VDIs, and pictures that VTK has drawn of
-// texts, scalar bars and axes, as web/scenes/scene.py packs them.
+// texts, scalar bars and axes, as web/scene.py packs them.
 import { VDIFileError } from "./bytes.js";
 import { emptyTexture, programOf } from "./graphics.js";
 import { load } from "./loader.js";
@@ -67,7 +67,7 @@ export class Scene {
   /** Whether all of it can be drawn. */
   complete = false;
 
-  /** @param {Uint8Array} bytes What web/scenes/scene.py makes. */
+  /** @param {Uint8Array} bytes What web/scene.py makes. */
   constructor(bytes) {
     /** Fulfilled when meshes and pictures are there. */
     this.loaded = this.#load(bytes);

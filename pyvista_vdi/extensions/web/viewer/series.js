@@ -144,40 +144,33 @@ export class Ahead {
   #series;
   #host; // show(prepared, i) has one drawn; came(i): it is ready; broken(i, error): it cannot be
   #wanted = []; // indices
-  #ready = new Map(); // index -> what prepare.js made of it; what was shown last is last
-  #broken = new Set();
   #working = false;
   #stop = new AbortController();
 
   /** Index of the one that was handed to be drawn. */
   shown = -1;
+  /** What prepare.js made, by index, that was shown last behind the others; and what cannot be. */
+  ready = new Map();
+  broken = new Set();
 
   constructor(series, host) {
     [this.#series, this.#host] = [series, host];
-  }
-
-  isReady(i) {
-    return this.#ready.has(i);
-  }
-
-  isBroken(i) {
-    return this.#broken.has(i);
   }
 
   /** Show one that is ready. */
   show(i) {
     if (this.shown === i) return;
     this.shown = i;
-    const prepared = this.#ready.get(i);
-    this.#ready.delete(i);
-    this.#ready.set(i, prepared);
+    const prepared = this.ready.get(i);
+    this.ready.delete(i);
+    this.ready.set(i, prepared);
     this.#host.show(prepared, i);
   }
 
   /** Have some ready, the first one first; `again`: those that could not be, too. */
   want(indices, again = false) {
     this.#wanted = indices;
-    if (again) this.#broken.clear();
+    if (again) this.broken.clear();
     this.#work();
   }
 
@@ -191,20 +184,20 @@ export class Ahead {
   async #work() {
     if (this.#working) return;
     this.#working = true;
-    const known = (i) => this.#ready.has(i) || this.#broken.has(i);
+    const known = (i) => this.ready.has(i) || this.broken.has(i);
     for (let i; (i = this.#wanted.find((each) => !known(each))) !== undefined;) {
       const { signal } = this.#stop;
       try {
-        this.#ready.set(i, await this.#series.prepared(i, signal));
+        this.ready.set(i, await this.#series.prepared(i, signal));
       } catch (error) {
         if (signal.aborted) continue;
-        this.#broken.add(i);
+        this.broken.add(i);
         this.#host.broken(i, error);
         continue;
       }
-      for (const old of this.#ready.keys()) {
-        if (this.#ready.size <= KEPT) break;
-        if (old !== this.shown && !this.#wanted.includes(old)) this.#ready.delete(old);
+      for (const old of this.ready.keys()) {
+        if (this.ready.size <= KEPT) break;
+        if (old !== this.shown && !this.#wanted.includes(old)) this.ready.delete(old);
       }
       this.#host.came(i);
     }

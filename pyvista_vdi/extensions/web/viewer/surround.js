@@ -33,9 +33,6 @@ export class Surround {
 
   /** Index of the VDI that is nearest to the view. */
   step = -1;
-  /** There is no time in a set. */
-  time = null;
-  playing = false;
 
   /**
    * @param {Series} set Its `views` are the V_Os' cameras, its `bounds` those of the data.
@@ -47,7 +44,7 @@ export class Surround {
     this.#ahead = new Ahead(set, {
       show,
       // Of what is there the nearest, until the very nearest is
-      came: () => this.#ahead.show(this.#order().find((i) => this.#ahead.isReady(i))),
+      came: () => this.#ahead.show(this.#order().find((i) => this.#ahead.ready.has(i))),
       broken: (i, error) => i === this.step && failed(error),
     });
     const middle = [0, 2, 4].map((k) => (set.bounds[k] + set.bounds[k + 1]) / 2);
@@ -61,13 +58,6 @@ export class Surround {
     return this.#ahead.shown === this.step && this.step >= 0;
   }
 
-  pause() {}
-
-  /** Go on with what was given up when it was closed. */
-  resume() {
-    if (this.#here) this.grown();
-  }
-
   close() {
     this.#ahead.stop();
   }
@@ -75,14 +65,15 @@ export class Surround {
   /** Look from a view: show the nearest VDI as soon as it is there. */
   look(camera) {
     this.#here = placeOf(camera, this.#centre);
-    this.grown();
+    this.resume();
   }
 
-  /** Choose among the VDIs that there are by now. */
-  grown() {
+  /** Choose among the VDIs that there are by now, also when what was closed goes on. */
+  resume() {
+    if (!this.#here) return;
     const order = this.#order(), [nearest] = order, isOther = nearest !== this.step;
     this.step = nearest;
-    if (this.#ahead.isReady(nearest)) this.#ahead.show(nearest);
+    if (this.#ahead.ready.has(nearest)) this.#ahead.show(nearest);
     this.#changed();
     this.#ahead.want(order.slice(0, NEAREST_VIEWS), isOther);
   }

@@ -13,8 +13,6 @@ export const FIRST_SPREAD = (127 - 11) * 8 - 1;
 const CELLS = 1 << 14;
 /** What a step that is opaque lets through. */
 const OPAQUE_LEAVES = Math.exp(-30);
-/** Means between which what is made is interpolated: this part of the spread apart. */
-const SMOOTH = 16;
 const ROOT_OF_3 = Math.sqrt(3);
 /** Most points of a curve. */
 const MOST_POINTS = 64;
@@ -125,18 +123,8 @@ export function fillTable(prepared, transfer, table) {
   for (let row = 0, first = 0; row < SPREADS; ++row, first += 4 * (MEAN_STEPS + 1)) {
     bits.setUint32(0, (FIRST_SPREAD + row) << 20);
     const spread = row ? bits.getFloat32(0) : 0;
-    // What is averaged over much changes little from mean to mean: some are between two others
-    const stride = Math.max(1, Math.floor(spread * MEAN_STEPS / SMOOTH));
-    for (let k = 0, before = 0; ; before = k, k = Math.min(k + stride, MEAN_STEPS)) {
+    for (let k = 0; k <= MEAN_STEPS; ++k) {
       mediumInto(table, first + 4 * k, atLow, sums, k / MEAN_STEPS, spread, stepsPerLength);
-      for (let at = first + 4 * (before + 1), m = 1; m < k - before; ++m, at += 4) {
-        const share = m / (k - before);
-        for (let c = 0; c < 4; ++c) {
-          const from = table[first + 4 * before + c];
-          table[at + c] = from + share * (table[first + 4 * k + c] - from);
-        }
-      }
-      if (k === MEAN_STEPS) break;
     }
   }
 }

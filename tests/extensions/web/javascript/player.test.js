@@ -96,7 +96,7 @@ test("a broken step is left out while it plays, and named when it is asked for",
 });
 
 test("the last step that is asked for counts, and what was given up comes later", async () => {
-  const series = seriesOf(9), { player, shown } = playing(series);
+  const series = seriesOf(9), { player, shown, failures } = playing(series);
   await settled();
   for (const step of [7, -4, 99]) player.step = step;
   await settled();
@@ -107,8 +107,17 @@ test("the last step that is asked for counts, and what was given up comes later"
   assert.equal(player.settled, false);
   player.resume();
   await settled();
-  assert.deepEqual(shown, [0, 8, 4]);
+  assert.deepEqual([shown, failures], [[0, 8, 4], []]);
   assert.throws(() => player.play({ rate: 0 }), /above 0/);
+});
+
+test("the last steps are kept, and no more of them", async () => {
+  const series = seriesOf(9), { player } = playing(series);
+  for (const step of [0, 1, 2, 3, 4, 5, 6, 7, 6, 3, 1]) {
+    player.step = step;
+    await settled();
+  }
+  assert.deepEqual(series.asked, [0, 1, 2, 3, 4, 5, 6, 7, 1]);
 });
 
 test("of a set the nearest is shown, and its neighbours are there", async () => {
@@ -131,6 +140,10 @@ test("of a set the nearest is shown, and its neighbours are there", async () => 
   assert.equal(surround.step, 3);
   surround.look(view(3.1, 400)); // as far away as none of them
   assert.equal(surround.step, 6);
+  views.push(view(0, 40)); // in one line with the first
+  const further = new Surround({ ...set, length: 8, views }, { show() {}, changed() {}, failed() {} });
+  further.look(view(0.1, 30));
+  assert.equal(further.step, 7);
 });
 
 // A ZIP of plainly stored members, without its directory.
@@ -154,14 +167,18 @@ test("a series is read from its beginning, as its steps come", async () => {
   const file = (k) => new Uint8Array(100).fill(k);
   const bytes = zipped({ "series.json": json(SERIES), "000000.vdi": file(0), "000001.vdi": file(1) });
   assert.ok(beginsAsSeries(bytes) && !beginsAsSeries(file(7)));
-  let series = null;
+  let series = null, begun = 0;
   const lengths = [];
   async function* pieces() {
     yield bytes.subarray(90, 300);
     lengths.push(series.length, series.complete);
     yield bytes.subarray(300);
   }
-  await Series.ofPieces(bytes.subarray(0, 90), pieces(), (begun) => { series = begun; });
+  await Series.ofPieces(bytes.subarray(0, 90), pieces(), (first) => {
+    series = first;
+    ++begun;
+  });
+  assert.equal(begun, 1);
   assert.deepEqual([lengths, series.length, series.complete, series.times], [[1, false], 2, true, [0, 0.5]]);
   assert.deepEqual([-1, 0.25, 0.3, 9].map((time) => series.nearest(time)), [0, 0, 1, 1]);
   await assert.rejects(Series.ofPieces(bytes.subarray(0, 90), [], () => {}), /no whole VDI/);

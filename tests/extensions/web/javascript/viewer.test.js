@@ -44,6 +44,8 @@ test("a curve becomes few points, which are on it", () => {
   const { points, clim } = editedFrom({ opacities, scalar_range: [2, 5] });
   assert.deepEqual(clim, [2, 5]);
   assert.deepEqual(points, [0, 0, 0.375, 0, 0.5, 1, 0.625, 0, 1, 0]);
+  const bump = Array.from({ length: 101 }, (_, k) => (k === 50 ? 0.01 : 0));
+  assert.ok(editedFrom({ opacities: bump, scalar_range: [0, 1] }).points.includes(0.01));
   assert.deepEqual(editedFrom({ opacities: [0.3], scalar_range: [4, 4] }),
     { cmap: null, clim: [3.5, 4.5], points: [0, 0.3, 1, 0.3] });
 });
