@@ -60,7 +60,7 @@ def test_included_tables_bring_no_headings():
 
 def _rows():
     """Yield the cells of each row of the tables on the page *Where is what*."""
-    for line in (DOCS / "where_is_what.md").read_text(encoding="utf-8").splitlines():
+    for line in (DOCS / "dev" / "where_is_what.md").read_text(encoding="utf-8").splitlines():
         if line.startswith("|") and not line.startswith("|---"):
             cells = [cell.strip() for cell in line.strip("|").split("|")]
             assert len(cells) == 5, line
@@ -98,7 +98,7 @@ def _anchors(page):
 def test_where_is_what_names_python_that_exists():
     pytest.importorskip("pyvista")
     missing = [name for row in _rows() for name in _named(row[1]) if not _is_importable(name)]
-    assert not missing, f"docs/where_is_what.md: {missing}"
+    assert not missing, f"docs/dev/where_is_what.md: {missing}"
 
 
 def test_where_is_what_names_kernels_tests_and_pages_that_exist():
@@ -118,9 +118,10 @@ def test_where_is_what_names_kernels_tests_and_pages_that_exist():
         target = re.search(r"\]\(([^)#]+)#?([^)]*)\)", page)
         assert target, page
         file, anchor = target.groups()
-        if not (DOCS / file).is_file() or (anchor and anchor not in _anchors(DOCS / file)):
+        led = DOCS / "dev" / file
+        if not led.is_file() or (anchor and anchor not in _anchors(led)):
             missing.append(f"{file}#{anchor}")
-    assert not missing, f"docs/where_is_what.md: {missing}"
+    assert not missing, f"docs/dev/where_is_what.md: {missing}"
 
 
 def test_sources_refer_to_pages_and_headings_that_exist():

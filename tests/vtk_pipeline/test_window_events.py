@@ -1,4 +1,4 @@
-"""Each row of docs/window_events.md: what a window shows after an event, by pictures and status."""
+"""Each row of docs/dev/window_events.md: what a window shows after an event, by pictures and status."""
 
 from __future__ import annotations
 
@@ -356,7 +356,7 @@ def test_again(plotter):
 
 
 def test_the_page_has_these_events():
-    page = (CHECKOUT / "docs" / "window_events.md").read_text(encoding="utf-8")
+    page = (CHECKOUT / "docs" / "dev" / "window_events.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (.+?) \|", page, re.MULTILINE)
     assert [each for each in rows if each not in ("event", "---")] == list(EVENTS)
 

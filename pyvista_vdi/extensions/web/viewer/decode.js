@@ -7,7 +7,7 @@ import { GrowingBytes, REMEDY, VDIFileError, crc32, damaged, inflate } from "./b
 const VERSION = 4;
 const MOST_COMPRESSED = 1032; // deflate makes no more bytes of one
 const CHUNK_ROWS = 1 << 16;
-/** Constants of docs/conventions.md, "Packed supersegments". */
+/** Constants of docs/dev/conventions.md, "Packed supersegments". */
 const DEPTH_CODES = 16383, TAU_CODES = 4095, GRID = 2 ** 24 - 2 ** 15;
 const MAX_EDGE = 65536;
 const DESCRIPTION = "vdi.json", COARSE = "coarse.vdi";
@@ -65,7 +65,7 @@ export class LevelDecoder {
  *   values (of lists that keep them, in the places of colours and optical depths), level, precision
  *   ("exact" or "8-byte"), offsets: Uint32Array(W H + 1). Exact: front, back, opticalDepth:
  *   Float32Array(n), color: Float32Array(3 n). 8-byte: words: Uint32Array(2 n), origin:
- *   Int32Array(W H), stride: Uint16Array(W H), depthStep. Frames and units: docs/conventions.md.
+ *   Int32Array(W H), stride: Uint16Array(W H), depthStep. Frames and units: docs/dev/conventions.md.
  * @throws {VDIFileError} A sentence that says what is wrong.
  */
 export async function decodeVDI(bytes, level = "full") {
