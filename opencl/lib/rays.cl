@@ -7,7 +7,7 @@
 //
 // with t the view depth of the ray's own camera less a reference depth (world units). The host
 // forms all six in float64 about a reference depth near the data, so that float32 is enough here
-// however far away the eye or the origin is (docs/dev/conventions.md, "Rays"). y = 0 is the bottom row.
+// however far the eye or the origin is (docs/dev/conventions.md, "Rays"). y = 0 is the bottom row.
 //
 // -D DOUBLE_FLOAT_RAYS   rays may enter the data so far from there that it is not enough for the
 // positions of samples: six more

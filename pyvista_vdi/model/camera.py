@@ -1,4 +1,4 @@
-"""The camera and its coordinates: world, view and list (docs/dev/conventions.md#list-coordinates)."""
+"""The camera: world, view and list coordinates (docs/dev/conventions.md#list-coordinates)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rays as the kernels take them: affine forms of the pixel, made in float64 (docs/dev/conventions.md).
+"""Rays as the kernels take them: affine forms of the pixel, in float64 (docs/dev/conventions.md).
 
 Along the ray of a pixel every quantity that the kernels need (a coordinate, the distance from a
 clipping plane, a homogeneous denominator) is affine in the pixel's position and in t, the view

@@ -1,7 +1,7 @@
 """What a ray meets first in a VDI: a single ray, walked on the host in float64.
 
-The same laws as the kernels' (docs/dev/conventions.md): a ray is cut where it crosses from one list to
-the next, each piece is clipped by interval to the supersegments of its list, and what it crosses
+The same laws as the kernels' (docs/dev/conventions.md): a ray is cut where it crosses from one list
+to the next, each piece is clipped by interval to the supersegments of its list, and what it crosses
 of one absorbs in proportion to its length.
 """
 

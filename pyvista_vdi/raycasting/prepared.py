@@ -88,7 +88,7 @@ class OccupancyGrid:
         self.slabs_per_depth = SLABS / (far - near) if far > near else 1.0
         # Find the size of what the raycaster rounds where it looks up a depth: its offset and, in
         # perspective, the depth coordinate times the change of view depth Z with it, Z**2 for
-        # -1 / Z, Z**2 / depth_origin for the long lens's (docs/dev/conventions.md, "Occupancy grid")
+        # -1 / Z, Z**2 / depth_origin for a long lens (docs/dev/conventions.md, "Occupancy grid")
         looked_up = max(abs(near - origin), abs(far - origin))
         if prepared.shifted:
             coordinate = max(abs(near - origin) / near, abs(far - origin) / far)

@@ -42,7 +42,7 @@ from pyvista_vdi.extensions.web import messages
 from pyvista_vdi.extensions.web.page import DATA_TYPE
 from pyvista_vdi.extensions.web.page import page as page_of
 
-#: Bytes that a byte of a file may become (docs/dev/robustness.md): a block of 128 KiB from 4 bytes is
+#: Bytes that a byte of a file may become (docs/dev/robustness.md): 128 KiB from 4 bytes is
 #: Zstandard's best, and an array is held twice while it is decoded, a third time as the VDI's.
 VDI_RATIO = 3 * 2**15
 #: Bytes that reading takes for itself, whatever the file.
@@ -336,7 +336,7 @@ def _changed_array(choices: Choices, array: Any) -> Any:
 
 
 def _check_valid(vdi: VDI | DeferredVDI) -> None:
-    """Check a VDI that was accepted by the rules of docs/dev/conventions.md, written another way."""
+    """Check a VDI that was accepted by docs/dev/conventions.md, written another way."""
     if isinstance(vdi, DeferredVDI):
         for values, most in ((vdi.mean, 1), (vdi.spread, 0.5), (vdi.share, 1)):
             assert all(0 <= float(value) <= most for value in values)

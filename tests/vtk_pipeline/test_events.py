@@ -1,4 +1,4 @@
-"""Each row of docs/dev/pipeline_events.md, against VTK's GPU mapper: pictures and bounds after it."""
+"""Each row of docs/dev/pipeline_events.md, against VTK's GPU mapper: pictures and bounds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Each row of docs/dev/window_events.md: what a window shows after an event, by pictures and status."""
+"""Each row of docs/dev/window_events.md: what a window shows, by pictures and status."""
 
 from __future__ import annotations
 

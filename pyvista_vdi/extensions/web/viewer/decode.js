@@ -65,7 +65,7 @@ export class LevelDecoder {
  *   values (of lists that keep them, in the places of colours and optical depths), level, precision
  *   ("exact" or "8-byte"), offsets: Uint32Array(W H + 1). Exact: front, back, opticalDepth:
  *   Float32Array(n), color: Float32Array(3 n). 8-byte: words: Uint32Array(2 n), origin:
- *   Int32Array(W H), stride: Uint16Array(W H), depthStep. Frames and units: docs/dev/conventions.md.
+ *   Int32Array(W H), stride: Uint16Array(W H), depthStep. Units: docs/dev/conventions.md.
  * @throws {VDIFileError} A sentence that says what is wrong.
  */
 export async function decodeVDI(bytes, level = "full") {
