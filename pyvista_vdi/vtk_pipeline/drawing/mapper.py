@@ -55,7 +55,7 @@ def _to_mode(mode: int) -> Callable[[Any], None]:
 
 
 class ArrayChoiceMethods:
-    """VTK's methods that choose an array; the VDI is made anew of it.
+    """VTK's methods that choose an array; the VDI is regenerated.
 
     What they say is kept from the proxy, which has no such array, and told to the source.
     """
@@ -174,7 +174,7 @@ class ArrayChoiceMethods:
             source.SetScalars(name)
 
     def SetSampleDistance(self, distance: float) -> None:
-        """Set the length of a step, model units, of which the VDI is made anew.
+        """Set the length of a step, model units, from which the VDI is regenerated.
 
         Raises
         ------
