@@ -5,19 +5,16 @@ from __future__ import annotations
 import ctypes.util
 import shutil
 import subprocess
-import warnings
 
 import numpy as np
 import pytest
 
 OpenEXR = pytest.importorskip("OpenEXR")
 
-from deep_programs import COMMANDS, RECORDED, SIZE, VIEW, make, pair  # noqa: E402
+from deep_programs import RECORDED, SIZE, VIEW, pair  # noqa: E402
 
 import pyvista_vdi as pvdi  # noqa: E402
-from pyvista_vdi import examples  # noqa: E402
 from pyvista_vdi.errors import VDIFileError, VDIWarning  # noqa: E402
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera  # noqa: E402
 
 A, B = pair()
 
@@ -86,30 +83,6 @@ def test_what_is_refused_says_why(name, message):
     assert recorded("no_back", thickness=0.1).n_supersegments == A.n_supersegments
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_what_oiiotool_makes(name, tmp_path, default_runtime):
-    program = shutil.which("oiiotool") or pytest.skip("oiiotool is not installed")
-    made = make(name, tmp_path, program)
-    if name in ("cut", "resized", "moved", "flat"):
-        with pytest.raises(VDIFileError, match="was cut, resized or moved after|a flat image"):
-            pvdi.read(made)
-        return
-    with warnings.catch_warnings(record=True) as given:
-        warnings.simplefilter("always")
-        vdi = pvdi.read(made)
-    changed = name in ("merged", "half", "cropped")
-    assert ["was changed after" in str(each.message) for each in given] == [True] * changed
-    if name == "merged":
-        check_shows_both(vdi, 20)
-    elif name == "cropped":
-        expected = np.zeros_like(A.counts)
-        expected[0:4, 1:4] = A.counts[0:4, 1:4]  # 4 rows from the top's third one on
-        assert np.array_equal(vdi.counts, expected)
-    else:
-        assert np.allclose(depths(vdi), depths(A), rtol=2.0**-10 if name == "half" else ROUNDING)
-        assert (vdi.camera, vdi.bounds == A.bounds) == (VIEW, name != "half")
-
-
 def test_openexrs_own_checks_accept_our_files(tmp_path):
     """``exrinfo``; and what ``exrcheck`` does, from OpenEXR's library."""
     path = A.save(tmp_path / "a.exr")
@@ -128,20 +101,3 @@ def test_openexrs_own_checks_accept_our_files(tmp_path):
         check.restype = ctypes.c_bool  # true where something is wrong
         for core in (False, True):
             assert not check(str(path).encode(), False, False, core)
-
-
-def test_oiiotool_flattens_to_the_picture_from_the_generating_view(tmp_path, default_runtime):
-    """Within 2/255 of ``render`` at V_O."""
-    program = shutil.which("oiiotool") or pytest.skip("oiiotool is not installed")
-    pytest.importorskip("pyvista")  # colour maps by name
-    volume, size = examples.load_data("brain", as_volume=True), (160, 90)
-    view = filling_camera(volume.bounds, size)
-    for name, looks in TRANSFER_FUNCTIONS.items():
-        vdi = pvdi.generate(volume, view, size, **looks)
-        deep, flat = vdi.save(tmp_path / "deep.exr"), tmp_path / "flat.exr"
-        command = [program, str(deep), "--flatten", "--ch", "R,G,B,A", "-d", "float", "-o"]
-        subprocess.run([*command, str(flat)], check=True, capture_output=True)
-        pixels = OpenEXR.File(str(flat)).channels()["RGBA"].pixels
-        picture = pvdi.render(vdi, view)
-        assert picture.max() > 0.3, name  # something is there
-        assert np.abs(pixels - picture).max() <= 2 / 255, name

@@ -116,19 +116,6 @@ def test_steps_that_there_are_not(player, step):
         player.step = step
 
 
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        *(({"rate": rate}, "rate") for rate in (0, -1, float("nan"), float("inf"), "fast", True)),
-        ({"memory_limit": "much"}, "memory_limit"),
-    ],
-)
-def test_rates_and_limits_that_are_none(player, arguments, named):
-    with pytest.raises(InvalidArgumentError, match=named):
-        player.play(**arguments)
-    assert not player.playing
-
-
 def test_every_step_is_shown_when_it_is_due(player, steps, clock):
     player.play(rate=10)
     player.advance()
@@ -193,17 +180,6 @@ def test_the_end_comes_although_the_last_step_is_damaged(player, steps, clock):
         except VDIFileError:
             told += 1
     assert (player.step, player.playing, told) == (N - 2, False, 1)
-
-
-def test_a_seek_goes_on_playing_from_there(player, clock):
-    player.play(rate=10)
-    player.advance()
-    clock.now += 0.1
-    player.step = 5
-    assert player.playing
-    player.advance()
-    assert look(player, clock)
-    assert player.step == 6
 
 
 def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):

@@ -130,20 +130,6 @@ def test_weights_add_up_and_nothing_jumps_on_a_path(made, around):
         previous = dense
 
 
-def test_without_blending_the_nearest_is_shown_alone(made, around):
-    view = around.azimuth(11)
-    made.blend = 0
-    try:
-        assert made.weights(view) == [(made.nearest(view), 1.0)]
-        picture = pvdi.render(made, view)
-        alone = pvdi.render(made[made.nearest(view)], view, SIZE)
-        assert np.array_equal(picture, alone)
-    finally:
-        made.blend = 6
-    with pytest.raises(InvalidArgumentError, match="blend"):
-        made.blend = -1
-
-
 def test_a_picture_is_the_weighted_mean(made, around):
     blended = 0
     for view in orbit(around, made.bounds, directions(30)):
