@@ -24,7 +24,6 @@ from oracle import assert_explained
 from reference.raycast import pixel_ray
 
 from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume
-from pyvista_vdi.model import float32_limits as numerics
 from pyvista_vdi.model.cropping import PRESETS
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
@@ -39,14 +38,6 @@ SHINY = Shading(0.2, 0.6, 0.5, 30.0)
 def is_far(runtime, volume, camera, window=WINDOW):
     medium = DeviceVolume(runtime, volume, transfer())
     return medium.rays.forms(camera, window).double_float
-
-
-@pytest.mark.parametrize(
-    ("reach", "points"), [(256, 9), (256, 64), (1600, 400), (2048, 600), (2048, 5000)]
-)
-def test_the_border(reach, points):
-    assert not numerics.enters_far_away(reach, points)
-    assert numerics.enters_far_away(reach + 1, points)
 
 
 @pytest.mark.every(3)
@@ -167,12 +158,6 @@ def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, paral
     image = render_vdi(vdi, vdi.camera, (4, 3), device=runtime)
     assert_within(worst, "VDI at V_O", image, reference.render(vdi, vdi.camera, (4, 3)))
     check_views(runtime, worst, vdi, [EYE.azimuth(a) for a in (25, 90, 180)], least_drawn=0)
-
-
-@pytest.mark.parametrize(("thickness", "far"), [(1.1 * 2.0**-22, True), (0.9 * 2.0**-22, False)])
-def test_what_depths_cannot_tell_is_left_to_float32(thickness, far):
-    """Two units of depth, and a slab of a unit in the last place of them."""
-    assert numerics.lists_are_far(2.0, thickness, 2.0) is far
 
 
 def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):

@@ -33,7 +33,6 @@ from pyvista_vdi import (
     Volume,
 )
 from pyvista_vdi.model.float32_limits import scalars_suit_float32
-from pyvista_vdi.volume.upload import GRADIENT_SHARE
 
 pytestmark = pytest.mark.extremes
 
@@ -163,15 +162,6 @@ def test_worlds_beyond_float32_are_refused(runtime, exponent, by):
         render_vdi(made, camera, device=runtime)
 
 
-@pytest.mark.parametrize("exponent", [-30, 30])
-def test_direct_rendering_goes_further_than_lists(runtime, worst, exponent):
-    volume = field_volume(10.0**exponent)
-    image = raycast_volume(volume, view(volume), WINDOW, transfer(), device=runtime)
-    exact = reference.volume_image(volume, view(volume), WINDOW, transfer())
-    assert exact[..., 3].max() > 0.5
-    assert_within(worst, "volume", image, exact)
-
-
 @pytest.mark.parametrize(
     "shape", [(2, 2, 2), (2, 9, 9), (9, 2, 9), (9, 9, 2), (2, 2, 300)], ids=str
 )
@@ -286,13 +276,6 @@ def test_scalars_at_the_border_of_being_taken_relative(
     check(runtime, worst, volume, transfer(low, high, interpolation=interpolation))
 
 
-def test_gradients_see_scalars_taken_relative(runtime, worst):
-    """Gradient opacity in scalars, where voxels are scaled because they are far from zero."""
-    volume = Volume((1e4 + FIELD).astype(np.float32))
-    steep = {"gradient_opacities": [0.0, 0.2, 0.9], "gradient_range": (0.0, GRADIENT_SHARE)}
-    check(runtime, worst, volume, transfer(1e4, 1e4 + 1, **steep))
-
-
 @pytest.mark.every(4)
 @pytest.mark.parametrize("name", ["shaded", "gradient", "both"])
 @pytest.mark.parametrize("scale", [1e-40, 1e-24, 1e-20, 1e20, 3e38])
@@ -312,14 +295,6 @@ def test_rgba(runtime, worst, name):
     check(runtime, worst, Volume(rgba, own.spacing, own.origin), function, (0, 8))
 
 
-def test_rgba_of_one_opacity(runtime, worst):
-    """A table over a single scalar, or over less than one: colours stay the bytes that they are."""
-    rgba = np.full((4, 4, 4, 4), 200, np.uint8)
-    rgba[..., 0] = np.arange(64).reshape(4, 4, 4) * 4
-    for low, high in ((199.0, 199.0), (199.9, 200.1)):
-        check(runtime, worst, Volume(rgba), transfer(low, high, unit_distance=2.0), (0, 8))
-
-
 @pytest.mark.parametrize("attenuation", [(0, 0, 1), (0, 0, 1e30), (1e-38, 0, 0)], ids=str)
 def test_a_light_inside_the_volume(runtime, worst, attenuation):
     """Strengths from nothing to beyond float32, at a sample's very place."""
@@ -331,13 +306,6 @@ def test_a_light_inside_the_volume(runtime, worst, attenuation):
     )  # fmt: skip
     # Two-sided: a sample whose normal is across the light jumps from none to all of it
     check(runtime, worst, volume, transfer(shading=SHINY), (0, 8), lit=Lights((bulb,)))
-
-
-@pytest.mark.parametrize("power", [0.0, 1e6])
-def test_specular_powers(runtime, worst, power):
-    """From a highlight wherever rays are mirrored to the eye's side to one of hardly a sample."""
-    function = transfer(shading=Shading(0.1, 0.5, 1.0, power))
-    check(runtime, worst, field_volume(), function, (0, 8))
 
 
 @pytest.mark.every(3)

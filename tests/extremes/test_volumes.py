@@ -10,18 +10,15 @@ import reference
 from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     BOUND,
-    FIELD,
     WINDOW,
     assert_within,
     check_views,
-    field_volume,
     transfer,
     view,
 )
 
 from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume
 from pyvista_vdi.device import Launch
-from pyvista_vdi.volume import upload
 
 pytestmark = pytest.mark.extremes
 
@@ -128,12 +125,3 @@ def test_more_than_2_31_voxels_that_the_host_never_holds(runtime, worst, monkeyp
     bound = max(BOUND, 2.0**-24 * max(volume.dimensions))
     assert_within(worst, "brick by brick", image, exact, bound)
     assert_within(worst, "VDI at V_O", render_vdi(vdi, camera, device=runtime), image)
-
-
-def test_a_volume_beyond_float32_is_found_once(runtime, monkeypatch):
-    volume = Volume(((FIELD - 0.5) * 6e38).astype(np.float32))
-    function = transfer(-3e38, 3e38)
-    assert not upload.reads_natively(runtime, volume, function, None)
-    monkeypatch.setattr(upload, "upload_voxels", None)
-    assert not upload.reads_natively(runtime, volume, function, None)
-    assert not upload.uploads_of(field_volume()).too_large

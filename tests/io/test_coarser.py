@@ -76,9 +76,3 @@ def test_the_picture_is_near():
     pictures = [render(vdi, near, (48, 32)) for vdi in (fine, coarser(fine))]
     # Measured: .95. Its silhouette is as fine as its 24 x 16 lists; nothing at all gives .6
     assert compare_images(*pictures).ssim > 0.9
-
-
-def test_an_empty_vdi_stays_empty():
-    empty = slabs_vdi(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), [], [], window=(5, 4), bounds=BOUNDS)
-    assert coarser(empty).window_size == (2, 1)
-    assert coarser(empty).n_supersegments == 0

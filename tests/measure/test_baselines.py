@@ -11,9 +11,7 @@ import strategies
 from oracle import explain, total
 
 from pyvista_vdi.model import compositing
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import Segment
-from pyvista_vdi.model.vdi import VDI
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 if not BENCHMARKS.is_dir():
@@ -55,13 +53,6 @@ def test_pictures_are_the_oracles(runtime, way, kind):
     assert result.drawn > result.pixels / 10
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_an_empty_vdi_is_empty(runtime, way):
-    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
-    none = VDI(camera, (3, 2), [0] * 7, [], [], [], [], (-1, 1, -1, 1, -1, 1))
-    assert not WAYS[way](runtime, none).image(camera, (3, 2)).any()
-
-
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_one_medium_is_cut_into_equal_shares(criterion):
     whole = Segment(2.0, 10.0, np.array([0.2, 0.5, 0.9]), 3.0)
@@ -94,10 +85,3 @@ def places(vdi):
     width, height = vdi.window_size
     y, x = np.divmod(np.arange(width * height), width)
     return x.tolist(), y.tolist()
-
-
-def test_empty_stretches_make_no_supersegment():
-    """Two thin media far apart: of ten equal lengths only the two that hold something are left."""
-    parts = [Segment(0.0, 1.0, np.ones(3), 1.0), Segment(19.5, 20.0, np.ones(3), 1.0)]
-    found = cut_runs(parts, "length", 10)
-    assert [(part.front, part.back) for part in found] == [(0.0, 1.0), (19.5, 20.0)]

@@ -5,7 +5,6 @@ Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one the
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import subprocess
@@ -17,37 +16,11 @@ import pytest
 import pyvista_vdi
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
-PACKAGE = Path(pyvista_vdi.__file__).parent
 
 #: Modules of Python that Windows has not.
 POSIX = ("fcntl", "grp", "pwd", "resource", "termios", "tty", "pty", "posix", "syslog")
 #: Names that Windows keeps for devices, with any extension.
 RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
-
-
-def _at_import(tree):
-    """Yield the nodes that run when a module is imported: none in a function."""
-    waiting = [tree]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        for child in ast.iter_child_nodes(node):
-            if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-                waiting.append(child)
-
-
-@pytest.mark.fast
-def test_no_module_needs_posix_to_be_imported():
-    found = []
-    for path in PACKAGE.rglob("*.py"):
-        for node in _at_import(ast.parse(path.read_text(encoding="utf-8"))):
-            names = []
-            if isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
-                names = [node.module or ""]
-            found += [f"{path.name}:{node.lineno} {n}" for n in names if n.split(".")[0] in POSIX]
-    assert not found
 
 
 def test_the_package_is_imported_where_posix_modules_are_absent():
@@ -73,21 +46,6 @@ def test_every_file_can_be_checked_out_on_windows_and_macos(names):
     assert not [p for p in parts if RESERVED.fullmatch(p)]
     assert len({name.lower() for name in names}) == len(set(names))
     assert max(map(len, names)) < 160  # Windows' limit, 260, less a folder to check out into
-
-
-def test_text_is_opened_with_its_encoding():
-    found = []
-    for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if (
-                isinstance(node, ast.Call)
-                and isinstance(node.func, ast.Attribute)
-                and node.func.attr in ("read_text", "write_text")
-                and "encoding" not in {k.arg for k in node.keywords}
-                and len(node.args) < (1 if node.func.attr == "read_text" else 2)
-            ):
-                found.append(f"{path.relative_to(PACKAGE)}:{node.lineno}")
-    assert not found
 
 
 def test_one_version():

@@ -11,7 +11,7 @@ from reference.generate import classify, medium_at
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite
-from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
 SHAPE = (5, 6, 7)  # z, y, x
@@ -110,17 +110,6 @@ def test_nearest_takes_the_point_whose_voxel_holds_the_position():
     _, tau = medium_at(volume, table, position, np.ones(5))
     expected = -np.log1p(-np.array([0, 1, 6, 7]) / 7 * float(np.float32(0.7)))
     np.testing.assert_allclose(tau, [*expected, 0], atol=1e-15)
-
-
-def test_nan_is_transparent_and_opaque_is_opaque():
-    volume = Volume(np.array([[[np.nan, 1.0]] * 2] * 2))
-    table = TransferFunction([[1, 1, 1]] * 2, [1, 1], (0, 1), unit_distance=1e6)
-    position = np.array([[0.0, 0, 0], [1, 0, 0]])
-    _, tau = medium_at(volume, table, position, np.ones(2))
-    np.testing.assert_array_equal(tau, [0, OPAQUE_OPTICAL_DEPTH])
-    linear = table.replace(interpolation="linear")
-    _, tau = medium_at(volume, linear, np.array([[0.999, 0, 0]]), np.ones(1))
-    np.testing.assert_array_equal(tau, [0])  # one corner of the cell is NaN
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import VDIFileError
 from pyvista_vdi.extensions.series.shown import SeriesInput
 
 #: Seconds after which something that should have happened has not.
@@ -110,12 +110,6 @@ def test_a_step_is_shown_by_its_index_or_by_its_time(player, steps):
     assert not player.playing
 
 
-@pytest.mark.parametrize("step", [N, -N - 1, 1.5, "first", None])
-def test_steps_that_there_are_not(player, step):
-    with pytest.raises(InvalidArgumentError, match=f"from 0 to {N - 1}"):
-        player.step = step
-
-
 def test_every_step_is_shown_when_it_is_due(player, steps, clock):
     player.play(rate=10)
     player.advance()
@@ -166,20 +160,6 @@ def test_without_a_loop_the_last_step_is_the_end(player, clock):
     assert (player.step, player.playing) == (N - 1, False)
     player.play(rate=10, loop=False)  # anew
     assert (player.step, player.playing) == (0, True)
-
-
-def test_the_end_comes_although_the_last_step_is_damaged(player, steps, clock):
-    steps.damaged = (N - 1,)
-    player.step = N - 3
-    player.play(rate=10, loop=False)
-    player.advance()
-    told = 0
-    for _ in range(10):
-        try:
-            look(player, clock, 0.1)
-        except VDIFileError:
-            told += 1
-    assert (player.step, player.playing, told) == (N - 2, False, 1)
 
 
 def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -109,23 +107,6 @@ def test_files_of_one_vdi_have_no_time(path, tmp_path):
     assert time_of(image) is None
     with pytest.raises(VDIFileError, match="is not a series"):
         reader.GetSeries()
-
-
-def test_what_is_wrong_with_a_series_is_said(path):
-    with zipfile.ZipFile(path) as archive:
-        place = archive.getinfo("000001.vdi").header_offset + 100
-    content = bytearray(path.read_bytes())
-    content[place] ^= 1
-    path.write_bytes(content)
-    reader = reader_of(path)
-    assert announced(reader) == (TIMES, (0.5, 4.0))
-    reader.UpdateTimeStep(0.5)
-    with pytest.raises(VDIFileError, match=r"000001\.vdi"):
-        reader.UpdateTimeStep(1.0)
-    with pytest.raises(InvalidArgumentError, match="finite"):
-        reader.UpdateTimeStep(float("nan"))
-    reader.UpdateTimeStep(4.0)
-    assert time_of(reader.GetOutputDataObject(0)) == 4.0
 
 
 SIZE = (24, 18)
