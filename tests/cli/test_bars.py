@@ -1,4 +1,4 @@
-"""Bars that show how far reading, writing, drawing and measuring are; a window without a screen."""
+"""How far reading and writing are; a window without a screen."""
 
 from __future__ import annotations
 

@@ -281,12 +281,6 @@ def test_devices(capsys, default_runtime):
     assert default_runtime.info.name in [device["name"] for device in json.loads(out)]
 
 
-def test_devices_fails_where_none_is_usable(capsys, monkeypatch):
-    monkeypatch.setattr(pvdi.device, "list_devices", list)
-    monkeypatch.setattr(pvdi.device, "describe_devices", lambda: "No device.")
-    assert outcome(capsys, "devices")[:2] == (1, "No device.\n")
-
-
 def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     target = tmp_path / "b.vdi"
     arguments = ("generate", folder / "v.nrrd", "--transfer-function", folder / "tf.json")
@@ -334,15 +328,6 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.png", "b.vdi"]
 
 
-def test_render_over_a_background(folder, capsys, default_runtime, tmp_path):
-    picture = tmp_path / "a.png"
-    for text, corner in (("white", 255), ("#ff0000", (255, 0, 0)), ("0,0,0.2", (0, 0, 51))):
-        run(capsys, "render", folder / "a.vdi", "-o", picture, "--background", text)
-        with Image.open(picture) as image:
-            assert image.mode == "RGB"
-            assert (np.asarray(image)[0, 0] == corner).all()
-
-
 def test_camera_options(folder):
     default = pvdi.Camera((0, -10, 0), (0, 0, 0), (0, 0, 1))
 
@@ -358,28 +343,6 @@ def test_camera_options(folder):
     assert view(f"--camera-json {folder / 'camera.json'}") == VIEW
     options = parser.parse(["render", "a", "-o", "b", "--view-angle", "20"])
     assert not inputs.camera(options, parallel).parallel_projection
-
-
-@pytest.mark.parametrize(
-    ("asked", "says"),
-    [
-        ("-o b.vdi --cmap bone --n-colors 9", "--n-colors 9 is for 'pyvista-vdi render'"),
-        ("-o b.vdi --tf soft", "--tf soft is for 'pyvista-vdi render'"),
-        ("-o b.vdi --shade", "--shade is for VDIs that have colours"),
-        ("-o b.vdi --quality high", "--quality high is for VDIs that have colours"),
-        ("-o b.vdi --occlusion-radius 3", "--occlusion-radius 3 is for VDIs that have colours"),
-        ("-o b.exr", "no colours yet: write a .vdi file in place of .exr"),
-    ],
-)
-def test_what_values_cannot_have_is_refused_by_options_names(
-    asked, says, capsys, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    words = f"generate none.nrrd {asked} --classification deferred".split()
-    assert says in complaint(capsys, *words)  # before the volume is looked for
-    message = complaint(capsys, "generate", "none.nrrd", "-o", "b.vdi", "--importance", "1,2")
-    assert message.startswith("--importance 1 2 is for --classification deferred")
-    assert not list(tmp_path.iterdir())
 
 
 def test_help_loads_nothing_slow():

@@ -63,20 +63,3 @@ def test_generate_says_the_level_and_why(image, tmp_path, capsys, default_runtim
     assert pvdi.read(target).metadata["volume"]["dimensions"] == [16, 12, 8]
     assert main(["generate", *files, "--level", "0"]) == 0
     assert "level 0 of 2 (32 x 24 x 16 points): asked for" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ("--example brain --level 0", "--level 0 is for files that hold several volumes"),
-        ("--example brain --time-index 0", "--time-index 0 is for files that hold several"),
-        ("--example brain --scheduler x", "--scheduler is for stores"),
-        ("none.ome.zarr", "none.ome.zarr cannot be read as zarr"),
-        ("x.zarr --level best", "auto, or a level's number"),
-        ("x.ome.zarr --spacing 1 1 1", "--spacing 1 1 1 is for one level of a store"),
-    ],
-)
-def test_mistakes_are_named(arguments, message, image, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["generate", *arguments.split(), "-o", "x.vdi", *LOOK]) in (1, 2)
-    assert message in capsys.readouterr().err

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import devices, memory
+from pyvista_vdi.device import devices
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.model import host_memory
 
 DTYPES = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "f4", "f8"]
 
@@ -57,19 +56,6 @@ def test_lasting_arrays_are_as_others(runtime, n):
         np.testing.assert_array_equal(runtime.download(buffer), values)
     assert runtime.allocated == before
     assert len(bytearray(array)) == 4 * n  # from its first byte to its last it is there
-
-
-def test_a_host_without_memory_for_an_array_says_so(runtime, monkeypatch):
-    def refused(*_, **__):
-        raise OSError(12, "Cannot allocate memory")
-
-    if not runtime.is_cpu:
-        pytest.skip("the device has memory of its own")
-    monkeypatch.setattr(host_memory.mmap, "mmap", refused)
-    before = runtime.allocated
-    with pytest.raises(DeviceMemoryError, match=r"no host memory .* 'lists' of 4\.00 MiB"):
-        runtime.result((2**20,), np.float32, "lists", lasting=True)
-    assert runtime.allocated == before
 
 
 @pytest.mark.parametrize("shape", [(3, 5), (1000, 7), (0, 4)])
@@ -258,47 +244,3 @@ def test_driver_errors_keep_their_cause_and_kind(runtime, monkeypatch, code, exp
             runtime.fill(buffer, 0)
     assert type(caught.value) is expected
     assert caught.value.__cause__ is driver_error
-
-
-class TestPinnedArrays:
-    """Arrays in page-locked memory, here of ordinary memory that is counted."""
-
-    @pytest.fixture
-    def pool(self, monkeypatch):
-        monkeypatch.setattr(memory, "PINNED_BYTES", 1000)
-        self.there = []
-
-        def allocate(nbytes):
-            if nbytes == 13:
-                raise DeviceMemoryError("none")
-            self.there.append(nbytes)
-            return np.zeros(nbytes, np.uint8), lambda: self.there.remove(nbytes)
-
-        return memory.PinnedArrays(allocate)
-
-    def test_memory_that_nobody_has_is_given_out_again(self, pool):
-        first = pool.empty((10, 4), np.dtype("f4"))
-        first[:] = 7
-        part = first[2:3]
-        del first
-        assert pool.empty((40,), np.dtype("f4")).sum() == 0  # the part is still read
-        assert part.sum() == 28
-        assert self.there == [160, 160]
-        del part
-        gc.collect()
-        assert pool.empty((5, 8), np.dtype("f4")).shape == (5, 8)
-        assert self.there == [160, 160]
-
-    def test_it_is_bounded(self, pool):
-        kept = [pool.empty((100,), np.dtype("f4")) for _ in range(5)]
-        assert self.there == [400, 400]
-        assert len({array.ctypes.data for array in kept}) == 5
-        del kept
-        gc.collect()
-        another = pool.empty((200,), np.dtype("f4"))  # in place of what is free
-        assert self.there == [800]
-        assert another.size == 200
-
-    def test_where_there_is_none_memory_is_ordinary(self, pool):
-        assert pool.empty((13,), np.dtype("u1")).shape == (13,)
-        assert self.there == []

@@ -145,23 +145,6 @@ def test_define_options():
             programs.define_options(defines)
 
 
-def test_threads_may_launch_the_same_kernel(runtime, scale_file):
-    start = threading.Barrier(4)
-
-    def work(factor: int) -> None:
-        data = np.full(100, factor, np.float32)
-        with runtime.buffer(data.shape, data.dtype) as x:
-            launch = runtime.bind(scaling(scale_file), {"ADD": 0}, x=x, n=100)
-            start.wait()
-            for _ in range(200):
-                runtime.write(x, data)
-                launch(100, 1, factor=factor)
-                assert np.all(runtime.download(x) == factor * factor)
-
-    with ThreadPoolExecutor(4) as pool:
-        list(pool.map(work, (2, 3, 5, 7)))
-
-
 def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
     """Also signs of 0, arrays changed in place, buffers in the place of those that have gone."""
     kinds = {"x": "float*", "y": "float*", "v": "float4", "t": "local float*"}

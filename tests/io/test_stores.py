@@ -321,15 +321,6 @@ def test_a_store_that_is_written_anew_must_be_opened_again(name, tmp_path):
     np.testing.assert_array_equal(again.load().array, VALUES[0, 0, 1:])
 
 
-def test_what_its_own_process_writes_into_an_hdf5_file_is_read(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(tmp_path / "x.h5", "w") as file:
-        file["v"] = VALUES[0, 0]
-        volume = pvdi.Volume(file["v"])
-        file["v"][1, 2, 3] = 9999
-        assert volume.finite_range()[1] == 9999
-
-
 @pytest.mark.parametrize(("name", "library"), [("x.zarr", "zarr"), ("x.h5", "h5py")])
 def test_an_absent_library_is_named(name, library, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, library, None)

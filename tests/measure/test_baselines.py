@@ -10,7 +10,6 @@ import pytest
 import strategies
 from oracle import explain, total
 
-from pyvista_vdi.model import compositing
 from pyvista_vdi.model.compositing import Segment
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -18,7 +17,7 @@ if not BENCHMARKS.is_dir():
     pytest.skip("the benchmarks are not beside the tests", allow_module_level=True)
 sys.path.insert(0, str(BENCHMARKS))
 
-from baselines import CRITERIA, WorldRays, cut, cut_runs  # noqa: E402
+from baselines import CRITERIA, WorldRays, cut_runs  # noqa: E402
 
 #: Largest difference per channel: they cut rays at t in float32, where a short stretch far from
 #: t = 0 has few digits; list space keeps 2e-5 (tests/support/oracle.py).
@@ -65,23 +64,3 @@ def test_one_medium_is_cut_into_equal_shares(criterion):
     }[criterion]
     np.testing.assert_allclose(share, np.full(8, share.sum() / 8))
     assert tau.sum() == pytest.approx(3.0)
-
-
-@pytest.mark.parametrize("criterion", CRITERIA)
-def test_lists_are_cut_to_the_limit_and_v_o_sees_the_same(criterion):
-    vdi = strategies.random_vdi(np.random.default_rng(7))
-    found = cut(vdi, criterion, 3)
-    assert found.counts.max() <= 3 < vdi.counts.max()
-    for before, after in zip(*(map(v.list_at, *places(v)) for v in (vdi, found)), strict=True):
-        seen = [
-            compositing.composite(v.color[part].astype(float), v.optical_depth[part].astype(float))
-            for v, part in ((vdi, before), (found, after))
-        ]
-        np.testing.assert_allclose(*seen, atol=1e-5)
-
-
-def places(vdi):
-    """The columns and the rows of a VDI's lists."""
-    width, height = vdi.window_size
-    y, x = np.divmod(np.arange(width * height), width)
-    return x.tolist(), y.tolist()

@@ -1,8 +1,7 @@
-"""The scripts of benchmarks/: their arithmetic, and that each runs to its end over little."""
+"""The scripts of benchmarks/: each runs to its end over little."""
 
 from __future__ import annotations
 
-import argparse
 import ast
 import importlib
 import json
@@ -22,7 +21,6 @@ if not BENCHMARKS.is_dir():
 pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
-import shared  # noqa: E402
 from shared import Case, sample  # noqa: E402
 
 CASES = [
@@ -101,45 +99,3 @@ def test_a_script_runs_to_its_end(name, tmp_path, default_runtime):
     assert found["rows"]
     assert not [row for row in found["rows"] if "refused" in row]
     assert "Measured from" in (tmp_path / f"{name}_sample.md").read_text()
-
-
-# What all scripts share
-
-
-def options(folder, **chosen):
-    parser = shared.parser_of("What is asked.\n", volumes=("brain",))
-    given = parser.parse_args(["--out", str(folder), "--size", "4x3"])
-    return argparse.Namespace(**{**vars(given), **chosen})
-
-
-def run(folder, measured, **chosen):
-    cases = [Case("brain", look, what=f"case {k}") for k in range(6) for look in ("soft", "steep")]
-    cases.append(Case("aneurism", "soft"))
-
-    def measure(case):
-        measured.append(case.name)
-        return {"value": float(case.what[-1])}
-
-    def report(results, every):
-        yield str(shared.mean_of(results, every, lambda row: row["value"], look="soft"))
-
-    return shared.execute("asked", options(folder, **chosen), cases, measure, report, count=5)
-
-
-@pytest.fixture
-def no_data(monkeypatch):
-    monkeypatch.delenv("PYVISTA_VDI_DATA", raising=False)
-
-
-def test_a_sample_and_the_whole_are_two_files(no_data, tmp_path, capsys):
-    measured = []
-    assert run(tmp_path, measured).data["extent"] == "sample"
-    assert len(measured) == 5
-    assert run(tmp_path, measured, whole=True).data["extent"] == "whole"
-    assert len(measured) == 5 + 12
-    assert {path.name for path in tmp_path.iterdir()} == {
-        *("asked.json", "asked.md", "asked_sample.json", "asked_sample.md"),
-    }
-    assert "Left out, not in PYVISTA_VDI_DATA: aneurism" in capsys.readouterr().out
-    assert "± " in (tmp_path / "asked_sample.md").read_text()  # of a sample's mean
-    assert (tmp_path / "asked.md").read_text().startswith("# asked\n\n12 of 12 cases.\n\n2.5\n")

@@ -61,15 +61,6 @@ def test_a_tiny_run_measures_what_each_setting_costs_and_gives(shell, default_ru
     assert len(found.plot().axes) == len(COSTS)
 
 
-def test_what_does_not_fit_is_refused_and_the_rest_goes_on(shell, default_runtime):
-    volume, look = shell
-    settings = [{"sample_distance": 1e-9}, {}]
-    found = measure_tradeoff(volume, settings, transfer_function=look, **TINY)
-    assert [one.name for one in found.points] == ["default"]
-    (why,) = found.refused.values()
-    assert "Error" in why
-
-
 def test_the_command_writes_figures_a_table_and_a_plot(shell, tmp_path, capsys, default_runtime):
     pytest.importorskip("matplotlib")
     np.save(tmp_path / "ball.npy", shell[0].array)
@@ -96,13 +87,6 @@ def test_noise_is_not_taken_for_dominance():
     assert not dominates(point(0.8, 0.98, noise=0.2), slow)
     # Faster, and worse by more than what does not count
     assert not dominates(point(0.8, 0.979), slow)
-
-
-def test_a_front_and_what_is_dominated():
-    points = [point(1.0, 0.98), point(0.5, 0.95, lists=0.5), point(1.5, 0.97, tolerance=0.1)]
-    found = Tradeoff({}, points, {})
-    assert found.front("frame") == ["lists 0.5", "default"]
-    assert found.dominated() == {"tolerance 0.1": ["default"]}
 
 
 @given(st.lists(st.tuples(st.floats(0.1, 10), st.floats(0.5, 1)), min_size=2, max_size=7))

@@ -1,4 +1,4 @@
-"""What can be told of Windows and macOS from here: names of files, imports, versions kept together.
+"""What can be told of Windows and macOS from here: imports, and versions kept together.
 
 Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one these tests lie in.
 """
@@ -19,8 +19,6 @@ CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve
 
 #: Modules of Python that Windows has not.
 POSIX = ("fcntl", "grp", "pwd", "resource", "termios", "tty", "pty", "posix", "syslog")
-#: Names that Windows keeps for devices, with any extension.
-RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 
 
 def test_the_package_is_imported_where_posix_modules_are_absent():
@@ -28,24 +26,6 @@ def test_the_package_is_imported_where_posix_modules_are_absent():
     code = f"import sys; sys.modules.update(dict.fromkeys({POSIX[:5]!r}))"
     modules = "pyvista_vdi.cli.parser, pyvista_vdi.model.vdi"
     subprocess.run([sys.executable, "-c", f"{code}; import {modules}"], check=True)
-
-
-@pytest.fixture
-def names():
-    if not (CHECKOUT / ".git").exists():
-        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
-    listing = subprocess.run(
-        ["git", "ls-files", "-z"], cwd=CHECKOUT, capture_output=True, check=True
-    )
-    return [name for name in os.fsdecode(listing.stdout).split("\0") if name]
-
-
-def test_every_file_can_be_checked_out_on_windows_and_macos(names):
-    parts = {part for name in names for part in name.split("/")}
-    assert not [p for p in parts if re.search(r'[<>:"\\|?*\x00-\x1f]|[. ]$', p)]
-    assert not [p for p in parts if RESERVED.fullmatch(p)]
-    assert len({name.lower() for name in names}) == len(set(names))
-    assert max(map(len, names)) < 160  # Windows' limit, 260, less a folder to check out into
 
 
 def test_one_version():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 
 import pyvista_vdi as pvdi
@@ -51,8 +49,4 @@ def same(one, other):
 
 def packed_steps(n, **options):
     """The first steps of a scene, packed."""
-    made = stepped_vdi if "metadata" in options else _kept
-    return [made(step=k, **options).with_precision("8-byte") for k in range(n)]
-
-
-_kept = functools.cache(stepped_vdi)
+    return [stepped_vdi(step=k, **options).with_precision("8-byte") for k in range(n)]

@@ -12,7 +12,6 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
-    UnsupportedError,
     VDIFileError,
 )
 
@@ -150,19 +149,3 @@ def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
     with pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT) as out:
         out.append(next(volumes()), 9.0)
     assert len(pvdi.read(path)) == 5
-
-
-def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
-    series = pvdi.VDISeries(alone)
-    with pytest.raises(InvalidVDIError, match="no colours yet"):
-        series.save(tmp_path / "run.html")
-    for vdis in (series, series.classified(**LOOK)):
-        for name in ("run.vdis", "run.html"):
-            with pytest.raises(InvalidArgumentError, match="cmap, opacity: .*classified"):
-                vdis.save(tmp_path / name, cmap="bone", opacity="linear")
-    with pytest.raises(InvalidArgumentError, match="cmap"):
-        pvdi.generate_series(volumes(), CAMERA, SIZE, cmap="bone", **KEPT)
-    with pytest.raises(UnsupportedError, match="quality"):
-        pvdi.SeriesWriter(tmp_path / "run.vdis", CAMERA, SIZE, quality="high", **KEPT)
-    assert not list(tmp_path.iterdir())
-    assert set(series._repr_mimebundle_()) == {"text/plain"}

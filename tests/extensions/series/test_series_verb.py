@@ -194,14 +194,6 @@ def test_lists_that_are_none_are_refused_by_name(name, text, said, capsys, tmp_p
     assert str(tmp_path) in error
 
 
-def test_info(series, capsys):
-    out = run(capsys, "info", series)
-    assert "3, times 0 to 2" in out
-    assert "24 x 16" in out
-    state = json.loads(run(capsys, "info", series, "--json"))
-    assert state["times"] == [0.0, 0.5, 2.0]
-
-
 def test_to_single_files_and_back(series, capsys, tmp_path):
     assert "3 files" in run(capsys, "convert", series, "-o", tmp_path / "a.vdi")
     files = sorted(tmp_path.glob("a_*.vdi"))

@@ -95,20 +95,6 @@ def test_a_series_grows_while_it_is_read(path, tmp_path):
             assert mapper.GetVDI().equals(vdi)
 
 
-def test_files_of_one_vdi_have_no_time(path, tmp_path):
-    vdi, reader = pvdi.read(path)[1], reader_of(path)
-    reader.UpdateTimeStep(4.0)
-    vdi.save(tmp_path / "a.vdi")
-    reader.SetFileName(tmp_path / "a.vdi")
-    assert announced(reader) is None
-    reader.Update()
-    image = reader.GetOutputDataObject(0)
-    assert vdi_from_image(image).equals(vdi)
-    assert time_of(image) is None
-    with pytest.raises(VDIFileError, match="is not a series"):
-        reader.GetSeries()
-
-
 SIZE = (24, 18)
 CAMERA = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1), view_angle=25)
 
