@@ -43,21 +43,6 @@ def test_upload_and_download(runtime, aligned):
         assert runtime.allocated == before
 
 
-@pytest.mark.parametrize("n", [1000, 2**20, 3 * 2**19 + 5])
-def test_lasting_arrays_are_as_others(runtime, n):
-    """4 KB, as everywhere; 4 MiB and 6 MiB and a little: 2 and 3 pages of 2 MiB, and a rest."""
-    array = ocl.aligned_empty((n,), np.float32, lasting=True)
-    assert (array.shape, array.dtype, array.flags.writeable) == ((n,), np.float32, True)
-    assert array.ctypes.data % 4096 == 0
-    before, values = runtime.allocated, np.arange(n, dtype=np.float32)
-    with runtime.result((n,), np.float32, "lists", lasting=True) as buffer:
-        assert runtime.allocated - before == 4 * n
-        runtime.write(buffer, values)
-        np.testing.assert_array_equal(runtime.download(buffer), values)
-    assert runtime.allocated == before
-    assert len(bytearray(array)) == 4 * n  # from its first byte to its last it is there
-
-
 @pytest.mark.parametrize("shape", [(3, 5), (1000, 7), (0, 4)])
 def test_results_outlive_their_buffers(runtime, shape):
     """On a CPU the array is the buffer's memory: nothing is copied, and it stays when it goes."""

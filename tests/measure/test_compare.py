@@ -11,7 +11,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
 from pyvista_vdi.errors import DeviceError
 from pyvista_vdi.measure.bench import as_json
-from pyvista_vdi.measure.compare import NAMES, contact_sheet, measure, table
+from pyvista_vdi.measure.compare import NAMES, measure
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -116,24 +116,6 @@ def test_a_blank_picture_is_an_error(volume, default_runtime):
     pytest.importorskip("pyvista")
     with pytest.raises(DeviceError, match="VTK's gpu mapper drew nothing: every pixel is black"):
         measure(volume, {"opacity": [0.0, 0.0, 0.0]}, SIZE, angles=(0,), repeats=1)
-
-
-@pytest.mark.parametrize("repeats", [0, 1])
-def test_without_vtk_and_timings(repeats, volume, default_runtime):
-    shade = pvdi.TransferFunction([(0, 0, 0), (1, 0.5, 0)], [0, 0.5], volume.finite_range())
-    looks, options = {"transfer_function": shade}, {"angles": (5,), "vtk": False}
-    report, _, images = measure(volume, looks, SIZE, repeats=repeats, **options)
-    assert set(images[5]) == {"raycaster", "vdi"}
-    (view,) = report["views"]
-    ssim = compare_images(images[5]["vdi"], images[5]["raycaster"]).ssim
-    assert [*view["near"]] == ["vdi_to_raycaster"]
-    assert view["near"]["vdi_to_raycaster"]["ssim"] == ssim
-    assert view["ratio_to_vtk"] is None
-    assert (report["generation_seconds"] is None) == (repeats == 0)
-    text = table(report)
-    assert "VTK fixed-point" not in text
-    assert ("Frames" in text, "Generation" in text) == (repeats > 0, repeats > 0)
-    assert contact_sheet(report, images).shape[1] == pytest.approx(3 * SIZE[0], abs=12)
 
 
 @pytest.mark.gl

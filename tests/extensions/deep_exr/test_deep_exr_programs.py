@@ -5,13 +5,14 @@ from __future__ import annotations
 import ctypes.util
 import shutil
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
 
 OpenEXR = pytest.importorskip("OpenEXR")
 
-from deep_programs import RECORDED, SIZE, VIEW, pair  # noqa: E402
+from deep_programs import COMMANDS, RECORDED, SIZE, VIEW, make, pair  # noqa: E402
 
 import pyvista_vdi as pvdi  # noqa: E402
 from pyvista_vdi.errors import VDIFileError, VDIWarning  # noqa: E402
@@ -81,6 +82,30 @@ def test_what_is_refused_says_why(name, message):
     with pytest.raises(VDIFileError, match=message):
         pvdi.read(RECORDED / f"oiiotool_{name}.exr")
     assert recorded("no_back", thickness=0.1).n_supersegments == A.n_supersegments
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_oiiotool_makes(name, tmp_path, default_runtime):
+    program = shutil.which("oiiotool") or pytest.skip("oiiotool is not installed")
+    made = make(name, tmp_path, program)
+    if name in ("cut", "resized", "moved", "flat"):
+        with pytest.raises(VDIFileError, match="was cut, resized or moved after|a flat image"):
+            pvdi.read(made)
+        return
+    with warnings.catch_warnings(record=True) as given:
+        warnings.simplefilter("always")
+        vdi = pvdi.read(made)
+    changed = name in ("merged", "half", "cropped")
+    assert ["was changed after" in str(each.message) for each in given] == [True] * changed
+    if name == "merged":
+        check_shows_both(vdi, 20)
+    elif name == "cropped":
+        expected = np.zeros_like(A.counts)
+        expected[0:4, 1:4] = A.counts[0:4, 1:4]  # 4 rows from the top's third one on
+        assert np.array_equal(vdi.counts, expected)
+    else:
+        assert np.allclose(depths(vdi), depths(A), rtol=2.0**-10 if name == "half" else ROUNDING)
+        assert (vdi.camera, vdi.bounds == A.bounds) == (VIEW, name != "half")
 
 
 def test_openexrs_own_checks_accept_our_files(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import shutil
 
 import numpy as np
@@ -12,7 +11,6 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
-    VDIFileError,
 )
 
 pytestmark = pytest.mark.filterwarnings("ignore:the transfer function shows values outside")
@@ -84,27 +82,6 @@ def test_a_look_is_that_of_each_step_alone_and_of_one_range(alone, saved):
         shown.classified(cmap="bone")
     with pytest.raises(TypeError, match="colourmap"):
         pvdi.read(saved).classified(colourmap="bone")
-
-
-def test_it_is_pickled_by_the_name_of_its_file(alone, saved, tmp_path, monkeypatch):
-    def again(series):
-        return pickle.loads(pickle.dumps(series))
-
-    with monkeypatch.context() as elsewhere:
-        elsewhere.chdir(saved.parent)
-        series = pvdi.read(saved.name)
-    assert len(pickle.dumps(series)) < 1000
-    assert again(series).times == TIMES
-    assert all_equal(again(series), alone)
-    assert all_equal(again(series[1:3]), alone[1:3])
-    shown = [step.classified(**LOOK) for step in alone]
-    assert all_equal(again(series.classified(**LOOK)), shown)
-    assert all_equal(again(series.classified(**LOOK)[2:]), shown[2:])
-    moved = pvdi.read(saved).save(tmp_path / "moved.vdis")
-    pickled = pickle.dumps(pvdi.read(moved))
-    moved.unlink()
-    with pytest.raises(VDIFileError, match=r"moved\.vdis cannot be read"):
-        pickle.loads(pickled)
 
 
 def test_without_a_range_that_of_the_first_step_is_all_s(default_runtime):

@@ -182,16 +182,6 @@ def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
         _ = player.current
 
 
-def test_few_steps_are_held_where_memory_is_short(player, steps, clock):
-    steps.copies = True
-    player.play(rate=10, memory_limit=1)
-    player.advance()
-    for _ in range(N - 1):
-        look(player, clock)
-        assert steps.living() <= 4
-    assert steps.asked[: N - 1] == list(range(1, N))
-
-
 @pytest.mark.parametrize("kept", [N, 6])
 def test_what_is_kept_is_not_decoded_in_the_next_round(player, steps, clock, kept):
     steps.copies = True
