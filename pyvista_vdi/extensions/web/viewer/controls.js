@@ -68,13 +68,9 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
   const takes = []; // what takes the viewer's look to a slider
   const change = (changes) => (viewer.look = { ...viewer.look, ...changes });
   const factor = (name, label) => {
-    const output = htmlElement("span", { className: "said" });
     const made = slider(label, { min: -3, max: 3, step: 0.05 }, (x) => change({ [name]: 2 ** x }));
-    takes.push((look) => {
-      output.textContent = `\u00d7${inShort(Number(look[name].toPrecision(3)))}`;
-      setSlider(made, Math.log2(look[name]), output.textContent);
-    });
-    return htmlElement("label", {}, htmlElement("span", {}, label), made, output);
+    takes.push((look) => setSlider(made, Math.log2(look[name]), `\u00d7${inShort(look[name])}`));
+    return htmlElement("label", {}, htmlElement("span", {}, label), made);
   };
   const cut = (axis) => htmlElement("fieldset", {}, htmlElement("legend", {}, `Clip ${axis}`),
     ...["from", "to"].map((end, isHigh) => {

@@ -55,11 +55,10 @@ const EMBEDDED = 'script[type="application/vdi+base64"]';
  * where there is no such script yet.
  */
 export function embedded(element) {
-  return element.querySelector(EMBEDDED) &&
-    { [Symbol.asyncIterator]: () => embeddedTexts(element) };
+  return element.querySelector(EMBEDDED) && { [Symbol.asyncIterator]: () => textsIn(element) };
 }
 
-async function* embeddedTexts(element) {
+async function* textsIn(element) {
   for (let taken = 0; ;) {
     const parsed = document.readyState !== "loading";
     const scripts = element.querySelectorAll(EMBEDDED);
