@@ -20,7 +20,7 @@ from pyvista_vdi.measure.bench import accuracy
 from pyvista_vdi.model.metrics import list_edges, list_places
 from pyvista_vdi.model.options import QUALITIES, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.quality.probe import turned
+from pyvista_vdi.quality.targets import turned
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
@@ -128,13 +128,13 @@ def of_setting(bench: Any, setting: Mapping[str, Any], *, estimated: bool) -> di
 
 
 def of_preset(bench: Any, quality: str) -> dict[str, Any]:
-    """Return what the dial predicts of a preset, and the truth."""
+    """Return what is predicted of the goal that a preset names, and the truth."""
     vdi = generate(
         bench.volume,
         bench.view,
         bench.size,
         transfer_function=bench.table,
-        quality=quality,
+        target_ssim=QUALITIES[quality],
         device=bench.runtime,
     )
     view = turned(bench.view, bench.volume.bounds, _ANGLE)

@@ -37,21 +37,7 @@ from pyvista_vdi.model.vdi import VDI
 
 Runs = Sequence[Segment]
 
-KERNEL = KernelDeclaration(
-    Path(__file__).with_name("world_rays.cl"),
-    "world_rays",
-    offsets="int*",
-    faces="float2*",
-    media="float4*",
-    lists_wide="int",
-    lists_high="int",
-    forms="float*",
-    planes="int",
-    width="int",
-    height="int",
-    cutoff="float",
-    image="float4*",
-)
+KERNEL = KernelDeclaration(Path(__file__).with_name("world_rays.cl"), "world_rays")
 
 #: Supersegments of a list from which cuts are made: more than a ray through most data has.
 RECORDED = 512

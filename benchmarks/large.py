@@ -23,7 +23,7 @@ from pyvista_vdi.measure.bench import accuracy, ratio
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.quality.probe import turned
+from pyvista_vdi.quality.targets import turned
 
 VOLUMES = (
     *("brain", "rayleigh_taylor", "bonsai", "aneurism"),

@@ -12,8 +12,6 @@ file say what it is; ``docs/where_is_what.md`` leads from each step of the paper
     From a volume to lists of supersegments: sampled, merged, fitted, packed.
 ``raycasting``, ``multi_vdi``
     From one VDI (paper, sections 3 to 5), or several, to a picture from any view.
-``cpu16``
-    The same as these four for sixteen rays in vectors, on CPUs.
 ``large``
     Volumes in blocks: an extension's.
 """

@@ -26,7 +26,6 @@ _HOMES = {
     "Pick": "raycasting.picking",
     "Plotter": "plotting.plotter",
     "Report": "device.report",
-    "Settings": "api",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",
@@ -36,18 +35,13 @@ _HOMES = {
     "Volume": "model.volume",
     "compare_images": "model.metrics",
     "describe_devices": "device",
-    "estimate": "api",
-    "generate": "api",
     "list_devices": "device",
     "list_volumes": "io.volumes",
     "open_volume": "io.stores",
-    "pick": "api",
     "presets": "model.presets",
-    "read": "api",
     "read_volume": "io.volumes",
-    "render": "api",
-    "render_depth": "api",
-    "render_volume": "api",
+    **dict.fromkeys(("Settings", "estimate", "generate", "pick", "read"), "api"),
+    **dict.fromkeys(("render", "render_depth", "render_volume"), "api"),
     **dict.fromkeys(errors.__all__, "errors"),
 }
 
@@ -81,7 +75,7 @@ registry.core = registry.Extension(
         "VDI.save": "pyvista_vdi.io:write",
         "Volume.read": "pyvista_vdi.io.volumes:read_volume",
         "Volume.from_vtk": "pyvista_vdi.vtk_pipeline:volume_from_vtk",
-        "Volume.with_scalars": "pyvista_vdi.plotting.volumes:as_image",
+        "Volume.with_scalars": "pyvista_vdi.plotting.volumes:as_grid",
     },
 )
 

@@ -140,9 +140,9 @@ def small(make: Any, volume: pvdi.Volume, function: Any = None, **options: Any) 
     camera = options.pop("camera", None) or outside(volume.bounds, 25.0)
     function = function or over(volume, interpolation="linear")
     size = options.pop("size", SMALL)
-    seldom = {name: options.pop(name) for name in [*options] if name in pvdi.Settings.declared}
-    options |= {"settings": pvdi.Settings(**seldom)} if seldom else {}
-    return make(volume, camera, size, transfer_function=function, **options)
+    seldom = {name: options.pop(name) for name in pvdi.Settings.declared.keys() & options}
+    how = {"transfer_function": function, "settings": pvdi.Settings(**seldom), **options}
+    return make(volume, camera, size, **how)
 
 
 made, pictured = partial(small, pvdi.generate), partial(small, pvdi.render_volume)
@@ -265,6 +265,7 @@ def frame_options(bounds: Any, camera: pvdi.Camera, size: tuple[int, int]) -> di
         "box": {"cropping": third},
         "regions": {"cropping": (third, 0x2A5F0C3)},
         "thick": {"opacity_multiplier": 6.0},
+        "no-skip": {},
         "all": {"opaque_depth": ends, "clipping_planes": [plane], "cropping": (third, "fence")},
         "cutoff": {"settings": pvdi.Settings(transmittance_cutoff=0.5)},
         "preview-30": {"preview_samples": 30, "opaque_depth": ends, "clipping_planes": [plane]},

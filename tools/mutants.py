@@ -46,7 +46,6 @@ ROOMS = {
     "generation": ("generation",),
     "volume": ("volume", "generation"),
     "multi_vdi": ("raycasting",),
-    "cpu16": ("generation", "volume", "raycasting"),
 }
 
 #: What stands in a line and what stands there in the mutant, either way.

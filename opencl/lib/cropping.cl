@@ -9,13 +9,6 @@
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#if CROPPED
-#define CROPPING_PARAMETER uint regions,
-#define CROPPING_ARGUMENT regions,
-#else
-#define CROPPING_PARAMETER
-#define CROPPING_ARGUMENT
-#endif
 #define CROPPING_PLANES 6
 #define MOST_KEPT 4 // six crossings make seven parts, and those that touch are one
 

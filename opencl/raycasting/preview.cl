@@ -48,16 +48,19 @@ inline float reaches_slab(const Cells *cells, int slab)
     return (depth_coordinate(face, cells->ray->depths) - cells->ray->deep.z) / cells->ray->along.z;
 }
 
+// r where the ray leaves a stack along one axis of so many lists, of which this is half.
+inline float leaves_stack(int stack, float along, float deep, float half_lists)
+{
+    const float edge = (float)((stack + (along > 0.0f ? 1 : 0)) * STACK) - half_lists;
+    return along != 0.0f ? (edge - deep) / along : INFINITY;
+}
+
 // Find where the ray leaves the walk's stack, and the occupied slabs that it crosses there.
 inline void enter_stack(Walk *walk, const Cells *cells)
 {
     const ListRay *ray = cells->ray;
-    const float edge_u =
-        (float)((walk->stack_i + (ray->along.x > 0.0f ? 1 : 0)) * STACK) - cells->half_wide;
-    const float edge_v =
-        (float)((walk->stack_j + (ray->along.y > 0.0f ? 1 : 0)) * STACK) - cells->half_high;
-    const float r_u = ray->along.x != 0.0f ? (edge_u - ray->deep.x) / ray->along.x : INFINITY;
-    const float r_v = ray->along.y != 0.0f ? (edge_v - ray->deep.y) / ray->along.y : INFINITY;
+    const float r_u = leaves_stack(walk->stack_i, ray->along.x, ray->deep.x, cells->half_wide);
+    const float r_v = leaves_stack(walk->stack_j, ray->along.y, ray->deep.y, cells->half_high);
     walk->r_leave = fmax(walk->r, fmin(ray->r_begin + 1.0f, fmin(r_u, r_v)));
     walk->z_leave = fma(walk->r_leave, ray->along.z, ray->deep.z);
     const int enters = slab_at(cells, fma(walk->r, ray->along.z, ray->deep.z));
@@ -86,9 +89,7 @@ inline bool next_cell(Walk *walk, const Cells *cells, CellCrossing *crossing)
     while (walk->left == 0) {
         if (walk->r_leave >= ray->r_begin + 1.0f)
             return false;
-        const float edge_u =
-            (float)((walk->stack_i + (ray->along.x > 0.0f ? 1 : 0)) * STACK) - cells->half_wide;
-        const float r_u = ray->along.x != 0.0f ? (edge_u - ray->deep.x) / ray->along.x : INFINITY;
+        const float r_u = leaves_stack(walk->stack_i, ray->along.x, ray->deep.x, cells->half_wide);
         if (r_u <= walk->r_leave)
             walk->stack_i += ray->along.x > 0.0f ? 1 : -1;
         else

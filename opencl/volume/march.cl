@@ -77,26 +77,17 @@ inline Int first_step_outside(const March *march, Real lower_x, Real lower_y, Re
     return TO_INT(fmin((leaves - march->t0) * march->per_step - 0.51f, 2e9f)) + 1;
 }
 
-// Whether a step's midpoint lies before the part's cells on an axis, and whether it lies behind
-// them. A ray that does not move along the axis is before them if it is not in them.
-#define BEFORE_ON(axis, at)                                                                        \
-    SELECT(at >= of->part_upper.axis, at < of->part_lower.axis, march->slope.axis >= 0.0f)
-#define BEHIND_ON(axis, at)                                                                        \
-    SELECT(at < of->part_lower.axis, at >= of->part_upper.axis, march->slope.axis >= 0.0f)
-#define MIDPOINT_ON(axis) fma(t, march->slope.axis, march->start.axis)
-
-inline Int before_part(const March *march, const Classified *of, Int k)
+// Whether a step's midpoint lies before the part's cells, or behind them, on any axis. A ray that
+// does not move along an axis is before them if it is not in them.
+inline Int beside_part(const March *march, const Classified *of, Int k, bool behind)
 {
     const Real t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
-    const Real x = MIDPOINT_ON(x), y = MIDPOINT_ON(y), z = MIDPOINT_ON(z);
-    return BEFORE_ON(x, x) | BEFORE_ON(y, y) | BEFORE_ON(z, z);
-}
-
-inline Int behind_part(const March *march, const Classified *of, Int k)
-{
-    const Real t = 0.5f * (step_face(march, k) + step_face(march, k + 1));
-    const Real x = MIDPOINT_ON(x), y = MIDPOINT_ON(y), z = MIDPOINT_ON(z);
-    return BEHIND_ON(x, x) | BEHIND_ON(y, y) | BEHIND_ON(z, z);
+#define BESIDE_ON(axis)                                                                            \
+    SELECT(fma(t, march->slope.axis, march->start.axis) >= of->part_upper.axis,                    \
+           fma(t, march->slope.axis, march->start.axis) < of->part_lower.axis,                     \
+           behind ? march->slope.axis < 0.0f : march->slope.axis >= 0.0f)
+    return BESIDE_ON(x) | BESIDE_ON(y) | BESIDE_ON(z);
+#undef BESIDE_ON
 }
 
 // Steps up to t, as far as rounding leaves it open.
@@ -133,10 +124,10 @@ inline void march_in_part(March *march, const Classified *of)
             break;                                                                                 \
         change;                                                                                    \
     }
-    WHILE((begin > 0) & !before_part(march, of, begin - 1), begin -= COUNT(moves))
-    WHILE((begin < march->steps) & before_part(march, of, begin), begin += COUNT(moves))
-    WHILE((end > begin) & behind_part(march, of, end - 1), end -= COUNT(moves))
-    WHILE((end < march->steps) & !behind_part(march, of, end), end += COUNT(moves))
+    WHILE((begin > 0) & !beside_part(march, of, begin - 1, false), begin -= COUNT(moves))
+    WHILE((begin < march->steps) & beside_part(march, of, begin, false), begin += COUNT(moves))
+    WHILE((end > begin) & beside_part(march, of, end - 1, true), end -= COUNT(moves))
+    WHILE((end < march->steps) & !beside_part(march, of, end, true), end += COUNT(moves))
 #undef WHILE
     march->begin = begin;
     march->steps = max(begin, end);

@@ -67,13 +67,11 @@ def render(
         units, top row first; infinity where nothing is opaque.
     clipping_planes : array_like of float, shape (k, 6), or list of these, optional
         Origin and normal of each plane, world coordinates; the side that the normal points to
-        is kept, as with VTK's mappers. They cut all of several VDIs; a list of such arrays, or of
-        ``None``, cuts each by its own.
+        is kept. They cut all of several VDIs; a list of such arrays cuts each by its own.
     cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, or list, optional
         Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
-        :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, z_low and z_high of a box, or
-        a pair of those planes and the regions (flags, or ``"fence"``, ``"cross"`` ...). For
-        several VDIs a list with one of these, or ``None``, for each.
+        :class:`Cropping`, a mapper's, the six planes of a box, or a pair of these and regions
+        (flags, or ``"fence"``, ``"cross"`` ...). For several VDIs a list with one for each.
     opacity_multiplier : float or list of float, default: 1.0
         Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
         the same as dividing the opacity unit distance by it. For several VDIs one for all, or a
@@ -277,6 +275,9 @@ def render_volume(
         Width and height in pixels.
     opaque_depth : array_like of float32, shape (H, W), optional
         As for :func:`render`.
+    blending : {"composite", "maximum", "minimum", "average", "additive"}
+        As in ``add_volume``: the greatest or the least scalar is classified; or opacity times
+        scalar is averaged or integrated over opacity unit distances, as a grey value.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
     device : str, int or device, optional

@@ -122,8 +122,7 @@ def generate(
         progress=progress,
         metadata={"classification": look.describe(), "scalars": read.name},
     )
-    from pyvista_vdi.quality.dial import warn_missed
-    from pyvista_vdi.quality.probe import generate_anywhere
+    from pyvista_vdi.quality.targets import generate_anywhere, warn_missed
 
     vdi: Any
     if deferral.deferred:

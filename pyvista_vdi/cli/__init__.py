@@ -46,9 +46,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         if isinstance(error, KeyboardInterrupt):
             return _complain("interrupted; nothing was left half done", _INTERRUPTED)
+        said = str(error)  # of OSError: a full disk, or an encoder that has ended
         if isinstance(error, MemoryError):
-            error = f"not enough memory ({error}): lower --size or --max-supersegments"
-        return _complain(str(error), 1)  # of OSError: a full disk, or an encoder that has ended
+            said = f"not enough memory ({error}): lower --size or --max-supersegments"
+        return _complain(said, 1)
 
 
 @contextlib.contextmanager

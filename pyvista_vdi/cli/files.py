@@ -71,14 +71,14 @@ def convert(options: argparse.Namespace) -> int:
     if options.thickness is not None:
         foreign["thickness"] = options.thickness
     with inputs.measuring("converting") as bar:
-        vdi = read(options.file, progress=inputs.part(bar, 0.0, 0.5, "reading"), **foreign)
+        vdi: Any = read(options.file, progress=inputs.part(bar, 0.0, 0.5, "reading"), **foreign)
         page = inputs.keeps_values(vdi) and getattr(format_named(target), "page", False)
         colors = target.suffix != ".vdi" and not page
         look = inputs.look_for(options, vdi, options.file, colors=colors)
         if page:
             arguments |= look  # that the page begins with
         elif look:
-            vdi = vdi.classified(**look)
+            vdi = vdi.classified(**look)  # type: ignore[union-attr]
         vdi.save(target, progress=inputs.part(bar, 0.5, 1.0, "writing"), **arguments)
     inputs.say_vdi(options, vdi)
     return 0

@@ -27,7 +27,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import describe
+from pyvista_vdi.quality.targets import describe
 
 
 def generate(options: argparse.Namespace) -> int:

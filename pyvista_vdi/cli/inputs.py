@@ -55,7 +55,7 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
     """
     values = {name: getattr(options, name, None) for name in declared(*records)}
     found = {name: value for name, value in values.items() if value is not None}
-    of = {n: getattr(options, f"occlusion_{n}", None) for n in ("radius", "strength")}
+    of: Any = {n: getattr(options, f"occlusion_{n}", None) for n in ("radius", "strength")}
     of = {name: value for name, value in of.items() if value is not None}
     if "ambient_occlusion" in values and (of or "ambient_occlusion" in found):
         found["ambient_occlusion"] = AmbientOcclusion(**of)
@@ -110,7 +110,7 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
 
         return laid_out(examples.load_data(options.example, as_volume=True), options)
     if is_store(options.file):
-        volume: Volume = open_store(options)
+        volume: Any = open_store(options)
         if len(volume.store.levels) > 1 and options.level in (None, "auto"):
             # Of another level they are others
             refuse(options, ("spacing", "origin"), "one level of a store, which --level chooses")
@@ -128,7 +128,7 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
         remedy = "take a coarser level by --level, or make a VDI of it (pyvista-vdi generate)"
         require_free_memory(volume.array.nbytes, f"the volume in {options.file}", remedy)
         volume = volume.load()
-    return volume
+    return volume  # type: ignore[no-any-return]
 
 
 def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
@@ -180,7 +180,9 @@ def require_vdi(file: str, verb: str) -> None:
 
 def volume_name(options: argparse.Namespace) -> str:
     """Return a short name of the volume, for files and reports."""
-    return options.example or Path(options.file).resolve().name.split(".")[0]
+    if options.example is not None:
+        return str(options.example)
+    return Path(options.file).resolve().name.split(".")[0]
 
 
 @contextmanager

@@ -64,7 +64,8 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
     Raises UsageError, which suggests what may have been meant.
     """
     added = registry.verbs()
-    known = {name: (verb.summary, verb.example) for name, verb in {**VERBS, **added}.items()}
+    both: dict[str, Any] = {**VERBS, **added}
+    known = {name: (verb.summary, verb.example) for name, verb in both.items()}
     name, *rest = arguments or [""]
     if not name:
         print(_LESSON, end="")

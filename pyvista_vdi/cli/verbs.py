@@ -127,8 +127,8 @@ VERBS = {
         VOLUME out no_vtk device
         name           NAME      in place of the volume's own, for several runs of one
         quick          -         fewer settings and angles in a smaller window
-        size|window_size  WxH    of all frames (default: 640x360; with --quick 320x180)
-        angles         A,B,...   from the generating view (default: 5,30,60; with --quick 5,30)
+        size|window_size  WxH    of all frames (default: 640x360; quick: 320x180)
+        angles         A,B,...   from the generating view (default: 5,30,60; quick: 5,30)
         repeats=5      COUNT     timed frames
         generations=3  COUNT     timed generations of each VDI
         sweep  AXIS[=A,B,...] ...  settings, with other values than usual: max-supersegments, \

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from pyvista_vdi.device.choice import describe_devices, get_runtime, list_devices
 from pyvista_vdi.device.devices import DeviceInfo, bytes_text
-from pyvista_vdi.device.launches import Launch, padded
+from pyvista_vdi.device.launches import Launch, Runtime, padded
 from pyvista_vdi.device.memory import DeviceBuffer, kept_together
 from pyvista_vdi.device.programs import Kernel, KernelDeclaration, Struct
-from pyvista_vdi.device.queues import KernelTime
-from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty
 
 __all__ = [
@@ -21,7 +19,6 @@ __all__ = [
     "GrowingArray",
     "Kernel",
     "KernelDeclaration",
-    "KernelTime",
     "Launch",
     "Runtime",
     "Struct",

@@ -10,29 +10,19 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.devices import Candidate, DeviceInfo, bytes_text
+from pyvista_vdi.device.devices import DeviceInfo, bytes_text
+from pyvista_vdi.device.launches import Runtime
 from pyvista_vdi.device.programs import KernelDeclaration
-from pyvista_vdi.device.runtime import Runtime
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
-PROBE = KernelDeclaration(
-    "lib/probe.cl",
-    "probe",
-    x="float*",
-    values="float4*",
-    group_sum="uint*",
-    total="uint*",
-    shared="local uint*",
-)
-PROBE_COUNT = 256
-PROBE_GROUP = 32
+PROBE = KernelDeclaration("lib/probe.cl", "probe")
+PROBE_COUNT, PROBE_GROUP = 256, 32
 # OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
 # value; the fourth is for the reference, which is rounded to single precision nowhere.
 PROBE_RTOL = 4 * 2.0**-23
 
 _lock = threading.RLock()
 _probed: dict[tuple[int, int], tuple[DeviceInfo, Runtime | None]] = {}
-_shared_contexts: dict[int, Runtime] = {}
 _default: Runtime | None = None
 
 
@@ -49,25 +39,22 @@ def list_devices() -> list[DeviceInfo]:
     MissingDependencyError
         If pyopencl cannot be imported.
     """
-    candidates, _ = devices.find_candidates()
-    return [_probe(candidate)[0] for candidate in candidates]
+    return [_probe(info)[0] for info in devices.find_devices()[0]]
 
 
 def get_runtime(device: Any = None) -> Runtime:
     """Return the runtime of a device, made once per process: the same object for the same device.
 
     ``device`` is a part of ``"platform / device"``, letter case ignored,
-    ``"platform_index:device_index"``, a DeviceInfo, a Runtime, or pyopencl's Device or Context,
-    which is shared and must have one device. By default it is what the environment variable
-    ``PYVISTA_VDI_DEVICE`` says, and without it the best device that passes the probe: GPU, then CPU
-    (Intel's runtime before PoCL).
+    ``"platform_index:device_index"``, a DeviceInfo, a Runtime, or pyopencl's Device. By default it
+    is what the environment variable ``PYVISTA_VDI_DEVICE`` says, and without it the best device
+    that passes the probe: GPU, then CPU (Intel's runtime before PoCL).
 
     Raises NoDeviceError if there is no usable device, or the one asked for is absent, ambiguous or
     not usable; InvalidArgumentError for another type; MissingDependencyError without pyopencl;
     DeviceError in a fork of a process that had used or listed devices.
     """
-    if devices.forked:
-        devices.require_drivers()
+    devices.require_drivers()
     if isinstance(device, Runtime):
         return device
     origin = "device="
@@ -81,9 +68,8 @@ def get_runtime(device: Any = None) -> Runtime:
 
 
 def default_device(infos: list[DeviceInfo]) -> DeviceInfo | None:
-    """The device that is used when none is named, among probed ones; None if none is usable."""
-    usable = [info for info in infos if info.usable]
-    return min(usable, key=devices.preference) if usable else None
+    """Return the device that is used when none is named, among probed ones, if one is usable."""
+    return min((info for info in infos if info.usable), key=devices.preference, default=None)
 
 
 def describe_devices() -> str:
@@ -99,120 +85,99 @@ def describe_devices() -> str:
     MissingDependencyError
         If pyopencl cannot be imported.
     """
-    _, notes = devices.find_candidates()
-    infos = list_devices()
+    infos, (_, notes) = list_devices(), devices.find_devices()
     best, variable = default_device(infos), devices.DEVICE_VARIABLE
     selector = os.environ.get(variable, "").strip()
     if selector:
         try:
             best = devices.select(infos, selector, f"{variable}=")
-            last = f"Default: {best.full_name}, because {variable}={os.environ[variable]!r}."
+            last = f"Default: {best.full_name}, because {variable}={selector!r}."
             if not best.usable:
                 last = f"No default: {_unusable(best, f'{variable}={selector!r}')}."
+                best = None
         except NoDeviceError as exc:
             best, last = None, f"No default: {exc}."
-    elif best is not None:
+    elif best is None:
+        last = devices.no_device_message(infos, []) + "."
+    else:
         last = (
             f"Default: {best.full_name}; GPUs come first, then CPUs, Intel's before PoCL.\n"
             f"Choose another with device=, --device or {variable}."
         )
-    else:
-        last = devices.no_device_message(infos, []) + "."
-
-    lines = []
-    for info in infos:
-        mark = "*" if best and best.usable and info.index == best.index else " "
-        memory, most = bytes_text(info.global_memory), bytes_text(info.max_allocation)
-        precision = "fp64" if info.has_fp64 else "no fp64"
-        lines.append(f"{mark} [{info.platform_index}:{info.device_index}] {info.full_name}")
-        lines.append(
-            f"    {info.kind}, {info.compute_units} compute units, {memory} memory, "
-            f"{most} per buffer, {precision}"
-        )
-        lines.append(f"    {info.version}, driver {info.driver}, selector {info.selector!r}")
-        lines.append("    usable" if info.usable else f"    not used: {info.reason}")
+    lines = [
+        f"{'*' if info is best else ' '} [{info.platform_index}:{info.device_index}] "
+        f"{info.full_name}\n"
+        f"    {info.kind}, {info.compute_units} compute units, {bytes_text(info.global_memory)} "
+        f"memory, {bytes_text(info.max_allocation)} per buffer, "
+        f"{'fp64' if info.has_fp64 else 'no fp64'}\n"
+        f"    {info.version}, driver {info.driver}, selector {info.selector!r}\n"
+        f"    {'usable' if info.usable else f'not used: {info.reason}'}"
+        for info in infos
+    ]
     return "\n".join([*lines, last, *(f"Note: {note}." for note in notes if note not in last)])
 
 
 def _best() -> Runtime:
     """Find the first device that passes the probe, and remember it: the drivers' list is fixed."""
     global _default
-    candidates, notes = devices.find_candidates()
-    for candidate in sorted(candidates, key=lambda c: devices.preference(c.info)):
-        _default = _probe(candidate)[1]
+    infos, notes = devices.find_devices()
+    for info in sorted(infos, key=devices.preference):
+        _default = _probe(info)[1]
         if _default is not None:
             return _default
-    infos = [_probe(candidate)[0] for candidate in candidates]
-    raise NoDeviceError(devices.no_device_message(infos, notes))
+    raise NoDeviceError(devices.no_device_message(list_devices(), notes))
 
 
 def _named(device: Any, origin: str) -> Runtime:
-    candidates, _ = devices.find_candidates()
-    infos, context = [candidate.info for candidate in candidates], None
-    there = f"there is {devices.listing(infos)}"
+    """Return the runtime of a device that is asked for in any way."""
+    infos, _ = devices.find_devices()
+    same = [
+        info
+        for info in infos
+        if getattr(device, "int_ptr", None) == devices.handles[info.index].int_ptr
+        or (getattr(device, "full_name", None) == info.full_name
+        and device.index == info.index)
+    ]
     if isinstance(device, str):
-        info = devices.select(infos, device, origin)
-    elif isinstance(device, DeviceInfo):
-        if (device.index, device.full_name) not in [(i.index, i.full_name) for i in infos]:
-            raise NoDeviceError(
-                f"the device {device.full_name} does not exist in this process; {there}"
-            )
-        info = device
-    elif hasattr(device, "int_ptr"):
-        context = device if hasattr(device, "devices") else None
-        if context is not None and len(context.devices) != 1:
-            raise InvalidArgumentError(
-                f"a context of {len(context.devices)} devices was given; it must have exactly one"
-            )
-        handle = device if context is None else context.devices[0]
-        same = [each.info for each in candidates if each.device.int_ptr == handle.int_ptr]
-        if not same:
-            raise NoDeviceError(
-                f"{device!r} is none of the devices that the drivers list (a sub-device?); {there}"
-            )
-        info = same[0]
-    else:
+        same = [devices.select(infos, device, origin)]
+    elif not (isinstance(device, DeviceInfo) or hasattr(device, "int_ptr")):
         raise InvalidArgumentError(
             f"device={device!r} of type {type(device).__name__}: give a name, a DeviceInfo, a "
-            "Runtime, a pyopencl.Device or a pyopencl.Context"
+            "Runtime or a pyopencl.Device"
         )
-
-    candidate = next(each for each in candidates if each.info.index == info.index)
-    probed, runtime = _probe(candidate)
+    if not same:
+        raise NoDeviceError(
+            f"the device {getattr(device, 'full_name', device)} does not exist in this process (a "
+            f"sub-device, or a context?); there is {devices.listing(infos)}"
+        )
+    probed, runtime = _probe(same[0])
     if runtime is None:
         raise NoDeviceError(_unusable(probed, f"{origin}{device!r}"))
-    if context is None:
-        return runtime
-    key = int(context.int_ptr)
-    if key not in _shared_contexts:
-        # The runtime keeps the context alive, so that its address cannot be given to another
-        _shared_contexts[key] = Runtime(Candidate(probed, candidate.device), context)
-    return _shared_contexts[key]
+    return runtime
 
 
 def _unusable(info: DeviceInfo, asked: str) -> str:
     return (
         f"{asked} means {info.full_name}, which is not usable: {info.reason}; "
-        f"choose another device, or {devices.remedy()}"
+        f"choose another device, or {devices.advice}"
     )
 
 
-def _probe(candidate: Candidate) -> tuple[DeviceInfo, Runtime | None]:
+def _probe(info: DeviceInfo) -> tuple[DeviceInfo, Runtime | None]:
     """Run the probe kernel, once per device and process."""
     with _lock:
-        index = candidate.info.index
-        if index not in _probed:
+        if info.index not in _probed:
             runtime, reason = None, ""
             try:
-                runtime = Runtime(candidate)
+                runtime = Runtime(info)
                 reason = run_probe(runtime)
             except VDIError as exc:
                 reason = f"the probe kernel failed: {exc}"
-            info = replace(candidate.info, usable=not reason, reason=reason)
+            info = replace(info, usable=not reason, reason=reason)
             if runtime is not None:
                 runtime.info = info
-            _probed[index] = (info, None if reason else runtime)
-        return _probed[index]
+            _probed[info.index] = (info, None if reason else runtime)
+        return _probed[info.index]
 
 
 def run_probe(runtime: Runtime) -> str:
@@ -228,30 +193,14 @@ def run_probe(runtime: Runtime) -> str:
         runtime.fill(total, 0)
         launch = runtime.bind(PROBE, x=inputs, values=values, group_sum=sums, total=total)
         launch(PROBE_COUNT, PROBE_GROUP, shared=PROBE_GROUP)
-        return _check_probe(x, *(runtime.download(b) for b in (values, sums, total)))
-
-
-def _check_probe(x: Any, values: Any, sums: Any, total: Any) -> str:
+        computed, group_sums, whole = (runtime.download(b) for b in (values, sums, total))
     exact = x.astype(np.float64)
-    square = (x * x).astype(np.float64)
-    expected = {
-        "expm1": np.expm1(-exact),
-        "log1p": np.log1p(-exact),
-        "exp": np.exp(-exact),
-        "fma": exact * exact - square,  # exact in float64: 48 bits
+    fused = exact * exact - (x * x)  # exact in float64: 48 bits
+    expected = np.stack([np.expm1(-exact), np.log1p(-exact), np.exp(-exact), fused], axis=1)
+    right = {
+        "functions": np.allclose(computed, expected, rtol=PROBE_RTOL, atol=0),
+        "local memory": np.array_equal(group_sums, np.arange(len(x)).reshape(groups, -1).sum(1)),
+        "atomic functions": whole[0] == len(x) * (len(x) + 1) // 2,
     }
-    for column, (name, wanted) in enumerate(expected.items()):
-        rtol = 0.0 if name == "fma" else PROBE_RTOL
-        error = np.abs(values[:, column] - wanted)
-        if not np.all(error <= rtol * np.abs(wanted)):
-            worst = int(np.nanargmax(np.where(np.isnan(error), np.inf, error)))
-            return (
-                f"the probe kernel's {name} of {x[worst]!r} is {values[worst, column]!r}, "
-                f"not {wanted[worst]!r}"
-            )
-    group_sums = np.arange(len(x), dtype=np.uint32).reshape(len(sums), -1).sum(axis=1)
-    if not np.array_equal(sums, group_sums):
-        return f"the probe kernel's sums through local memory are {sums}, not {group_sums}"
-    if total[0] != len(x) * (len(x) + 1) // 2:
-        return f"the probe kernel's atomic sum is {total[0]}, not {len(x) * (len(x) + 1) // 2}"
-    return ""
+    wrong = [name for name, is_right in right.items() if not is_right]
+    return f"the probe kernel computes wrong numbers by {', '.join(wrong)}" if wrong else ""

@@ -1,6 +1,6 @@
 """The devices that exist, what is known of each, and which one a selector or the default means.
 
-Everything here but :func:`find_candidates` works on plain :class:`DeviceInfo` lists and needs no
+Everything here but :func:`find_devices` works on plain :class:`DeviceInfo` lists and needs no
 driver.
 """
 
@@ -9,7 +9,7 @@ import os
 import re
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any
@@ -34,8 +34,6 @@ REMEDY = (
 NOT_PROBED = "not probed"
 
 _KIND_RANK = {"GPU": 0, "CPU": 1, "accelerator": 2}
-_INDEX_SELECTOR = re.compile(r"^\s*(\d+)\s*:\s*(\d+)\s*$")
-_PLATFORM_SELECTOR = re.compile(r"^(.+):\s*(\d+)\s*$")
 
 
 @dataclass(frozen=True)
@@ -94,14 +92,6 @@ class DeviceInfo:
         return (self.platform_index, self.device_index)
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A device that a driver lists: what is known of it, and the driver's own object."""
-
-    info: DeviceInfo
-    device: Any
-
-
 def preference(info: DeviceInfo) -> tuple[int, ...]:
     """Sort key of the default choice, best first.
 
@@ -125,54 +115,46 @@ def match(infos: Sequence[DeviceInfo], selector: str) -> list[DeviceInfo]:
     ``"platform / device"`` or of the version. Letter case is ignored; an exact name beats a part of
     one, and a part of the platform beats one of the device.
     """
-    by_index = _INDEX_SELECTOR.match(selector)
-    if by_index:
-        wanted = (int(by_index[1]), int(by_index[2]))
-        return [info for info in infos if info.index == wanted]
-
-    text = selector.strip().lower()
-    exact = [i for i in infos if text in (i.full_name.lower(), i.name.lower(), i.selector.lower())]
-    if exact:
-        return exact
-    # "intel" is a platform before it is the processor that PoCL runs on; "pocl" is in versions.
-    for words in (
-        lambda i: i.platform,
-        lambda i: i.full_name,
-        lambda i: f"{i.version} {i.driver}",
-    ):
-        parts = [info for info in infos if text in words(info).lower()]
-        if parts:
-            return parts
-
-    by_platform = _PLATFORM_SELECTOR.match(text)
-    if by_platform:
-        platform, number = by_platform[1].strip(), int(by_platform[2])
-        return [i for i in infos if platform in i.platform.lower() and i.device_index == number]
-    return []
+    text = re.sub(r"\s*:\s*", ":", selector.strip().lower())
+    platform, _, number = text.rpartition(":")
+    if platform.isdigit() and number.isdigit():
+        return [info for info in infos if info.index == (int(platform), int(number))]
+    ways: tuple[Callable[[DeviceInfo], bool], ...] = (
+        lambda i: text in (i.full_name.lower(), i.name.lower(), i.selector.lower()),
+        # "intel" is a platform before it is the processor that PoCL runs on; "pocl" is in versions
+        lambda i: text in i.platform.lower(),
+        lambda i: text in i.full_name.lower(),
+        lambda i: text in f"{i.version} {i.driver}".lower(),
+        lambda i: platform != "" and platform in i.platform.lower() and number == str(i.index[1]),
+    )
+    return next((found for way in ways if (found := [i for i in infos if way(i)])), [])
 
 
 def with_selectors(infos: Sequence[DeviceInfo]) -> list[DeviceInfo]:
-    """The same devices, each with the shortest kind of selector that means it alone."""
-    platforms: dict[str, set[int]] = {}
-    for info in infos:
-        platforms.setdefault(info.platform.lower(), set()).add(info.platform_index)
-    named = []
-    for info in infos:
-        unique = len(platforms[info.platform.lower()]) == 1
-        head = info.platform.lower() if unique else str(info.platform_index)
-        named.append(replace(info, selector=f"{head}:{info.device_index}"))
-    return named
+    """Return the same devices, each with the shortest kind of selector that means it alone."""
+    platforms = {(info.platform.lower(), info.platform_index) for info in infos}
+    names = [name for name, _ in platforms]
+    return [
+        replace(info, selector=f"{name if names.count(name) == 1 else number}:{info.device_index}")
+        for info in infos
+        for name, number in [(info.platform.lower(), info.platform_index)]
+    ]
 
 
 def listing(infos: Sequence[DeviceInfo]) -> str:
-    """The devices in one sentence, for error messages."""
-    if not infos:
-        return "no device at all"
-    return "; ".join(
-        f"{info.full_name} ({info.kind}, selected by {info.selector!r}"
-        + ("" if info.usable or info.reason in ("", NOT_PROBED) else f", not usable: {info.reason}")
-        + ")"
-        for info in infos
+    """Return the devices in one sentence, for error messages."""
+    return (
+        "; ".join(
+            f"{info.full_name} ({info.kind}, selected by {info.selector!r}"
+            + (
+                ""
+                if info.usable or info.reason in ("", NOT_PROBED)
+                else f", not usable: {info.reason}"
+            )
+            + ")"
+            for info in infos
+        )
+        or "no device at all"
     )
 
 
@@ -190,22 +172,17 @@ def select(infos: Sequence[DeviceInfo], selector: str, origin: str) -> DeviceInf
             f"{origin}{selector!r} means {len(found)} devices: {listing(found)}; "
             "name one of them by its selector"
         )
-    advice = f"; {remedy()}" if not infos else ""
     raise NoDeviceError(
-        f"{origin}{selector!r}: there is no such OpenCL device; there is {listing(infos)}{advice}"
+        f"{origin}{selector!r}: there is no such OpenCL device; there is {listing(infos)}"
+        f"{'' if infos else f'; {advice}'}"
     )
 
 
 def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
-    """Text for when nothing can be used: what was found, why it failed, and what to do."""
+    """Return what was found where nothing can be used, why it failed, and what to do."""
     found = f"found {listing(infos)}" if infos else "no OpenCL driver lists a device"
-    details = "".join(f"; {note}" for note in notes if note and note != remedy())
-    return f"no usable OpenCL device: {found}{details}. Remedy: {remedy()}"
-
-
-def remedy() -> str:
-    """Return what to do where no device will do; what is installed already is not advised."""
-    return _advice
+    details = "".join(f"; {note}" for note in notes if note and note != advice)
+    return f"no usable OpenCL device: {found}{details}. Remedy: {advice}"
 
 
 def bytes_text(nbytes: int) -> str:
@@ -217,8 +194,11 @@ def bytes_text(nbytes: int) -> str:
 
 
 _lock = threading.RLock()
-_found: tuple[list[Candidate], list[str]] | None = None
-_advice = REMEDY
+_found: tuple[list[DeviceInfo], list[str]] | None = None
+#: The driver's own object of each device, by its index.
+handles: dict[tuple[int, int], Any] = {}
+#: What to do where no device will do; what is installed already is not advised.
+advice = REMEDY
 #: Whether drivers are here that the threads they work with did not follow into a fork.
 forked = False
 
@@ -251,7 +231,7 @@ def opencl() -> ModuleType:
 
     MissingDependencyError if it, or the OpenCL loader that it needs, cannot be imported.
     """
-    find_candidates()
+    find_devices()
     # Once it is there without the import system, whose locks a finalizer that frees device memory
     # must not ask for in the middle of an import (Python 3.10 raises KeyError)
     return sys.modules.get("pyopencl") or _import_pyopencl()
@@ -274,13 +254,13 @@ def _import_pyopencl() -> ModuleType:
     return cl
 
 
-def find_candidates() -> tuple[list[Candidate], list[str]]:
+def find_devices() -> tuple[list[DeviceInfo], list[str]]:
     """Return every device of every platform, unprobed, in the drivers' order, listed once.
 
     Also notes on how they were looked for. MissingDependencyError if pyopencl cannot be imported,
     DeviceError in a fork of a process that had listed them.
     """
-    global _found, _advice
+    global _found, advice
     require_drivers()
     if _found is not None:
         return _found  # likewise without a lock
@@ -289,17 +269,15 @@ def find_candidates() -> tuple[list[Candidate], list[str]]:
             with drivers_visible() as discovery, pocl_cache_at_hand():
                 early = "pyopencl" in sys.modules
                 cl = _import_pyopencl()
-                candidates, notes = _list(cl)
+                infos, notes = _list(cl)
                 discovery = after_listing(discovery) if early else discovery
-            _advice = discovery.note if discovery.hidden else REMEDY
-            _found = candidates, [discovery.note, *notes]
+            advice = discovery.note if discovery.hidden else REMEDY
+            _found = infos, [discovery.note, *notes]
         return _found
 
 
-def _list(cl: ModuleType) -> tuple[list[Candidate], list[str]]:
-    notes: list[str] = []
-    infos: list[DeviceInfo] = []
-    handles: list[Any] = []
+def _list(cl: ModuleType) -> tuple[list[DeviceInfo], list[str]]:
+    notes, infos = [], []
     try:
         platforms = cl.get_platforms()
     except cl.Error as exc:  # PLATFORM_NOT_FOUND_KHR: the loader knows no driver
@@ -313,29 +291,21 @@ def _list(cl: ModuleType) -> tuple[list[Candidate], list[str]]:
         for device_index, device in enumerate(devices):
             try:
                 infos.append(_describe(cl, device, platform_index, device_index))
+                handles[infos[-1].index] = device
             except cl.Error as exc:
                 notes.append(f"device {platform_index}:{device_index} cannot be queried: {exc}")
-                continue
-            handles.append(device)
-    pairs = zip(with_selectors(infos), handles, strict=True)
-    return [Candidate(info, device) for info, device in pairs], notes
+    return with_selectors(infos), notes
 
 
 def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: int) -> DeviceInfo:
-    kinds = cl.device_type
-    if device.type & kinds.GPU:
-        kind = "GPU"
-    elif device.type & kinds.CPU:
-        kind = "CPU"
-    else:
-        kind = "accelerator"
+    kinds = {cl.device_type.GPU: "GPU", cl.device_type.CPU: "CPU"}
     return DeviceInfo(
         name=device.name.strip(),
         platform=device.platform.name.strip(),
         vendor=device.vendor.strip(),
         version=device.version.strip(),
         driver=device.driver_version.strip(),
-        kind=kind,
+        kind=next((name for bit, name in kinds.items() if device.type & bit), "accelerator"),
         compute_units=int(device.max_compute_units),
         global_memory=int(device.global_mem_size),
         max_allocation=int(device.max_mem_alloc_size),

@@ -49,71 +49,55 @@ class Discovery:
 
 def intel_library() -> Path | None:
     """Return the absolute path of pip's Intel CPU runtime, or None."""
-    candidates = []
-    try:
+    candidates = [Path(sys.prefix) / "lib" / INTEL_LIBRARY]
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         files = importlib.metadata.distribution(INTEL_DISTRIBUTION).files or []
-        candidates = [Path(str(f.locate())) for f in files if f.name == INTEL_LIBRARY]
-    except importlib.metadata.PackageNotFoundError:
-        pass
-    candidates.append(Path(sys.prefix) / "lib" / INTEL_LIBRARY)
+        candidates[:0] = [Path(str(f.locate())) for f in files if f.name == INTEL_LIBRARY]
     return next((path.resolve() for path in candidates if path.resolve().is_file()), None)
 
 
 def vendor_folders() -> list[Path]:
-    """Folders whose vendor files a loader would read if its search path were left alone."""
+    """Return folders whose vendor files a loader would read if its search path were left alone."""
     folders = [SYSTEM_VENDORS, Path(sys.prefix) / "etc" / "OpenCL" / "vendors"]
     # The loader of pyopencl's wheels reads its own folder; pocl-binary-distribution installs there.
     spec = importlib.util.find_spec("pyopencl")
-    if spec is not None and spec.origin is not None:
-        folders.append(Path(spec.origin).parent / ".libs")
-    return folders
+    return [*folders, Path(spec.origin).parent / ".libs"] if spec and spec.origin else folders
 
 
-def read_vendor_files(folders: list[Path]) -> dict[str, str]:
-    """Vendor files that name a loadable library: a file name that is free, and the library.
+def libraries_in(folders: list[Path]) -> list[str]:
+    """Return the libraries that vendor files name, each once.
 
-    A bare library name is left to the dynamic linker; a path that does not exist is dropped,
-    as is a library that an earlier file names.
+    A bare library name is left to the dynamic linker; a path that does not exist is dropped.
     """
-    libraries: dict[str, str] = {}
-    for folder in folders:
-        if not folder.is_dir():
-            continue
-        for file in sorted(folder.glob("*.icd")):
-            try:
-                library = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
-            except OSError:
-                continue  # unreadable for us, hence for the loader as well
-            beside = folder / library
-            if library and os.sep not in library and beside.is_file():
-                library = str(beside)
-            missing = os.sep in library and not Path(library).is_file()
-            if not library or missing or library in libraries.values():
-                continue
-            libraries[f"{len(libraries):02d}-{file.name}"] = library
-    return libraries
+    found: list[str] = []
+    for file in (file for folder in folders for file in sorted(folder.glob("*.icd"))):
+        try:
+            library = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
+        except OSError:
+            continue  # unreadable for us, hence for the loader as well
+        if library and (file.parent / library).is_file():
+            library = str(file.parent / library)
+        if library and (os.sep not in library or Path(library).is_file()) and library not in found:
+            found.append(library)
+    return found
 
 
-def plan() -> tuple[dict[str, str] | None, Discovery]:
-    """Return the vendor files to show (None: leave the environment alone), and why."""
+def plan() -> tuple[list[str], Discovery]:
+    """Return the libraries to show (none: leave the environment alone), and why."""
     if not sys.platform.startswith("linux"):
-        return None, Discovery(None, "drivers are found by the system's own loader")
+        return [], Discovery(None, "drivers are found by the system's own loader")
     library = intel_library()
     for variable in USER_VARIABLES:
         if os.environ.get(variable):
             note = f"{variable}={os.environ[variable]!r} is set and obeyed"
             unset = f": unset it to have {library} added" if library else ""
-            return None, Discovery(None, note + unset, hidden=library is not None)
+            return [], Discovery(None, note + unset, hidden=library is not None)
     if library is None:
-        return None, Discovery(None, f"no {INTEL_LIBRARY} from pip in this environment")
-    system = read_vendor_files([SYSTEM_VENDORS])
-    if any(Path(entry).name.startswith(INTEL_LIBRARY) for entry in system.values()):
-        return None, Discovery(None, "the system's vendor files name Intel's CPU runtime already")
-
-    files = read_vendor_files(vendor_folders())
-    if str(library) not in files.values():
-        files["zz-pyvista-vdi-intel.icd"] = str(library)
-    return files, Discovery(library, f"added {library} to the loader's search path")
+        return [], Discovery(None, f"no {INTEL_LIBRARY} from pip in this environment")
+    if any(Path(name).name.startswith(INTEL_LIBRARY) for name in libraries_in([SYSTEM_VENDORS])):
+        return [], Discovery(None, "the system's vendor files name Intel's CPU runtime already")
+    libraries = dict.fromkeys([*libraries_in(vendor_folders()), str(library)])
+    return [*libraries], Discovery(library, f"added {library} to the loader's search path")
 
 
 def after_listing(discovery: Discovery) -> Discovery:
@@ -141,26 +125,20 @@ def drivers_visible() -> Iterator[Discovery]:
 
     Import pyopencl and list the platforms inside: the loader keeps what it found.
     """
-    files, discovery = plan()
-    if files is None:
-        yield discovery
-        return
+    libraries, discovery = plan()
     with contextlib.ExitStack() as stack:
-        try:
-            # mkdtemp creates with mode 0700: nobody else can slip a library in.
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="pyvista-vdi-icd-"))
-            for name, library in files.items():
-                Path(folder, name).write_text(
-                    library + "\n", encoding="utf-8", errors="surrogateescape"
-                )
-        except OSError as exc:
-            yield Discovery(None, f"no temporary folder for the loader's vendor files: {exc}")
-            return
-        os.environ["OCL_ICD_VENDORS"] = folder
-        try:
-            yield discovery
-        finally:
-            os.environ.pop("OCL_ICD_VENDORS", None)
+        if libraries:
+            try:
+                # mkdtemp creates with mode 0700: nobody else can slip a library in.
+                folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="pyvista-vdi-icd-"))
+                for number, library in enumerate(libraries):
+                    text = os.fsencode(library + "\n")
+                    Path(folder, f"{number:02d}.icd").write_bytes(text)
+                stack.enter_context(_variable("OCL_ICD_VENDORS", folder))
+            except OSError as exc:
+                why = f"no temporary folder for the loader's vendor files: {exc}"
+                discovery = Discovery(None, why)
+        yield discovery
 
 
 @contextlib.contextmanager
@@ -169,19 +147,26 @@ def pocl_cache_at_hand() -> Iterator[None]:
 
     List the platforms inside: it keeps what it found. The environment is put back.
     """
+    folder = None
     try:
         writable_cache("pyvista-vdi")
-        folder = None
     except OSError:
         folder = user_cache()
     if folder is None or os.environ.get("POCL_CACHE_DIR"):
         yield
         return
-    os.environ["POCL_CACHE_DIR"] = str(folder / "pocl")
+    with _variable("POCL_CACHE_DIR", str(folder / "pocl")):
+        yield
+
+
+@contextlib.contextmanager
+def _variable(name: str, value: str) -> Iterator[None]:
+    """Set a variable of the environment that is not set, for the block."""
+    os.environ[name] = value
     try:
         yield
     finally:
-        os.environ.pop("POCL_CACHE_DIR", None)
+        os.environ.pop(name, None)
 
 
 @contextlib.contextmanager

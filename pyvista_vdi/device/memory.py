@@ -1,24 +1,27 @@
-"""Memory of a device: buffers, checked before they are taken, and page-locked host memory."""
+"""A device's command queues and its memory: buffers, checked before they are taken, and copies."""
 
 import contextlib
 import math
 import threading
 import weakref
-from collections.abc import Callable, Iterator
-from types import TracebackType
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pyvista_vdi.device import devices
-from pyvista_vdi.device.devices import Candidate, bytes_text
-from pyvista_vdi.device.queues import Device
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.device.devices import DeviceInfo, bytes_text
+from pyvista_vdi.device.scheduling import Turns
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
 
 #: Page-locked host memory that a device may have, and the least worth it, bytes.
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
+#: Bytes of the largest results whose memory on a GPU is kept for the next ones, and how many.
+MOST_POOLED, BLOCKS_HELD = 64 * 2**20, 4
+#: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
+COPY_BYTES = 4 * 2**20
 
 
 class PinnedArrays:
@@ -39,17 +42,15 @@ class PinnedArrays:
         """Return an uninitialised array, ordinary memory where there is no room."""
         nbytes = math.prod(shape) * dtype.itemsize
         with self._lock:
-            places = (k for k, (memory, _) in enumerate(self._free) if memory.nbytes == nbytes)
-            place = next(places, None)
-            if place is not None:
-                block = self._free.pop(place)
+            sizes = [memory.nbytes for memory, _ in self._free]
+            while nbytes not in sizes and sizes and self._taken + nbytes > PINNED_BYTES:
+                self._taken -= sizes.pop(0)
+                self._free.pop(0)[1]()
+            if nbytes in sizes:
+                block = self._free.pop(sizes.index(nbytes))
+            elif self._taken + nbytes > PINNED_BYTES:
+                return np.empty(shape, dtype)
             else:
-                while self._free and self._taken + nbytes > PINNED_BYTES:
-                    memory, release = self._free.pop(0)
-                    self._taken -= memory.nbytes
-                    release()
-                if self._taken + nbytes > PINNED_BYTES:
-                    return np.empty(shape, dtype)
                 try:
                     block = self._allocate(nbytes)
                 except DeviceMemoryError:
@@ -64,12 +65,12 @@ class PinnedArrays:
 class Held:
     """What goes back with a buffer: bytes that are accounted for, and the driver's memory.
 
-    ``readers``: where the memory is a host's array, the queues whose kernels use it.
+    ``queues``: where the memory is a host's array, those whose kernels use it.
     """
 
     nbytes = 0
     memory: Any = None
-    readers: set[int] | None = None
+    queues: set[Any] | None = None
 
 
 class DeviceBuffer:
@@ -78,9 +79,8 @@ class DeviceBuffer:
     Released by :meth:`release`, at the end of a ``with`` block, or with its last reference.
     ``nbytes`` is its size as asked for, ``name`` what it holds, for messages, and ``memory`` the
     driver's object, None when it has been given back. :meth:`Runtime.write` and
-    :meth:`Runtime.fill` change it if it is ``writable``. Where its memory is a host array's,
-    ``readers`` are the queues whose kernels use it, and ``host`` is the array, if kernels write it
-    (:meth:`Runtime.result`, :meth:`Runtime.target`).
+    :meth:`Runtime.fill` change it if it is ``writable``. Where kernels write a host array's memory,
+    that is ``host`` (:meth:`Runtime.result`, :meth:`Runtime.target`).
     """
 
     def __init__(
@@ -92,13 +92,9 @@ class DeviceBuffer:
         *,
         writable: bool = True,
     ) -> None:
-        self.shape = shape
-        self.dtype = dtype
+        self.shape, self.dtype, self.name, self.writable = shape, dtype, name, writable
         self.nbytes = math.prod(shape) * dtype.itemsize
-        self.name = name
-        self.writable = writable
         self.memory: Any = None
-        self.readers: set[int] | None = None
         self.host: NDArray[Any] | None = None
         # Nothing is held yet, so that wherever an interrupt comes, what is held goes back
         self.held = Held()
@@ -115,15 +111,16 @@ class DeviceBuffer:
         """Whether the memory has been given back."""
         return self.memory is None
 
+    def used(self) -> Any:
+        """Return the driver's memory for a use of it; DeviceError if it has been given back."""
+        if self.memory is None:
+            raise DeviceError(f"the buffer {self.name!r} was used after its release")
+        return self.memory
+
     def __enter__(self) -> "DeviceBuffer":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.release()
 
     def __repr__(self) -> str:
@@ -143,32 +140,26 @@ def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
         made.pop_all()
 
 
-def shape_of(nbytes_or_shape: int | tuple[int, ...], dtype: np.dtype[Any]) -> tuple[int, ...]:
-    """Return the shape for an integer number of *bytes*, or the given shape, checked."""
-    if isinstance(nbytes_or_shape, (int, np.integer)):
-        nbytes = int(nbytes_or_shape)
-        if nbytes < 0 or nbytes % dtype.itemsize:
-            raise InvalidArgumentError(
-                f"{nbytes} bytes are no whole number of {dtype} ({dtype.itemsize} bytes each); "
-                "an integer size is in bytes, a shape is a tuple"
-            )
-        return (nbytes // dtype.itemsize,)
-    shape = tuple(map(int, nbytes_or_shape))
-    if min(shape, default=0) < 0:
-        raise InvalidArgumentError(f"a buffer's shape must not be negative: {shape}")
-    return shape
+class Memory(Turns):
+    """A device and a context on it, a command queue for all threads and for who asks, and buffers.
 
+    ``cl`` is pyopencl; ``vector_floats`` the floats of the device's longest vectors; ``allocated``
+    the bytes that buffers hold now, where arrays used in place count nothing, and
+    ``peak_allocated`` the most that they ever held.
+    """
 
-#: Bytes of the largest results whose memory on a GPU is kept for the next ones, and how many.
-MOST_POOLED, BLOCKS_HELD = 64 * 2**20, 4
+    allocated = peak_allocated = 0
 
-
-class Memory(Device):
-    """A device with buffers on it."""
-
-    def __init__(self, candidate: Candidate, context: Any = None) -> None:
-        super().__init__(candidate, context)
-        self._peak = 0  # bytes
+    def __init__(self, info: DeviceInfo) -> None:
+        super().__init__()
+        self.cl: Any = devices.opencl()
+        self.info, self.is_cpu = info, info.kind == "CPU"
+        self._device = devices.handles[info.index]
+        self.vector_floats = int(self._device.native_vector_width_float)
+        with self.failing("making a context"):
+            self._context = self.cl.Context([self._device])
+        self._queues: list[Any] = []  # that of all threads first
+        self._new_queue()
         # Re-entrant: a garbage collection inside the lock may release other buffers
         self._ledger = threading.RLock()
         self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
@@ -177,15 +168,107 @@ class Memory(Device):
         tools = self.cl.tools
         self._pool = tools.MemoryPool(tools.ImmediateAllocator(self.queue))
 
-    @property
-    def allocated(self) -> int:
-        """Bytes that this runtime's buffers hold now; arrays used in place count nothing."""
-        return self._allocated
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} on {self.info.full_name}>"
+
+    def failure(self, error: Any, doing: str) -> DeviceError | DeviceMemoryError:
+        """Return the package's error for one of the driver's, naming what was being done."""
+        codes = self.cl.status_code
+        code = getattr(error, "code", None)  # what pyopencl raises by itself has none
+        if code in (
+            codes.MEM_OBJECT_ALLOCATION_FAILURE,
+            codes.OUT_OF_RESOURCES,
+            codes.OUT_OF_HOST_MEMORY,
+            codes.INVALID_BUFFER_SIZE,
+        ):
+            return DeviceMemoryError(
+                f"{self.info.full_name!r} ran out of memory or resources while {doing} "
+                f"({error}); it has {bytes_text(self.info.global_memory)}, of which this "
+                f"process holds {bytes_text(self.allocated)}: use a smaller volume, window "
+                "size or max_supersegments, or another device"
+            )
+        remedy = "try again, or use another device"
+        if code in (
+            codes.DEVICE_NOT_AVAILABLE,
+            codes.INVALID_COMMAND_QUEUE,
+            codes.INVALID_CONTEXT,
+            codes.INVALID_DEVICE,
+        ):
+            remedy = (
+                "it may be lost (unplugged, or reset by its driver): start the program again, or "
+                "use another device"
+            )
+        return DeviceError(
+            f"{self.info.full_name!r} failed while {doing}: {error}; {remedy} (device=, or the "
+            f"environment variable {devices.DEVICE_VARIABLE}; pyvista-vdi devices lists them)"
+        )
+
+    @contextlib.contextmanager
+    def failing(self, doing: str) -> Iterator[None]:
+        """Raise the driver's errors as the package's, which say what was being done."""
+        try:
+            yield
+        except self.cl.Error as exc:
+            raise self.failure(exc, doing) from exc
 
     @property
-    def peak_allocated(self) -> int:
-        """The most bytes that were held at once."""
-        return self._peak
+    def queue(self) -> Any:
+        """The calling thread's queue; an error in a fork, where its driver would wait for ever."""
+        devices.require_drivers()
+        return self.thread.queue or self._queues[0]
+
+    def _new_queue(self) -> Any:
+        with self.failing("making a command queue"):
+            self._queues.append(queue := self.cl.CommandQueue(self._context, self._device))
+        return queue
+
+    @contextlib.contextmanager
+    def queue_scope(self) -> Iterator[None]:
+        """Open an in-order command queue of the calling thread's own for the ``with`` block.
+
+        What was enqueued before is finished first, and what is enqueued inside is finished at
+        the end, so buffers may cross the borders of the block.
+        """
+        self.finish()
+        outer, inner = self.thread.queue, self._new_queue()
+        self.thread.queue = inner
+        try:
+            yield
+        finally:
+            self.thread.queue = outer
+            try:
+                self._finish([inner])
+            finally:
+                self._queues.remove(inner)
+
+    def _finish(self, queues: Iterable[Any]) -> None:
+        """Finish queues where their driver is."""
+        with self.failing("waiting for enqueued work"):
+            for queue in () if devices.forked else queues:
+                queue.finish()
+
+    def finish(self) -> None:
+        """Wait until all is done that was enqueued on the calling thread's queue.
+
+        Threads outside :meth:`queue_scope` share one. A buffer that a thread with a queue of its
+        own has written may be handed to another thread after this. DeviceError if a kernel failed.
+        """
+        self._finish([self.queue])
+
+    @contextlib.contextmanager
+    def background(
+        self,
+        cancelled: Callable[[], bool] = lambda: False,
+        paused: Callable[[], bool] = lambda: False,
+    ) -> Iterator[None]:
+        """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
+
+        The calling thread gets a queue of its own. Its launches and copies are cut into pieces
+        that take no longer than a turn; each is finished when the call returns. ``cancelled`` is
+        asked between pieces: True ends the work with :class:`Cancelled`, from any method.
+        """
+        with self.queue_scope(), super().background(cancelled, paused):
+            yield
 
     @property
     def in_place_alignment(self) -> int | None:
@@ -196,26 +279,19 @@ class Memory(Device):
         return self._alignment if self.is_cpu and HOST_ALIGNMENT % self._alignment == 0 else None
 
     def in_place(self, array: NDArray[Any]) -> bool:
-        """Whether kernels can use a C-contiguous array where it is."""
+        """Return whether kernels can use a C-contiguous array where it is."""
         return self.is_cpu and array.nbytes > 0 and array.ctypes.data % self._alignment == 0
 
     def buffer(
-        self,
-        nbytes_or_shape: int | tuple[int, ...],
-        dtype: DTypeLike = np.float32,
-        name: str = "buffer",
-        read_only: bool = False,
+        self, shape: tuple[int, ...], dtype: DTypeLike = np.float32, name: str = "buffer"
     ) -> DeviceBuffer:
         """Return uninitialised memory on the device, checked against its limits before.
 
-        An integer is a number of **bytes**, a tuple a shape in elements; zero is allowed, less or
-        no whole number of elements an InvalidArgumentError. ``name`` is what it is for: messages
-        say it. Release it, use it in a ``with`` block, or drop it. DeviceMemoryError if it is
-        larger than the device allows per buffer or has left, or the driver fails.
+        ``name`` is what it is for: messages say it. Release it, use it in a ``with`` block, or drop
+        it. DeviceMemoryError if it is larger than the device allows per buffer or has left, or the
+        driver fails.
         """
-        dtype, flags = np.dtype(dtype), self.cl.mem_flags
-        access = flags.READ_ONLY if read_only else flags.READ_WRITE
-        return self.allocate(access, shape_of(nbytes_or_shape, dtype), dtype, name)
+        return self.allocate(self.cl.mem_flags.READ_WRITE, shape, np.dtype(dtype), name)
 
     def result(
         self,
@@ -231,26 +307,19 @@ class Memory(Device):
         is copied, and that array holds what is written afterwards, too. ``lasting`` is as for
         :func:`aligned_empty`; all else, and what is raised, as for :meth:`buffer`.
         """
-        dtype, flags = np.dtype(dtype), self.cl.mem_flags
-        shape = shape_of(shape, dtype)
-        if self.is_cpu and 0 not in shape:
-            in_place = flags.READ_WRITE | flags.USE_HOST_PTR
-            return self.allocate(in_place, shape, dtype, name, lasting=lasting)
-        pooled = not lasting and 0 not in shape
-        return self.allocate(flags.READ_WRITE, shape, dtype, name, pooled=pooled)
+        flags, empty = self.cl.mem_flags, 0 in shape
+        in_place = self.is_cpu and not empty
+        access = flags.READ_WRITE | (flags.USE_HOST_PTR if in_place else 0)
+        pooled = not (self.is_cpu or lasting or empty)
+        return self.allocate(access, shape, np.dtype(dtype), name, lasting=lasting, pooled=pooled)
 
     def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
         """Return memory for kernels to write what an array is to hold, see :meth:`download`.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array, or its beginning, copies nothing. The array is C-contiguous and writable
-        (InvalidArgumentError else); what is in it is not read. Leave it alone until the download.
+        that very array, or its beginning, copies nothing. What is in it is not read. Leave it alone
+        until the download.
         """
-        if not (array.flags.c_contiguous and array.flags.writeable):
-            raise InvalidArgumentError(
-                f"the array for {name!r} must be C-contiguous and writable; its strides are "
-                f"{array.strides}, writeable={array.flags.writeable}"
-            )
         access, host = self.cl.mem_flags.READ_WRITE, None
         if self.in_place(array):
             access, host = access | self.cl.mem_flags.USE_HOST_PTR, array
@@ -272,8 +341,7 @@ class Memory(Device):
 
         Where they want a host array's place and there is none, one is made.
         """
-        if devices.forked:
-            devices.require_drivers()
+        devices.require_drivers()
         cl, limits = self.cl, self.info
         buffer = DeviceBuffer(shape, dtype, name, self._release, writable=writable)
         held, nbytes = buffer.held, buffer.nbytes
@@ -290,17 +358,17 @@ class Memory(Device):
                     "size or max_supersegments, or another device"
                 )
             with self._ledger:
-                if self._allocated + taken > limits.global_memory:
+                if self.allocated + taken > limits.global_memory:
                     raise DeviceMemoryError(
                         f"the buffer {name!r} needs {bytes_text(nbytes)} and "
-                        f"{bytes_text(self._allocated)} are in use already; {limits.full_name!r} "
+                        f"{bytes_text(self.allocated)} are in use already; {limits.full_name!r} "
                         f"has {bytes_text(limits.global_memory)} in all: release VDIs or volumes "
                         "that are no longer drawn, use a smaller window size or "
                         "max_supersegments, or another device"
                     )
                 # One statement without a call: no interrupt comes between the two
-                self._allocated, held.nbytes = self._allocated + taken, taken
-                self._peak = max(self._peak, self._allocated)
+                self.allocated, held.nbytes = self.allocated + taken, taken
+                self.peak_allocated = max(self.peak_allocated, self.allocated)
 
             # Take it
             if in_place and host is None:
@@ -312,34 +380,37 @@ class Memory(Device):
                         f"{bytes_text(nbytes)}: close other programs, or use a smaller volume, "
                         "window size or max_supersegments"
                     ) from exc
-            if pooled and nbytes <= MOST_POOLED:
-                if self._pool.held_blocks > BLOCKS_HELD:  # of windows that were larger once
-                    self._pool.free_held()
-                held.memory = self._pool.allocate(nbytes)
-            elif host is None or nbytes == 0:
-                flags &= ~cl.mem_flags.COPY_HOST_PTR
-                held.memory = cl.Buffer(self._context, flags, size=taken)
-            else:
-                held.memory = cl.Buffer(self._context, flags, hostbuf=host)
-        except BaseException as exc:
+            with self.failing(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
+                if pooled and nbytes <= MOST_POOLED:
+                    if self._pool.held_blocks > BLOCKS_HELD:  # of windows that were larger once
+                        self._pool.free_held()
+                    held.memory = self._pool.allocate(nbytes)
+                elif host is None or nbytes == 0:
+                    flags &= ~cl.mem_flags.COPY_HOST_PTR
+                    held.memory = cl.Buffer(self._context, flags, size=taken)
+                else:
+                    held.memory = cl.Buffer(self._context, flags, hostbuf=host)
+        except BaseException:
             buffer.release()  # now: whoever keeps the error keeps this frame
-            if isinstance(exc, cl.Error):
-                doing = f"allocating {bytes_text(nbytes)} for the buffer {name!r}"
-                raise self.failure(exc, doing) from exc
             raise
-        buffer.memory = held.memory
-        if in_place:
-            buffer.readers = held.readers = set()
-            buffer.host = host if writable else None
+        held.queues, buffer.memory = set() if in_place else None, held.memory
+        buffer.host = host if in_place and writable else None
         return buffer
+
+    def note_use(self, buffer: DeviceBuffer) -> Any:
+        """Return the driver's memory for the calling thread's queue, and remember who uses it."""
+        memory, held, queue = buffer.used(), buffer.held, self.queue
+        if held.queues is not None and queue not in held.queues:
+            with self._ledger:
+                held.queues = {each for each in held.queues if each in self._queues} | {queue}
+        return memory
 
     def _release(self, held: Held) -> None:
         """Take back what a buffer has held."""
         with self._ledger:
-            self._allocated, held.nbytes = self._allocated - held.nbytes, 0
+            self.allocated, held.nbytes = self.allocated - held.nbytes, 0
         try:
-            if held.readers:
-                self.finish_queues(held.readers)  # the array may go when the buffer has gone
+            self._finish(held.queues or ())  # the array may go when the buffer has gone
         finally:
             if held.memory is not None:
                 held.memory.release()
@@ -349,15 +420,156 @@ class Memory(Device):
         cl, queue = self.cl, self.queue
         flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
         access = cl.map_flags.READ | cl.map_flags.WRITE
-        try:
+        with self.failing(f"allocating {bytes_text(nbytes)} of page-locked host memory"):
             memory = cl.Buffer(self._context, flags, nbytes)
             mapped, _ = cl.enqueue_map_buffer(queue, memory, access, 0, (nbytes,), np.uint8)
-        except cl.Error as exc:
-            doing = f"allocating {bytes_text(nbytes)} of page-locked host memory"
-            raise self.failure(exc, doing) from exc
 
         def release() -> None:
             mapped.base.release(self.queue)
             memory.release()
 
         return mapped, release
+
+    def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
+        """Return an array's values on the device, for kernels to read; ``name`` says of what.
+
+        A CPU device uses an array that is C-contiguous and aligned for it in place (see
+        :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
+        the values are copied. The buffer is not writable. Raises as :meth:`buffer` does.
+        """
+        shape, array, flags = np.shape(array), np.ascontiguousarray(array), self.cl.mem_flags
+        in_place, dtype = self.in_place(array), array.dtype
+        if in_place or self.thread.worker is None or array.nbytes <= COPY_BYTES:
+            access = flags.READ_ONLY | (flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR)
+            return self.allocate(access, shape, dtype, name, array, writable=False)
+
+        # In pieces: a driver that makes a buffer from an array keeps Python's lock
+        buffer = self.allocate(flags.READ_ONLY, shape, dtype, name, writable=False)
+        try:
+            self._copy(buffer, array)
+        except BaseException:
+            buffer.release()
+            raise
+        return buffer
+
+    def download(self, buffer: DeviceBuffer, out: NDArray[Any] | None = None) -> NDArray[Any]:
+        """Return the values of a buffer, when all that was enqueued before is done.
+
+        They are in ``out``, a C-contiguous array of the buffer's dtype, as many from the start as
+        it has elements, or in a new one of the buffer's shape. InvalidArgumentError if these do not
+        fit; DeviceError if the driver fails, now or in a kernel before.
+        """
+        if out is None:
+            out = buffer.host
+        if out is None:
+            waits = self.thread.worker is None
+            pins = waits and not self.is_cpu and buffer.nbytes >= LEAST_PINNED
+            out = (self.pinned.empty if pins else np.empty)(buffer.shape, buffer.dtype)
+        if buffer.host is None or out.ctypes.data != buffer.host.ctypes.data:
+            self._copy(buffer, out, to_host=True)
+        elif out.nbytes:
+            # Map it: the memory is the array's, so that nothing is copied, and the values stay
+            _check_exchange(buffer, out, 0, True)
+            if self.thread.worker is not None:
+                self.give_way()
+            cl, queue = self.cl, self.queue
+            with self.failing(f"reading the buffer {buffer.name!r}"):
+                access, kind = cl.map_flags.READ, (out.shape, out.dtype)
+                mapped, _ = cl.enqueue_map_buffer(queue, buffer.used(), access, 0, *kind)
+                mapped.base.release(queue)
+        return out
+
+    def download_later(
+        self, buffer: DeviceBuffer, out: NDArray[Any], *, first: int = 0
+    ) -> Callable[[], None]:
+        """Copy part of a buffer into an array when all that was enqueued before is done.
+
+        Inside :meth:`background` the copy is done when this returns. As many elements as ``out``
+        has are copied, from the ``first`` on, or InvalidArgumentError is raised; leave it alone
+        until what is returned, when called, has waited for them (and raised DeviceError if the
+        driver failed).
+        """
+        event = self._copy(buffer, out, to_host=True, first=first, later=True)
+
+        def wait() -> None:
+            if event is not None:
+                with self.failing(f"reading the buffer {buffer.name!r}"):
+                    event.wait()
+
+        return wait
+
+    def write(self, buffer: DeviceBuffer, array: NDArray[Any], *, first: int = 0) -> None:
+        """Copy an array into a buffer, from the element ``first`` on.
+
+        The array is free to change when this returns. InvalidArgumentError if it does not fit, or
+        the buffer is not writable: one from :meth:`upload`.
+        """
+        _check_writable(buffer)
+        self._copy(buffer, np.ascontiguousarray(array), first=first)
+
+    def _copy(
+        self,
+        buffer: DeviceBuffer,
+        host: NDArray[Any],
+        *,
+        to_host: bool = False,
+        first: int = 0,
+        later: bool = False,
+    ) -> Any:
+        """Copy a C-contiguous array to a buffer, from the buffer's element ``first`` on.
+
+        With ``to_host`` the other way. Background work copies in pieces, and what others ask for
+        ``later`` is not waited for: its event is returned.
+        """
+        _check_exchange(buffer, host, first, to_host)
+        memory, cl, queue = buffer.used(), self.cl, self.queue
+        background = self.thread.worker is not None
+        waits, event = background or not later, None
+        data, offset = host.reshape(-1).view(np.uint8), first * host.itemsize
+        size = COPY_BYTES if background else max(1, data.nbytes)
+        with self.failing(f"{'reading' if to_host else 'writing'} the buffer {buffer.name!r}"):
+            for start in range(0, data.nbytes, size):
+                if background:
+                    self.give_way()
+                part, place = data[start : start + size], offset + start
+                if to_host:
+                    ends = {"dest": part, "src": memory, "src_offset": place}
+                else:
+                    ends = {"dest": memory, "src": part, "dst_offset": place}
+                event = cl.enqueue_copy(queue, **ends, is_blocking=waits)
+        return None if waits else event
+
+    def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
+        """Fill a buffer, not one from :meth:`upload`, with one byte or one element.
+
+        A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is.
+        """
+        _check_writable(buffer)
+        pattern = np.uint8(value) if isinstance(value, int) else value
+        memory, queue, cl = self.note_use(buffer), self.queue, self.cl
+        if buffer.nbytes == 0:
+            return
+        with self.failing(f"filling the buffer {buffer.name!r}"):
+            cl.enqueue_fill_buffer(queue, memory, pattern, 0, buffer.nbytes)
+            if self.thread.worker is not None:
+                queue.finish()  # nothing of this thread runs when its turn is over
+
+
+def _check_writable(buffer: DeviceBuffer) -> None:
+    if not buffer.writable:
+        raise InvalidArgumentError(
+            f"the buffer {buffer.name!r} was uploaded and may share the caller's array; "
+            "make a buffer() to write to"
+        )
+
+
+def _check_exchange(buffer: DeviceBuffer, array: NDArray[Any], first: int, to_host: bool) -> None:
+    """Refuse an array that cannot exchange its elements with a buffer, from one on."""
+    room = buffer.nbytes // buffer.dtype.itemsize
+    wrong = array.dtype != buffer.dtype or not array.flags.c_contiguous
+    if wrong or not 0 <= first <= room - array.size or (to_host and not array.flags.writeable):
+        raise InvalidArgumentError(
+            f"the buffer {buffer.name!r} exchanges C-contiguous elements of {buffer.dtype}, "
+            f"{room} at most; the array has {array.size} of {array.dtype} from {first} on, strides "
+            f"{array.strides}, writeable={array.flags.writeable}"
+        )

@@ -9,12 +9,13 @@ import contextlib
 import hashlib
 import itertools
 import logging
+import operator
 import os
 import re
 import sqlite3
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, cached_property
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
@@ -30,18 +31,16 @@ from pyvista_vdi.model.user_cache import user_cache
 
 Define = str | int | float | bool | None
 
+#: A pointer to a null handle; pyopencl 2024 refuses None itself.
+_NULL = np.uintp(0)
 #: OpenCL's types of a number, as NumPy has them.
 SCALARS: dict[str, np.dtype[Any]] = {
-    "char": np.dtype(np.int8),
-    "uchar": np.dtype(np.uint8),
-    "short": np.dtype(np.int16),
-    "ushort": np.dtype(np.uint16),
-    "int": np.dtype(np.int32),
-    "uint": np.dtype(np.uint32),
-    "long": np.dtype(np.int64),
-    "ulong": np.dtype(np.uint64),
-    "float": np.dtype(np.float32),
-    "double": np.dtype(np.float64),
+    name: np.dtype(kind)
+    for name, kind in zip(
+        ["char", "uchar", "short", "ushort", "int", "uint", "long", "ulong", "float", "double"],
+        ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"],
+        strict=True,
+    )
 }
 
 
@@ -53,22 +52,17 @@ class Struct:
 
     def __init__(self, name: str, /, **fields: str) -> None:
         self.name, self.fields = name, fields
-        formats, offsets, end, alignment = [], [], 0, 1
-        for kind in fields.values():
-            number, count = _numbers(kind, {})
-            assert number is not None, f"{kind} is no type of a number in OpenCL"
-            size = number.itemsize * count  # a vector is aligned to its size
-            offsets.append(-(-end // size) * size)
-            formats.append(number if count == 1 else np.dtype((number, (count,))))
-            end, alignment = offsets[-1] + size, max(alignment, size)
-        self.dtype = np.dtype(
-            {
-                "names": list(fields),
-                "formats": formats,
-                "offsets": offsets,
-                "itemsize": -(-end // alignment) * alignment,
-            }
-        )
+        kinds: list[Any] = [_kind(kind, {}) for kind in fields.values()]
+        assert None not in kinds, f"{name} has a field of no type of a number in OpenCL"
+        # Each is aligned to its size
+        offsets = [0]
+        for kind, after in itertools.pairwise(kinds):
+            end = offsets[-1] + kind.itemsize
+            offsets.append(-(-end // after.itemsize) * after.itemsize)
+        largest, end = max(kind.itemsize for kind in kinds), offsets[-1] + kinds[-1].itemsize
+        layout: Any = {"names": list(fields), "formats": kinds, "offsets": offsets}
+        layout["itemsize"] = -(-end // largest) * largest
+        self.dtype = np.dtype(layout)
 
     def __call__(self, **values: Any) -> NDArray[np.void]:
         """Return a value of it, with every field given by name."""
@@ -81,40 +75,75 @@ class Struct:
 
 
 class Parameter:
-    """An argument of a compiled kernel: its place and type, and the numbers that it consists of.
+    """An argument of a compiled kernel: its place, and its type in OpenCL C and in NumPy.
 
-    ``number`` is None where it is not known: of a type that the kernel's file defines. ``held``
-    says what buffers a pointer may have: of its numbers, or of parts of them such as two floats for
-    a ulong; None where that is not known. ``scalar`` is NumPy's type of a single number.
+    ``dtype`` is that of what a pointer points to, None where it is not known: of a type that the
+    kernel's file defines.
     """
 
-    def __init__(self, index: int, kind: str, number: np.dtype[Any] | None, count: int = 1) -> None:
-        self.index, self.kind, self.number, self.count = index, kind, number, count
-        local, pointer = kind.startswith("local "), kind.endswith("*")
-        single = number is not None and number.names is None and count == 1
-        self.scalar: Any = number.type if number is not None and single and not pointer else None
-        self.held: set[np.dtype[Any]] | None = set()
-        if pointer and not local:
-            whole = 0 if number is None else number.itemsize
-            parts = {n for n in SCALARS.values() if whole % (2 * n.itemsize) == 0}
-            self.held = None if number is None else {number, *parts}
+    def __init__(self, index: int, kind: str, dtype: np.dtype[Any] | None) -> None:
+        self.index, self.kind, self.dtype = index, kind, dtype
+
+    def holds(self, dtype: np.dtype[Any]) -> bool:
+        """Return whether a buffer may be given: of its numbers, or of parts of them.
+
+        Two floats for a ulong, say.
+        """
+        if self.kind.startswith("local ") or not self.kind.endswith("*"):
+            return False
+        own = self.dtype and self.dtype.base
+        return own is None or own == dtype or own.itemsize % (2 * dtype.itemsize) == 0
+
+    def given(self, cl: Any, value: Any) -> Any:
+        """Return a number, a vector, a structure or local memory as the driver takes it.
+
+        None is a null pointer. TypeError, or what NumPy raises, for what is not of its type.
+        """
+        dtype = self.dtype
+        if self.kind.startswith("local ") and dtype is not None:
+            return cl.LocalMemory(operator.index(value) * dtype.itemsize)
+        if self.kind.endswith("*") and value is None:
+            return _NULL
+        if dtype is None or dtype.names is not None:
+            if value.dtype != dtype:
+                raise TypeError
+            return value
+        if value is None or self.kind.endswith("*"):
+            raise TypeError
+        converted = np.array(value, dtype.base) if dtype.shape else dtype.type(value)
+        if converted.shape != dtype.shape or (
+            dtype.base.kind != "f" and np.any(converted != value)
+        ):
+            raise TypeError
+        return converted
 
 
 class KernelDeclaration:
     """A kernel function, with the types of its arguments by name and in order.
 
-    ``path`` is a file of ``pyvista_vdi.opencl``, any other one as a Path. An argument is a number
-    (``"int"``), a vector (``"float4"``), a pointer to a buffer (``"float4*"``), to memory of each
-    work-group (``"local ulong*"``), or a structure. A type may be named by a ``-D`` option
-    (``"VOXEL_T*"``). What only programs with an option have ends in ``" if OPTION"`` or ``" if
-    OPTION=value"``, what only those without it have, in ``" if not OPTION"``; there may be several.
+    ``path`` is a file of ``pyvista_vdi.opencl``, any other one as a Path. The file says what the
+    arguments are, but for the ``structures`` among them, which are known by their names; or they
+    are given: a number (``"int"``), a vector (``"float4"``), a pointer to a buffer (``"float4*"``),
+    to memory of each work-group (``"local ulong*"``), or a structure. A type may be named by a
+    ``-D`` option (``"VOXEL_T*"``).
     """
 
-    def __init__(self, path: str | Path, name: str, /, **arguments: str | Struct) -> None:
-        self.path, self.name, self.arguments = path, name, arguments
+    def __init__(
+        self, path: str | Path, name: str, /, *structures: Struct, **arguments: str | Struct
+    ) -> None:
+        self.path, self.name = path, name
+        self._structures, self._given = {each.name: each for each in structures}, arguments
 
     def __repr__(self) -> str:
         return f"<KernelDeclaration {self.name!r} of {self.path}>"
+
+    @cached_property
+    def arguments(self) -> Mapping[str, str | Struct]:
+        """Their types by name, in order."""
+        return self._given or {
+            name: self._structures.get(kind, kind)
+            for name, kind in written_arguments(expand(self.path), self.name).items()
+        }
 
     def parameters(self, defines: Mapping[str, Define]) -> dict[str, Parameter]:
         """Return the arguments in a program with these ``-D`` options, by name and in order."""
@@ -123,27 +152,44 @@ class KernelDeclaration:
             if isinstance(declared, Struct):
                 found[name] = Parameter(len(found), declared.name, declared.dtype)
                 continue
-            kind, *conditions = declared.split(" if ")
-            if not all(_holds(condition, defines) for condition in conditions):
-                continue
-            element = kind.removeprefix("local ").removesuffix("*")
-            found[name] = Parameter(len(found), kind, *_numbers(element, defines))
+            element = declared.removeprefix("local ").removesuffix("*")
+            found[name] = Parameter(len(found), declared, _kind(element, defines))
         return found
 
 
-def _holds(condition: str, defines: Mapping[str, Define]) -> bool:
-    """Whether a program has, or has not, an option: ``NAME``, ``NAME=value`` or ``not NAME``."""
-    option, _, value = condition.removeprefix("not ").partition("=")
-    there = option in defines and value in ("", str(defines[option]))
-    return there != condition.startswith("not ")
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_PARAMETERS = re.compile(r"#define (\w+_PARAMETERS)((?:[^\n]*\\\n)*[^\n]*)")
 
 
-def _numbers(kind: str, defines: Mapping[str, Define]) -> tuple[np.dtype[Any] | None, int]:
-    """Return the numbers that a type consists of, None if not known, and how many."""
+def written_arguments(source: str, name: str) -> dict[str, str]:
+    """Return a kernel's arguments as OpenCL C has them: types by name, ``"local ulong*"``, say.
+
+    What is the same in several kernels is a macro whose name ends in ``_PARAMETERS``.
+    """
+    text = _COMMENT.sub("", source)
+    found = re.search(rf"(?:__kernel|KERNEL_OF_LANES)\s+void\s+{name}\s*\(([^)]*)\)", text)
+    if found is None:
+        return {}  # the compiler will say so
+    written = found[1]
+    for macro, expanded in _PARAMETERS.findall(text):
+        written = re.sub(rf"\b{macro}\b", lambda _, to=expanded: to.replace("\\", " "), written)
+    arguments = {}
+    for each in written.replace("*", " * ").split(","):
+        words = each.split()
+        kind = next(word for word in words if word not in _QUALIFIERS)
+        arguments[words[-1]] = "local " * ("__local" in words) + kind + "*" * ("*" in words)
+    return arguments
+
+
+_QUALIFIERS = {"__global", "__local", "__constant", "const", "volatile", "restrict"}
+
+
+def _kind(kind: str, defines: Mapping[str, Define]) -> np.dtype[Any] | None:
+    """Return a number's or a vector's type as NumPy has it, None if it is not known."""
     kind = str(defines.get(kind, kind))
     name = kind.rstrip("0123456789")
-    number = SCALARS.get(name)
-    return number, int(kind[len(name) :] or 1)
+    number, count = SCALARS.get(name), int(kind[len(name) :] or 1)
+    return number if number is None or count == 1 else np.dtype((number, (count,)))
 
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
@@ -155,11 +201,9 @@ def read_resource(path: str) -> str:
 
     FileNotFoundError if there is no such file, or the path leaves the package.
     """
-    parts = PurePosixPath(path).parts
-    if not parts or ".." in parts or PurePosixPath(path).is_absolute():
-        raise FileNotFoundError(path)
-    resource = files("pyvista_vdi.opencl").joinpath(*parts)
-    if not resource.is_file():
+    place = PurePosixPath(path)
+    resource = files("pyvista_vdi.opencl").joinpath(*place.parts)
+    if place.is_absolute() or ".." in place.parts or not resource.is_file():
         raise FileNotFoundError(path)
     return resource.read_text(encoding="utf-8")
 
@@ -183,49 +227,42 @@ def expand(path: str | Path) -> str:
 @cache
 def _expand_resource(path: str) -> str:
     try:
-        text = read_resource(path)
+        return _expand_text(path, read_resource(path))
     except FileNotFoundError as exc:
         raise KernelBuildError(f"no kernel file {path!r} in pyvista_vdi.opencl") from exc
-    return _expand_text(path, text)
 
 
 def _expand_text(name: str, text: str) -> str:
     lines: list[str] = []
     seen = {name}
-    _append_file(name, text, seen, lines)
+
+    def append(name: str, text: str) -> None:
+        lines.append(f'#line 1 "{name}"')
+        depth = 0
+        for number, line in enumerate(text.splitlines(), start=1):
+            if conditional := _CONDITIONAL.match(line):
+                depth += 1 if conditional[1] == "if" else -1
+            found = _INCLUDE.match(line)
+            if found is None:
+                lines.append(line)
+                continue
+            # Replace the directive by the file's text, or by nothing where it stands already
+            target, why = str(PurePosixPath(found[1])), ""
+            if depth > 0:
+                why = "stands inside #if; files are included once, so move it out of it"
+            elif target not in seen:
+                seen.add(target)
+                try:
+                    append(target, read_resource(target))
+                except FileNotFoundError:
+                    why = "no such file in pyvista_vdi.opencl, to which paths are relative"
+            if why:
+                raise KernelBuildError(f'{name}:{number}: #include "{target}": {why}')
+            lines.append(f'#line {number + 1} "{name}"')
+
+    append(name, text)
     constants = definitions({file.partition("/")[0] for file in seen})
     return "\n".join([*constants, *lines]) + "\n"
-
-
-def _append_file(name: str, text: str, seen: set[str], out: list[str]) -> None:
-    out.append(f'#line 1 "{name}"')
-    depth = 0
-    for number, line in enumerate(text.splitlines(), start=1):
-        conditional, found = _CONDITIONAL.match(line), _INCLUDE.match(line)
-        if conditional:
-            depth += 1 if conditional[1] == "if" else -1
-        if found is None:
-            out.append(line)
-            continue
-
-        # Replace the directive by the file's text, or by nothing where it stands already
-        target = str(PurePosixPath(found.group(1)))
-        if depth > 0:
-            raise KernelBuildError(
-                f'{name}:{number}: #include "{target}" stands inside #if; files are included once '
-                "for the whole program, so move the include out of the conditional"
-            )
-        if target not in seen:
-            seen.add(target)
-            try:
-                included = read_resource(target)
-            except FileNotFoundError as exc:
-                raise KernelBuildError(
-                    f'{name}:{number}: #include "{target}": no such file in pyvista_vdi.opencl '
-                    "(paths are relative to that package, not to the including file)"
-                ) from exc
-            _append_file(target, included, seen, out)
-        out.append(f'#line {number + 1} "{name}"')
 
 
 LOG_LINES_SHOWN = 30
@@ -246,13 +283,11 @@ def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
     """Return ``-D`` options in sorted order; None is a name alone."""
     options = []
     for name, value in sorted(defines.items()):
-        if not _IDENTIFIER.fullmatch(name):
-            raise InvalidArgumentError(f"{name!r} is no name for a -D option")
         text = "1" if value is None else literal(value)
-        if not text or _NOT_IN_OPTIONS.search(text):
+        if not _IDENTIFIER.fullmatch(name) or not text or _NOT_IN_OPTIONS.search(text):
             raise InvalidArgumentError(
-                f"-D{name}={text!r}: a value must be non-empty and free of spaces, quotes, "
-                "backslashes and semicolons (drivers split options there)"
+                f"-D{name}={text!r}: the name must be an identifier, and the value non-empty and "
+                "free of spaces, quotes, backslashes and semicolons (drivers split options there)"
             )
         options.append(f"-D{name}" if value is None else f"-D{name}={text}")
     return tuple(options)
@@ -267,9 +302,8 @@ class Kernel:
     """
 
     def __init__(self, program: Any, path: str, name: str) -> None:
-        self.path, self.name = path, name
+        self.path, self.name, self._program = path, name, program
         self.parameters: dict[str, Parameter] = {}
-        self._program = program
         self.free = [self.new_object()]
         self.argument_count = int(self.free[0].num_args)
 
@@ -299,38 +333,40 @@ class Kernel:
 
 
 class ProgramCache:
-    """Programs of one device, with a context that has it alone.
-
-    ``known`` are kernels of the package's files by path, name and ``-D`` options with their types.
-    """
+    """Programs of one device, with a context that has it alone, and their kernels."""
 
     def __init__(self, context: Any, device: Any) -> None:
-        self._context = context
-        self._device = device
-        self.known: dict[tuple[Any, ...], Kernel] = {}
+        self._context, self._device = context, device
         self._kernels: dict[tuple[Any, ...], Kernel] = {}
-        self._programs: dict[tuple[str, tuple[str, ...]], Any] = {}
-        self._locks: dict[tuple[str, tuple[str, ...]], threading.Lock] = {}
+        self._programs: dict[tuple[Any, ...], Any] = {}
+        self._locks: dict[tuple[Any, ...], threading.Lock] = {}
         self._options = ["-cl-std=CL1.2"]
         if device.single_fp_config & opencl().device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT:
             self._options.append("-cl-fp32-correctly-rounded-divide-sqrt")
 
-    def kernel(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel:
+    def kernel(
+        self,
+        path: str | Path,
+        name: str,
+        defines: Mapping[str, Define],
+        aside: Callable[[], contextlib.AbstractContextManager[None]],
+    ) -> Kernel:
         """Return a kernel, compiled when first asked for, and the same for the same source.
 
-        KernelBuildError if it cannot be assembled or compiled, or has no such function.
+        What is compiled is so inside ``aside()``. KernelBuildError if it cannot be assembled or
+        compiled, or has no such function.
         """
-        options = (*self._options, *define_options(defines))
-        source = expand(path)
+        options, source = (*self._options, *define_options(defines)), expand(path)
         program, key = (source, options), (source, name, options)
+        if key in self._kernels:
+            return self._kernels[key]
         # Different programs are compiled side by side. OpenCL has every function thread safe but
         # the one that sets arguments (1.2, A.2); compilers that are not are locked by their drivers
-        with self._locks.setdefault(program, threading.Lock()):
+        with aside(), self._locks.setdefault(program, threading.Lock()):
+            if program not in self._programs:
+                of = self._context, self._device, str(path)
+                self._programs[program] = build(*of, source, options)
             if key not in self._kernels:
-                if program not in self._programs:
-                    self._programs[program] = build(
-                        self._context, self._device, str(path), source, options
-                    )
                 try:
                     self._kernels[key] = Kernel(self._programs[program], str(path), name)
                 except opencl().Error as exc:
@@ -362,11 +398,16 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
             return cl.Program(program)
 
     program = cl._cl._Program(context, source)
+    announcing = threading.Timer(_SLOW, _announce, [path])
+    announcing.daemon = True
+    if kept_by_driver:
+        announcing.start()
+    else:
+        _announce(path)
     try:
-        with _announced(path, _SLOW if kept_by_driver else 0.0):
-            program._build(**call)
+        program._build(**call)
     except cl.Error as exc:
-        log = _placed(_log(program, device) or str(exc), source)
+        log = _log(program, device) or str(exc)
         lines = [line for line in log.splitlines() if line.strip()]
         if len(lines) > LOG_LINES_SHOWN:
             left_out = len(lines) - LOG_LINES_SHOWN
@@ -378,32 +419,19 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
             options=joined,
             source=source,
         ) from exc
+    finally:
+        announcing.cancel()
     _logger.debug("%s: %s", path, _log(program, device))
     _write(place, program)
     return cl.Program(program)
 
 
-@contextlib.contextmanager
-def _announced(path: str, delay: float) -> Iterator[None]:
-    """Tell that a program is being compiled, if that takes longer than a delay in seconds."""
-
-    def announce() -> None:
-        number = next(_program_numbers)
-        level = logging.INFO if number == 1 else logging.DEBUG
-        _logger.log(level, "compiling kernels, program %d of this process: %s", number, path)
-        for tell in tuple(on_compiling):
-            tell()
-
-    timer = threading.Timer(delay, announce)
-    timer.daemon = True
-    if delay > 0:
-        timer.start()
-    else:
-        announce()
-    try:
-        yield
-    finally:
-        timer.cancel()
+def _announce(path: str) -> None:
+    """Tell that a program is being compiled."""
+    level = logging.INFO if next(_program_numbers) == 1 else logging.DEBUG
+    _logger.log(level, "compiling kernels: %s", path)
+    for tell in tuple(on_compiling):
+        tell()
 
 
 def _place(device: Any, options: str, source: str) -> Path | None:
@@ -443,20 +471,3 @@ def _write(place: Path | None, program: Any) -> None:
 
 def _log(program: Any, device: Any) -> str:
     return str(program.get_build_info(device, opencl().program_build_info.LOG) or "").strip()
-
-
-def _placed(log: str, source: str) -> str:
-    """Name file and line where a compiler counts the lines of the whole source, as NVIDIA's."""
-    places, name, number = [""], "", 0
-    for line in source.splitlines():
-        if line.startswith("#line "):
-            _, first, name = line.split(" ", 2)
-            name, number = name.strip('"'), int(first) - 1
-        else:
-            number += 1
-        places.append(f"{name}:{number}")
-
-    def place(found: re.Match[str]) -> str:
-        return places[int(found[1])] if int(found[1]) < len(places) else found[0]
-
-    return re.sub(r"<kernel>:(\d+)", place, log)

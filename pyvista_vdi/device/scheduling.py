@@ -4,7 +4,8 @@ A frame that a person waits for is drawn inside ``Turns.foreground``; a thread w
 its time works inside ``Turns.background``. Background work runs in *turns*, only while no frame is
 in progress; within its turn it calls ``give_way`` between two *pieces* of work. A frame that
 arrives waits for the piece in progress. Where frames follow each other without pause, background
-work still gets a turn after each, as long as a fixed share of a recent frame.
+work still gets a turn after each, as long as a fixed share of a recent frame
+(docs/decisions/background.md).
 """
 
 import contextlib
@@ -13,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from pyvista_vdi.errors import Cancelled
 
@@ -49,10 +51,8 @@ class Worker:
     def __init__(
         self, cancelled: Callable[[], bool], paused: Callable[[], bool] = lambda: False
     ) -> None:
-        self.cancelled = cancelled
-        self.paused = paused
-        self.turn_began = 0.0
-        self.worked = 0.0
+        self.cancelled, self.paused = cancelled, paused
+        self.turn_began = self.worked = 0.0
         self._rates: dict[str, deque[float]] = {}  # items per second of the last pieces
 
     def piece(self, kind: str, seconds: float) -> int | None:
@@ -67,21 +67,18 @@ class Worker:
 
 
 class ThisThread(threading.local):
-    """The calling thread, as one that works in turns, and whether it draws a frame."""
+    """The calling thread: as one that works in turns, whether it draws a frame, and its queue."""
 
     worker: Worker | None = None
     in_frame = False
+    queue: Any = None  # its own, if it has one
 
 
 class Turns:
-    """The order in which frames and background work use one device.
-
-    ``thread`` has ``worker``, the calling thread as one that works in turns, None for any other,
-    and ``in_frame``, whether it draws a frame.
-    """
+    """The order in which frames and background work use one device."""
 
     def __init__(self) -> None:
-        self._changed = threading.Condition()
+        self._changed = threading.Condition()  # re-entrant
         self.thread = ThisThread()
         self._frames = 0  # in progress
         self._arriving = 0  # frames that wait to begin
@@ -94,13 +91,11 @@ class Turns:
     def foreground(self) -> Iterator[None]:
         """Draw a frame that a person waits for inside the ``with`` block.
 
-        Background work on this device rests meanwhile: put into the block all that must not be
-        disturbed, drawing included. The block begins when the piece of background work in
-        progress is done. If background work could not go on before the last frame, it begins
-        after a turn of it, 0.3 times as long as a recent frame. Blocks of several threads run
-        side by side; inside another, or in background work, a block changes nothing.
-
-        Do not begin one while holding a lock that background work may need.
+        Background work on this device rests meanwhile. The block begins when the piece of
+        background work in progress is done, or after a turn of it, if it could not go on before the
+        last frame. Blocks of several threads run side by side; inside another, or in background
+        work, a block changes nothing. Do not begin one while holding a lock that background work
+        may need.
         """
         if self.thread.worker is not None or self.thread.in_frame:
             yield
@@ -133,11 +128,14 @@ class Turns:
 
     @contextlib.contextmanager
     def background(
-        self, cancelled: Callable[[], bool], paused: Callable[[], bool] = lambda: False
+        self,
+        cancelled: Callable[[], bool] = lambda: False,
+        paused: Callable[[], bool] = lambda: False,
     ) -> Iterator[None]:
-        """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
+        """Work inside the ``with`` block only when no frame is in progress.
 
-        Nor while ``paused()`` is true: frames then wait for nothing of it.
+        Nor while ``paused()`` is true: frames then wait for nothing of it. ``cancelled`` is asked
+        between pieces: True ends the work with :class:`Cancelled`.
         """
         if self.thread.worker is not None or self.thread.in_frame:
             raise RuntimeError("background work cannot begin inside a frame or background work")
@@ -153,19 +151,19 @@ class Turns:
     def give_way(self) -> float:
         """Stand aside for others if this thread's turn is over.
 
-        Returns the seconds that the next piece may take; raises Cancelled if the work is no longer
-        wanted. Background work on the host calls it now and then.
+        Returns the seconds that the next piece may take, infinite outside background work; raises
+        Cancelled if the work is no longer wanted.
         """
-        worker = self.thread.worker
+        worker, recent = self.thread.worker, list(self._recent)
         if worker is None:
             return float("inf")
         if worker.cancelled():
             raise Cancelled("background work was cancelled")
-        turn = self._turn()
+        turn = max(SHORTEST_TURN, SHARE * statistics.median(recent)) if recent else FIRST_TURN
         left = worker.turn_began + turn - time.perf_counter()
         over = left <= LEAST_REMAINDER * turn
         with self._changed:  # throughout, so that who is let in finds this thread waiting already
-            if (over and self._wanted()) or worker.paused():
+            if (over and (self._arriving or self._waiting)) or worker.paused():
                 self._end_turn(worker)
             if self._holder is not worker:
                 self._take_turn(worker)
@@ -179,39 +177,27 @@ class Turns:
         worker, now = self.thread.worker, time.perf_counter()
         return now if worker is None else worker.worked + now - worker.turn_began
 
-    def _turn(self) -> float:
-        recent = list(self._recent)
-        if not recent:
-            return FIRST_TURN
-        return max(SHORTEST_TURN, SHARE * statistics.median(recent))
-
-    def _wanted(self) -> bool:
-        """Whether anybody waits for the turn to end."""
-        return self._arriving > 0 or bool(self._waiting)
-
-    def _take_turn(self, worker: Worker) -> None:
-        with self._changed:
-            self._waiting.append(worker)
-            try:
-                while not self._free_for(worker):
-                    # A frame may be ending this very work and wait for its end: look now and then
-                    self._changed.wait(POLL)
-                    if worker.cancelled():
-                        raise Cancelled("background work was cancelled")
-                self._holder = worker
-                self._owed = False
-            finally:
-                self._waiting.remove(worker)
-                self._changed.notify_all()
-        worker.turn_began = time.perf_counter()
-
     def _next(self) -> Worker | None:
         """Return who waits for a turn first, and may work."""
         return next((worker for worker in self._waiting if not worker.paused()), None)
 
-    def _free_for(self, worker: Worker) -> bool:
-        frames_first = self._frames > 0 or (self._arriving > 0 and not self._owed)
-        return not frames_first and self._holder is None and self._next() is worker
+    def _take_turn(self, worker: Worker) -> None:
+        def is_free() -> bool:
+            frames_first = self._frames > 0 or (self._arriving > 0 and not self._owed)
+            return not frames_first and self._holder is None and self._next() is worker
+
+        with self._changed:
+            self._waiting.append(worker)
+            try:
+                # A frame may be ending this very work and wait for its end: look now and then
+                while not self._changed.wait_for(is_free, POLL):
+                    if worker.cancelled():
+                        raise Cancelled("background work was cancelled")
+                self._holder, self._owed = worker, False
+            finally:
+                self._waiting.remove(worker)
+                self._changed.notify_all()
+        worker.turn_began = time.perf_counter()
 
     def _end_turn(self, worker: Worker) -> None:
         with self._changed:
@@ -223,19 +209,18 @@ class Turns:
     @contextlib.contextmanager
     def aside(self) -> Iterator[None]:
         """Leave the device to others inside the ``with`` block, whose work needs none."""
-        worker = self.thread.worker
+        worker, in_frame = self.thread.worker, self.thread.in_frame
         if worker is not None:
             self._end_turn(worker)
-            yield
-            self._take_turn(worker)
-        elif self.thread.in_frame:
+        elif in_frame:
             self._end_frame()
-            try:
-                yield
-            finally:
-                self._begin_frame()
-        else:
+        try:
             yield
+        finally:
+            if in_frame:
+                self._begin_frame()
+        if worker is not None:
+            self._take_turn(worker)
 
     @contextlib.contextmanager
     def holding(self, lock: threading.Lock) -> Iterator[None]:

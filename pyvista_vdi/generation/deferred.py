@@ -10,7 +10,7 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_external
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import as_range
-from pyvista_vdi.model.deferred import DeferredVDI, importance_points, lengths_of
+from pyvista_vdi.model.deferred import DeferredVDI, importance_points
 from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
@@ -18,7 +18,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import with_arrays
+from pyvista_vdi.model.vdi import lengths_of, with_arrays
 from pyvista_vdi.model.volume import Volume
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,

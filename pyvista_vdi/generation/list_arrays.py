@@ -46,6 +46,7 @@ class ListsOnDevice:
     ) -> None:
         offsets.setflags(write=False)
         self.offsets, self._runtime, self._buffers = offsets, runtime, buffers
+        self.nbytes = offsets.nbytes + SUPERSEGMENT_BYTES * int(offsets[-1])
         self._arrays: Arrays | None = None
         self._lock = threading.Lock()
         _latest[runtime] = weakref.ref(self)
@@ -58,7 +59,7 @@ class ListsOnDevice:
                 found = []
                 for name, (_, item) in _ARRAYS.items():
                     array = np.empty((n, *item), np.float32)
-                    runtime.download(self._buffers[name], array, count=array.size)
+                    runtime.download(self._buffers[name], array)
                     found.append(array)
                 self._arrays = Arrays(self.offsets, *found)
                 self._release()
@@ -68,7 +69,10 @@ class ListsOnDevice:
     def on(self, runtime: Runtime) -> Iterator[dict[str, DeviceBuffer]]:
         """Hold the lists on a device for a ``with`` block; empty where they are not on it."""
         with runtime.holding(self._lock):
-            yield dict(self._buffers) if runtime is self._runtime else {}
+            if self._buffers and runtime is self._runtime:
+                yield self._buffers
+                return
+        yield {}
 
     def _release(self) -> None:
         for buffer in self._buffers.values():
@@ -219,7 +223,7 @@ class GrowingLists:
             if not in_place:
                 array.reserve(made, self._most)
             filled = array.part(self._begin, made)
-            self._runtime.download(target, filled, count=filled.size)
+            self._runtime.download(target, filled)
         if in_place:
             self._release_targets()
 

@@ -90,15 +90,8 @@ class AmbientOcclusion:
     def from_any(cls, value: Any) -> AmbientOcclusion | None:
         """Return what a user calls ambient occlusion; ``None`` where there is none.
 
-        Parameters
-        ----------
-        value : None, bool, float or AmbientOcclusion
-            ``None`` and ``False`` are none, ``True`` is the default, a number is a radius.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none of these.
+        ``None`` and ``False`` are none, ``True`` is the default, a number is a radius.
+        InvalidArgumentError if it is none of these.
         """
         if value is None or value is False:
             return None

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, UnsupportedError
-from pyvista_vdi.model.checks import as_flag, as_float, as_floats
+from pyvista_vdi.model.checks import as_flag, as_float, as_floats, as_vector
 
 Matrix: TypeAlias = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ class Camera:
         parallel to the direction of projection, or ``model_transform`` cannot be inverted.
     """
 
-    __slots__ = ("_axes", "_key", "_model_to_view", *_STATE)
+    __slots__ = ("_key", "_model_to_view", "axes", *_STATE)
 
     position: tuple[float, float, float]
     focal_point: tuple[float, float, float]
@@ -95,6 +95,8 @@ class Camera:
     window_center: tuple[float, float]
     use_horizontal_view_angle: bool
     model_transform: Matrix
+    #: Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows.
+    axes: Matrix
 
     def __init__(
         self,
@@ -110,23 +112,23 @@ class Camera:
         model_transform: ArrayLike | None = None,
     ) -> None:
         checked = {
-            "focal_point": _vector("focal_point", focal_point, 3),
+            "focal_point": as_vector(focal_point, "focal_point", 3, InvalidCameraError),
             "model_transform": _affine(model_transform),
             "parallel_projection": as_flag(parallel_projection, "parallel_projection"),
             "parallel_scale": as_float(parallel_scale),
-            "position": _vector("position", position, 3),
+            "position": as_vector(position, "position", 3, InvalidCameraError),
             "use_horizontal_view_angle": as_flag(
                 use_horizontal_view_angle, "use_horizontal_view_angle"
             ),
             "view_angle": as_float(view_angle),
-            "view_up": _vector("view_up", view_up, 3),
-            "window_center": _vector("window_center", window_center, 2),
+            "view_up": as_vector(view_up, "view_up", 3, InvalidCameraError),
+            "window_center": as_vector(window_center, "window_center", 2, InvalidCameraError),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
         checked["model_transform"] = self.model_transform.tobytes()
         object.__setattr__(self, "_key", tuple(checked.values()))
-        object.__setattr__(self, "_axes", self._checked_axes())
+        object.__setattr__(self, "axes", self._checked_axes())
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Camera cannot be changed (tried to set {name!r}): use replace()")
@@ -314,11 +316,6 @@ class Camera:
         )
 
     @property
-    def axes(self) -> Matrix:
-        """Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows."""
-        return self._axes  # type: ignore[attr-defined, no-any-return]
-
-    @property
     def view_matrix(self) -> Matrix:
         """World to view space (X right, Y up, Z forward, world units), float64 (4, 4)."""
         axes = self.axes
@@ -456,16 +453,17 @@ class Camera:
         if not np.any(self.view_up):
             raise InvalidCameraError("view_up is the zero vector: give the direction that is up")
         # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
-        if _length(_cross(_unit(forward), _unit(np.asarray(self.view_up)))) < 1e-12:
+        across = _cross(_unit(forward), _unit(np.asarray(self.view_up)))
+        if math.sqrt(across @ across) < 1e-12:
             raise InvalidCameraError(
                 f"view_up {self.view_up} is parallel to the direction of projection "
                 f"{tuple(_unit(forward).tolist())}: choose another up direction"
             )
         # By a power of two, which rounds nothing: squares may overflow
         forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
-        forward = forward / _length(forward)
+        forward = forward / math.sqrt(forward @ forward)
         right = _cross(forward, _unit(np.asarray(self.view_up)))
-        right /= _length(right)
+        right /= math.sqrt(right @ right)
         axes = np.array([right, _cross(right, forward), forward])
         axes.setflags(write=False)
         return axes
@@ -479,13 +477,6 @@ class Camera:
         turned = arm * math.cos(angle) + _cross(axis, arm) * math.sin(angle)
         turned = turned + axis * (axis @ arm) * (1 - math.cos(angle))
         return self.replace(position=np.asarray(self.focal_point) + turned)
-
-
-def _vector(name: str, value: ArrayLike, length: int) -> tuple[float, ...]:
-    array = as_floats(value)
-    if array.shape != (length,) or not np.isfinite(array).all():
-        raise InvalidCameraError(f"{name} must be {length} finite numbers; got {value!r}")
-    return tuple(array.tolist())
 
 
 def _affine(value: ArrayLike | None) -> Matrix:
@@ -512,15 +503,11 @@ def _affine(value: ArrayLike | None) -> Matrix:
 def _unit(vector: Matrix) -> Matrix:
     # Scaled first: the square of a component may overflow or vanish though the vector does not
     vector = vector / np.abs(vector).max()
-    return np.asarray(vector / _length(vector))
+    return np.asarray(vector / math.sqrt(vector @ vector))
 
 
-# For three numbers each, of which a frame has dozens: np.cross takes 50 times as long, and
-# np.linalg.norm five times. The same bits.
-
-
-def _length(vector: Matrix) -> float:
-    return math.sqrt(vector @ vector)
+# For three numbers, of which a frame has dozens: np.cross takes 50 times as long, and
+# np.linalg.norm, in place of the root of a product, five times. The same bits.
 
 
 def _cross(a: Matrix, b: Matrix) -> Matrix:

@@ -81,12 +81,10 @@ class Number:
         if self.none and value is None:
             return None
         number = as_whole(value) if self.whole else as_number(value)
-        inside = self.low < number if self.open_ended else self.low <= number
-        below = (
-            number < self.high if self.open_ended or self.high == math.inf else number <= self.high
-        )
-        if not (inside and below):
-            raise not_taken(value)(f"{self.name} must be {self.wanted}; got {value!r}")
+        at_end = number in (self.low, self.high) and self.open_ended
+        if not self.low <= number <= self.high or number == math.inf or at_end:
+            error = InvalidArgumentTypeError if math.isnan(number) else InvalidArgumentError
+            raise error(f"{self.name} must be {self.wanted}; got {value!r}")
         return int(number) if self.whole else number
 
 
@@ -145,6 +143,26 @@ def as_floats(values: Any) -> NDArray[np.float64]:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         return np.empty(0)
+
+
+def as_vector(
+    value: Any, name: str, length: int = 3, error: type[ValueError] = InvalidArgumentError
+) -> Any:
+    """Return so many finite numbers as a tuple of floats, or raise an error that names them."""
+    vector = as_floats(value)
+    if vector.shape != (length,) or not np.isfinite(vector).all():
+        raise error(f"{name} must be {length} finite numbers; got {value!r}")
+    return tuple(vector.tolist())
+
+
+def as_bounds(bounds: Any, error: type[ValueError] = InvalidArgumentError) -> Any:
+    """Return the bounds of a box as a tuple of floats, or raise an error."""
+    box = as_floats(bounds)
+    if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
+        raise error(
+            f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
+        )
+    return tuple(box.tolist())
 
 
 def memory_limit_bytes(memory_limit: Any) -> int | None:

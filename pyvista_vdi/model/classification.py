@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from typing import Any, get_args
 
@@ -19,7 +19,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.model.arguments import refuse_unknown
-from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.checks import Number, one_of
 from pyvista_vdi.model.options import Options, declared, option, record
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
@@ -95,9 +95,7 @@ class ArrayChoice(Described):
     blending: Blending = option(
         "composite",
         "what becomes of the scalars along a ray",
-        'As in ``add_volume``; a VDI has ``"composite"`` alone. Of the others the greatest or the '
-        "least is classified; or opacity times scalar, which is 0 to 1 over the volume's range, is "
-        "averaged or integrated over opacity unit distances, as a grey value.",
+        'As in ``add_volume``; a VDI has ``"composite"`` alone.',
         check=_blending,
         takes="Blending | str | int",
     )
@@ -129,7 +127,12 @@ class Look(Described):
     clim: RangeLike | None = option(
         None, "range of the colour map; that of all values by default", aliases=("rng",)
     )
-    n_colors: int = option(256, "entries of the colour map")
+    n_colors: int = option(
+        256,
+        "entries of the colour map",
+        # Building more takes PyVista time by the square, some seconds here
+        check=Number("a whole number from 1 to 16384", 1, 16384, whole=True),
+    )
     opacity: OpacityLike = option(
         "linear",
         "name, one opacity, or opacities",
@@ -144,15 +147,15 @@ class Look(Described):
         None,
         "length over which opacities are reached, model units; the volume's diagonal over its mean "
         "number of cells by default",
+        check=Number("a positive length in model units", open_ended=True),
         aliases=("unit_distance",),
     )
     log_scale: bool = option(False, "map values to colours by their logarithm")
     shade: bool = option(
         False,
         "light the volume",
-        "A shaded VDI has the lights of its generating view: a plotter's, as they stand there, so "
-        "that lights that follow the camera move in the picture when the VDI is regenerated; other "
-        "lights, and another place among lights of the scene, regenerate it.",
+        "A shaded VDI has the lights as they stand at its generating view; other lights, and "
+        "another place among lights of the scene, regenerate it.",
     )
     ambient: float | None = option(None, "ambient light that is reflected, where shaded")
     diffuse: float | None = option(0.7, "diffuse light that is reflected, where shaded")
@@ -230,10 +233,6 @@ class Classification(Look, ArrayChoice):
         """Whether a transfer function or a property stands in place of ``add_volume``'s."""
         return any(getattr(self, name) is not None for name in IN_PLACE)
 
-    def changed(self, changes: Mapping[str, Any]) -> Classification:
-        """Return these arguments with some of them changed."""
-        return replace(self, **changes)
-
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
         """Return the transfer function that the arguments describe for a volume.
 
@@ -241,8 +240,16 @@ class Classification(Look, ArrayChoice):
         ``add_volume`` takes, MissingDependencyError if PyVista is needed to build it and not
         installed.
         """
-        if self.transfer_function is not None:
-            return _checked_transfer_function(self.transfer_function)
+        table: Any = self.transfer_function
+        if isinstance(table, TransferFunction):
+            return table
+        if table is not None:
+            meant = hasattr(table, "GetScalarOpacity")
+            raise InvalidArgumentError(
+                "transfer_function must be a pyvista_vdi.TransferFunction; got "
+                f"{type(table).__name__}"
+                + (": pass a vtkVolumeProperty as volume_property=" if meant else "")
+            )
         if self.volume_property is not None:
             from_property = registry.method("TransferFunction.from_property")
             return from_property(  # type: ignore[no-any-return]
@@ -261,20 +268,6 @@ class Classification(Look, ArrayChoice):
         return from_arguments(  # type: ignore[no-any-return]
             scalars, rgba=volume.rgba, **arguments
         )
-
-
-def _checked_transfer_function(table: object) -> TransferFunction:
-    if isinstance(table, TransferFunction):
-        return table
-    hint = (
-        ": pass a vtkVolumeProperty as volume_property="
-        if hasattr(table, "GetScalarOpacity")
-        else ""
-    )
-    raise InvalidArgumentError(
-        "transfer_function must be a pyvista_vdi.TransferFunction; "
-        f"got {type(table).__name__}{hint}"
-    )
 
 
 def _plain(value: Any) -> Any:

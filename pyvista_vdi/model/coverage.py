@@ -19,7 +19,7 @@ MAX_LISTS_PER_PIXEL = 4.0
 _NEAREST = 1e-3
 
 #: A corner this little beyond a pixel's border, in pixels, does not need another row of lists.
-_SLACK = 1e-6
+SLACK = 1e-6
 
 #: Rays along an edge of the window that tell what is covered, and by how much of V_O's window a
 #: point may lie outside of it by rounding.
@@ -59,18 +59,18 @@ def covering_view(
         raise InvalidArgumentError(
             f"max_lists_per_pixel must be positive; got {max_lists_per_pixel!r}"
         )
-    pixels = _project(camera, window_size, np.asarray(corners, dtype=np.float64))
+    pixels = projected(camera, window_size, np.asarray(corners, dtype=np.float64))
     if pixels is None:
         return None
-    low = np.floor(pixels.min(axis=0) + _SLACK)
-    high = np.maximum(np.ceil(pixels.max(axis=0) - _SLACK), low + 1)
+    low = np.floor(pixels.min(axis=0) + SLACK)
+    high = np.maximum(np.ceil(pixels.max(axis=0) - SLACK), low + 1)
     # Take as many lists as allowed, each a square
     extent, most = high - low, max_lists_per_pixel * size.prod()
     pitch = max(1.0, math.sqrt(extent.prod() / most), extent.max() / MAX_WINDOW_EDGE)
-    lists = np.ceil(extent / pitch - _SLACK)
+    lists = np.ceil(extent / pitch - SLACK)
     while not (lists.prod() <= most or (lists == 1).any()):
         pitch *= 1.01  # rounding up both edges may pass the limit by less than two rows
-        lists = np.ceil(extent / pitch - _SLACK)
+        lists = np.ceil(extent / pitch - SLACK)
     grown = (lists * pitch - extent) / 2
     low, high = low - grown, high + grown
 
@@ -83,33 +83,6 @@ def covering_view(
         angle = math.degrees(2 * math.atan(new_half[1]))
         lens = {"view_angle": angle, "use_horizontal_view_angle": False}
     return camera.replace(window_center=middle / new_half, **lens), (width, height)
-
-
-def view_in_sight(
-    camera: Camera, window_size: Sequence[int], corners: ArrayLike
-) -> tuple[Camera, tuple[int, int]] | None:
-    """Cut a view's window down to the pixels in which a volume can be seen.
-
-    ``camera``: the view on the screen, with the model transform in it. ``window_size``: the
-    screen's width and height in pixels. ``corners`` (float, shape (n, 3)): points whose convex hull
-    contains the volume, model frame. Returns: The view of the smallest rectangle of whole pixels of
-    the window that the projected corners allow, and its size: the whole window where a corner is
-    behind the eye or close to it. ``None`` if nothing of the volume is in the window.
-    """
-    size = check_window_size(window_size)
-    points = np.asarray(corners, dtype=np.float64)
-    pixels = _project(camera, size, points)
-    low, high = np.zeros(2), np.asarray(size, dtype=np.float64)
-    if pixels is not None:
-        low = np.maximum(low, np.floor(pixels.min(axis=0) + _SLACK))
-        high = np.minimum(high, np.ceil(pixels.max(axis=0) - _SLACK))
-    elif ((points @ camera.model_to_view[2, :3] + camera.model_to_view[2, 3]) <= 0).all():
-        return None
-    width, height = (int(n) for n in high - low)
-    if width <= 0 or height <= 0:
-        return None
-    corner = (int(low[0]), size[1] - int(high[1]))
-    return camera.tile(size, corner, (width, height)), (width, height)
 
 
 def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
@@ -178,10 +151,13 @@ def bounds_corners(bounds: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(bounds, dtype=np.float64)[_CORNERS].T
 
 
-def _project(
+def projected(
     camera: Camera, window_size: Sequence[int], corners: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Return points in pixels from the window's lower left corner, or None (see above)."""
+    """Return points in pixels from the window's lower left corner.
+
+    None if one is behind the eye or closer than a thousandth of all points' diagonal.
+    """
     points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
     if not camera.parallel_projection:
         world = corners @ camera.model_transform[:3, :3].T

@@ -131,19 +131,9 @@ class Cropping:
     def parts_of_ray(
         self, origin: NDArray[np.float64], direction: NDArray[np.float64], first: float, last: float
     ) -> NDArray[np.float64]:
-        """Return the parts of a ray in kept regions.
+        """Return the parts of a ray in kept regions, ascending: their ends' t, float64 (k, 2).
 
-        Parameters
-        ----------
-        origin, direction : numpy.ndarray
-            P(t) = origin + t direction, model frame, float64 (3,).
-        first, last : float
-            Between which t to look.
-
-        Returns
-        -------
-        numpy.ndarray
-            First and last t of each part, float64 (k, 2), ascending.
+        Of P(t) = origin + t direction in the model frame, float64 (3,), from first to last.
         """
         planes = np.maximum.accumulate(np.reshape(np.asarray(self.planes), (3, 2)), axis=1)
         origin, direction = (np.asarray(self.normals) @ along for along in (origin, direction))

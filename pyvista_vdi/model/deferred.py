@@ -13,8 +13,8 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_floats, as_number, as_range
-from pyvista_vdi.model.packing import Arrays, check_precision
-from pyvista_vdi.model.vdi import VDI, Lists, with_arrays
+from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, with_arrays
 
 Floats = NDArray[np.float64]
 
@@ -154,6 +154,7 @@ class DeferredVDI(Lists):
             self.importance = importance_points(importance, self.value_range)
         except InvalidArgumentError as error:
             raise InvalidVDIError(str(error)) from error
+        lists.kept = self.about
 
     @property
     def lists(self) -> VDI:
@@ -171,11 +172,6 @@ class DeferredVDI(Lists):
             "sample_distance": self.sample_distance,
             "importance": None if points is None else [list(point) for point in points],
         }
-
-    @property
-    def arrays(self) -> Arrays:
-        """Those of :attr:`lists`, not public."""
-        return self._lists.arrays
 
     @cached_property
     def mean(self) -> NDArray[np.float32]:
@@ -313,23 +309,3 @@ def importance_points(
             f"that grow; got {importance!r}"
         )
     return tuple((float(value), float(weight)) for value, weight in points)
-
-
-def lengths_of(lists: VDI) -> Floats:
-    """Return the model length of each supersegment along its list's centre ray, float64 (n,)."""
-    across, along = ((2 * np.arange(n) + 1) / n - 1 for n in lists.window_size)
-    per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
-    thickness = lists.back.astype(np.float64) - lists.front
-    return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
-
-
-def length_per_depth(
-    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
-    constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
-        np.linalg.inv(camera.model_to_view)[:3, :3].T
-    )
-    return np.linalg.norm(
-        constant + u[:, np.newaxis] * along_u + v[:, np.newaxis, np.newaxis] * along_v, axis=-1
-    )

@@ -74,7 +74,7 @@ class GrowingArray:
 
     def part(self, first: int, last: int) -> NDArray[Any]:
         """Return elements to write, a view that is valid until the next call of another method."""
-        begin, end = (self._start + n * self._bytes for n in (first, last))
+        begin, end = self._start + first * self._bytes, self._start + last * self._bytes
         return self._raw[begin:end].view(np.float32).reshape(last - first, *self._item)
 
     def finished(self, n: int) -> NDArray[Any]:

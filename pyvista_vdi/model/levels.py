@@ -38,16 +38,6 @@ def nearest_depth(grid: Geometry, camera: Camera, window_size: Sequence[int]) ->
     return max(0.0, float((corners @ to_view[2, :3] + to_view[2, 3]).min()))
 
 
-def nearest_list_width(grid: Geometry, camera: Camera, window_size: Sequence[int]) -> float | None:
-    """Return how wide a list of V_O is where the visible part of a grid is nearest, world units."""
-    depth = nearest_depth(grid, camera, window_size)
-    if depth is None:
-        return None
-    size = np.asarray(check_window_size(window_size))
-    width = float((2 * np.asarray(camera.half_extent(window_size)) / size).min())
-    return width if camera.parallel_projection else width * depth
-
-
 def required_level(
     levels: Sequence[Geometry], camera: Camera, window_size: Sequence[int], unit: str = ""
 ) -> tuple[int, str]:
@@ -60,9 +50,12 @@ def required_level(
     ``levels``: from the finest to the coarsest. ``camera``: V_O. ``window_size``: lists of V_O
     along x and y. ``unit``: what lengths are called. Returns: Its number, and a sentence.
     """
-    width = nearest_list_width(levels[0], camera, window_size)
-    if width is None:
+    depth = nearest_depth(levels[0], camera, window_size)
+    if depth is None:
         return len(levels) - 1, "the coarsest, as V_O sees nothing of the volume"
+    size = np.asarray(check_window_size(window_size))
+    width = float((2 * np.asarray(camera.half_extent(window_size)) / size).min())
+    width *= 1.0 if camera.parallel_projection else depth
     if width == 0:
         return 0, "the finest, as V_O is in the volume"
     to_view = camera.model_to_view[:3, :3]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_flag, as_float, as_floats, not_taken, one_of
+from pyvista_vdi.model.checks import as_flag, as_float, as_vector, not_taken, one_of
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -93,7 +93,7 @@ class Light:
         put = object.__setattr__
         vectors = ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation")
         for name in vectors:
-            put(self, name, _vector(f"a light's {name}", getattr(self, name)))
+            put(self, name, as_vector(getattr(self, name), f"a light's {name}"))
         for name in ("cone_angle", "exponent", "intensity"):
             put(self, name, _number(f"a light's {name}", getattr(self, name)))
         put(self, "positional", as_flag(self.positional, "a light's positional"))
@@ -107,13 +107,7 @@ class Light:
 
     @classmethod
     def from_any(cls, light: Any) -> Light:
-        """Return a ``Light``, ``vtkLight`` or ``pyvista.Light`` as a :class:`Light`.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none of them.
-        """
+        """Return a ``Light``, ``vtkLight`` or ``pyvista.Light`` as a :class:`Light`."""
         if isinstance(light, Light):
             return light
         if not hasattr(light, "GetTransformedPosition"):
@@ -227,11 +221,3 @@ def _number(name: str, value: Any) -> float:
     if not math.isfinite(number):
         raise not_taken(value)(f"{name} must be a finite number; got {value!r}")
     return number
-
-
-def _vector(name: str, value: Any) -> Vector:
-    vector = as_floats(value)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InvalidArgumentError(f"{name} must be three finite numbers; got {value!r}")
-    x, y, z = vector.tolist()
-    return x, y, z

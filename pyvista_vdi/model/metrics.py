@@ -197,24 +197,9 @@ def list_edges(
     and follows the reference within a list, so that the two kinds of steps tell squares from other
     errors. On a ramp a list of n pixels has a ratio of n - 1.
 
-    Parameters
-    ----------
-    image, reference : array_like of float, shape (H, W, 4) or (H, W, 3)
-        As for :func:`compare_images`, both from the generating view.
-    columns, rows : array_like of float, shape (W,) and (H,)
-        Where each column and each row of pixels lies among the lists: :func:`list_places`.
-    background : (float, float, float)
-        RGB that both are blended over.
-
-    Returns
-    -------
-    ListEdges
-        Mean steps across borders and within lists, in units of the brightest luminance.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If one is not an image or not finite, or sizes differ.
+    ``image``, ``reference``, ``background``: as for :func:`compare_images`, both from the
+    generating view; ``columns``, ``rows``: where each column and each row of pixels lies among the
+    lists, see :func:`list_places`. InvalidArgumentError if their sizes differ.
 
     Examples
     --------

@@ -102,13 +102,7 @@ class Option:
         elif check is None and isinstance(self.default, bool) and kind == "bool":
             check = partial(as_flag, name=name)
         standard = self.default if check is None else check(self.default)
-        told: dict[str, Any] = {
-            "kind": kind,
-            "check": check,
-            "choices": choices,
-            "standard": standard,
-        }
-        return replace(self, name=name, **told)
+        return replace(self, name=name, kind=kind, check=check, choices=choices, standard=standard)
 
 
 #: What documentation calls the types of ``model/types.py``.
@@ -226,13 +220,7 @@ def _entry(
 @record
 @dataclass(frozen=True)
 class MediumOptions(Options):
-    """How a classified volume is sampled: what generation and volume rendering both need.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a value is out of range.
-    """
+    """How a classified volume is sampled: what generation and volume rendering both need."""
 
     sample_distance: float | None = option(
         None,
@@ -243,16 +231,14 @@ class MediumOptions(Options):
     lights: Lights = option(
         None,
         "what a shaded volume is lit by; one headlight by default, which is VTK's",
-        "PyVista's plotters have a light kit: pass ``plotter.renderer`` for its lights. A VDI has "
-        "them in its colours as they stand at its generating view.",
+        "Pass ``plotter.renderer`` for a plotter's. A VDI has them as they stand at its view.",
         check=Lights.from_any,
         takes="LightsLike | None",
     )
     ambient_occlusion: AmbientOcclusion | None = option(
         None,
         "darken what is hidden from the light around it",
-        "``True``, or the radius up to which something hides, model units. It is the same from "
-        "every view.",
+        "``True``, or the radius up to which something hides, model units.",
         check=AmbientOcclusion.from_any,
         takes="OcclusionLike | None",
     )
@@ -260,8 +246,7 @@ class MediumOptions(Options):
         None,
         "most memory to take on the device",
         'Bytes, or a text such as ``"2 GiB"``; by default what the device has. A volume that does '
-        "not fit goes there brick by brick: that takes more time, and changes no bit. Of a chunked "
-        'volume blocks are smaller. See docs/performance.md, "Larger than memory".',
+        "not fit goes there brick by brick, which takes more time and changes no bit.",
         check=memory_limit_bytes,
         takes="MemoryLike | None",
         setting=True,
@@ -277,13 +262,9 @@ class MediumOptions(Options):
 @record
 @dataclass(frozen=True)
 class GenerationOptions(MediumOptions):
-    """How a VDI is made.
+    """How a VDI is made."""
 
-    Raises
-    ------
-    InvalidArgumentError
-        If a value is out of range.
-    """
+    elsewhere = "it says how a VDI is made: give it to generate, or to add_vdi with a volume"
 
     max_supersegments: int = option(
         20,
@@ -299,27 +280,21 @@ class GenerationOptions(MediumOptions):
         "what decides where a list that must be shortened is cut",
         '``"least-error"``: neighbours are merged where the error is least. ``"homogeneity"`` (the '
         "paper's, after Frey et al. 2013): a supersegment goes on while the medium is like its "
-        "mean so far, by the least threshold that keeps the budget on this ray. It records up to "
-        "512 runs of a ray before unlike ones are merged, which takes more time and, in wide "
-        "windows, memory. By both, neighbours within ``tolerance`` are merged.",
+        "mean so far, by the least threshold that keeps the budget on this ray.",
         setting=True,
     )
     tolerance: float = option(
         0.0,
         "error that may be traded for shorter lists",
-        "Neighbours are merged even under budget where this changes (opacity-weighted colour, "
-        "opacity) per voxel, in the root of the sum of squares along the ray, by no more than "
-        "this. 0 merges only what is homogeneous.",
+        "Per voxel, in opacity-weighted colour and opacity. 0 merges only what is homogeneous.",
         check=Number("a number >= 0"),
         setting=True,
     )
     view_cone: float = option(
         60.0,
         "half angle of the cone of new views that must be served, degrees",
-        "The wider, the more of the budget goes to what the generating view cannot see: hidden "
-        "completely, that counts ``1 - cos(view_cone)`` as much as what is seen when neighbours "
-        'are merged by least error or within ``tolerance``. ``"homogeneity"`` cuts without regard '
-        "to it.",
+        "The wider, the more of the budget goes to what the generating view cannot see: "
+        "``1 - cos(view_cone)`` of what the seen counts.",
         check=Number("an angle between 0 and 90 degrees", 0, 90),
         setting=True,
     )
@@ -344,24 +319,16 @@ class GenerationOptions(MediumOptions):
 @record
 @dataclass(frozen=True)
 class Deferral(Options):
-    """When scalars are classified, and what is kept of them until then: docs/deferred.md.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a range or an importance is given and nothing is deferred.
-    """
+    """When scalars are classified, and what is kept of them until then: docs/deferred.md."""
 
     elsewhere = "values in place of colours are kept by generate, generate_series and InSitu"
 
     classification: When = option(
         "baked",
         "when scalars are classified: as the VDI is made, or by whoever shows it",
-        "A deferred one keeps values in place of colours, is a :class:`DeferredVDI`, and "
-        "``classified(cmap=..., opacity=...)`` makes a VDI of it, without the volume: "
-        "docs/deferred.md. Of the look it takes ``interpolation`` only. In a plotter, "
-        "``actor.prop`` and its lookup table classify it: what is changed there is seen in the "
-        "next frame, and nothing is generated again.",
+        "Deferred, it is a :class:`DeferredVDI`, of which ``classified(cmap=..., opacity=...)`` "
+        "makes a VDI without the volume, and in a plotter ``actor.prop`` (docs/deferred.md). Of "
+        "the look it takes ``interpolation`` only.",
     )
     value_range: Any = option(
         None,
@@ -372,8 +339,7 @@ class Deferral(Options):
     importance: Any = option(
         None,
         "how much errors count over the range, where deferred",
-        "Points (scalar, weight), or weights at equal distances over ``value_range``; 1 by "
-        "default. Scalars of weight 0 are empty.",
+        "Points (scalar, weight), or weights at equal distances; 1 by default, and 0 is empty.",
         takes="ArrayLike | None",
         setting=True,
     )
@@ -409,24 +375,18 @@ class Deferral(Options):
 @record
 @dataclass(frozen=True)
 class QualityTarget(Options):
-    """What is asked of a VDI in place of settings, which are chosen to reach it: docs/dial.md.
+    """What is asked of a VDI in place of settings, which are chosen to reach it: docs/dial.md."""
 
-    Raises
-    ------
-    InvalidArgumentError
-        If one is out of range, or they contradict each other.
-    """
+    elsewhere = GenerationOptions.elsewhere
 
     quality: Quality | None = option(
         None,
         "choose the settings by how good pictures are to be",
-        "An SSIM of 0.98, 0.96 or 0.93 against volume rendering, and with the first two no squares "
-        'of lists. ``"reference"`` is what is made where nothing is given. This and the other '
-        "targets have the scene measured on the device, once, and then choose the lists of the "
-        "window, ``max_supersegments`` and ``precision``, so that these and ``tolerance`` cannot "
-        "be given as well. ``window_size`` is then that of the pictures, and the VDI's own may be "
-        'smaller or larger. ``vdi.metadata["dial"]``, or ``actor.status.dial``, says what was '
-        "chosen and what it is predicted to give; docs/dial.md, how well.",
+        'An SSIM of 0.98, 0.96 or 0.93 against volume rendering. ``"reference"`` is what is made '
+        "where nothing is given. Targets have the scene measured on the device, once, and choose "
+        "the VDI's ``window_size``, ``max_supersegments`` and ``precision``, so that these and "
+        "``tolerance`` cannot be given as well, and ``window_size`` is that of the pictures. "
+        '``vdi.metadata["dial"]`` or ``actor.status.dial`` says what was chosen: docs/dial.md.',
     )
     target_ssim: float | None = option(
         None,
@@ -443,8 +403,7 @@ class QualityTarget(Options):
     max_bytes: int | None = option(
         None,
         "most bytes of the VDI on the device",
-        "Not of files. Goes before all others. Limits without a quality give the best that is "
-        "within them.",
+        "Not of files. Goes before all others; limits alone give the best that is within them.",
         check=Number("a number of bytes above 0", open_ended=True),
         takes="float | None",
     )
@@ -488,40 +447,18 @@ class QualityTarget(Options):
 class GenerationRequest:
     """A VDI that is asked for: of what, from where, and how; carried whole to what makes it.
 
-    Parameters
-    ----------
-    volume : Volume
-        The scalars.
-    transfer_function : TransferFunction
-        Scalar to colour and opacity.
-    camera : Camera or vtkCamera or pyvista.Camera
-        The generating view V_O.
-    window_size : (int, int)
-        Width and height of V_O's window in pixels: one list each.
-    options : GenerationOptions
-        How it is made.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    progress : callable, optional
-        Called with the fraction done, 0 to 1, between slices of work; when it returns False the
-        work is given up.
-    metadata : mapping
-        Entries to add to ``vdi.metadata``.
-
-    Raises
-    ------
-    InvalidCameraError, InvalidArgumentError
-        If the camera, the window or ``progress`` cannot be used.
+    InvalidCameraError or InvalidArgumentError if the camera, the window or ``progress`` cannot be
+    used.
     """
 
     volume: Volume
     transfer_function: TransferFunction
-    camera: Camera
-    window_size: tuple[int, int]
+    camera: Camera  # the generating view V_O; VTK's or PyVista's becomes ours
+    window_size: tuple[int, int]  # of V_O, pixels: one list each
     options: GenerationOptions = field(default_factory=GenerationOptions)
     device: DeviceLike | None = None
-    progress: Progress | None = None
-    metadata: Metadata = field(default_factory=dict)
+    progress: Progress | None = None  # called between slices of work; False gives it up
+    metadata: Metadata = field(default_factory=dict)  # entries to add to those of the VDI
 
     def __post_init__(self) -> None:
         check_callback(self.progress)

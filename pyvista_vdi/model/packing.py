@@ -4,14 +4,14 @@
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.host_memory import aligned_empty
 
@@ -28,7 +28,7 @@ DEPTH_CODES = (1 << 14) - 1
 GRID = (1 << 24) - (1 << 15)
 
 #: No step is shorter: devices may take what is nearer to 0 than float32's normal numbers for 0.
-_LEAST_STEP_EXPONENT = -126
+LEAST_STEP_EXPONENT = -126
 
 #: Supersegments that are packed or unpacked at a time: what this takes is small beside a VDI.
 _PIECE = 2**16
@@ -113,14 +113,16 @@ class Packed8:
         """Return the values that it stands for."""
         n, counts = len(self.words), lengths_of_lists(self.offsets)
         front, back, tau = (aligned_empty(n, np.float32) for _ in range(3))
-        color = aligned_empty((n, 3), np.float32)
+        color, bits_of_color = aligned_empty((n, 3), np.float32), np.array(_COLOR_BITS, np.uint32)
         for lists, part in _pieces(counts):
             codes = self.codes(part)
             own = np.repeat(np.arange(lists.start, lists.stop), counts[lists])
             front[part], back[part] = (self.depths(own, code) for code in codes[:2])
             bits = np.where(codes.tau > 0, codes.tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
             tau[part] = bits.astype(np.uint32).view(np.float32)
-            color[part] = unpacked_color(codes.color)
+            # One multiplication, which every device rounds alike
+            steps = codes.color[:, np.newaxis] >> bits_of_color & np.uint32(_COLOR_STEPS)
+            color[part] = steps.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
         return Arrays(self.offsets, front, back, color, tau)
 
     def depths(self, lists: NDArray[np.int64], codes: NDArray[np.uint32]) -> NDArray[np.float32]:
@@ -154,7 +156,7 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         exponent = math.frexp(farthest / GRID)[1]  # farthest / GRID < 2^exponent
         if farthest / 2.0 ** (exponent - 1) <= GRID:
             exponent -= 1
-        step = 2.0 ** max(exponent, _LEAST_STEP_EXPONENT)
+        step = 2.0 ** max(exponent, LEAST_STEP_EXPONENT)
     for lists, part in _pieces(counts):
         # Whole steps, exactly: a division by a power of two; what is before the eye stays there
         faces = np.stack([arrays.front[part], arrays.back[part]], axis=1).astype(np.float64) / step
@@ -165,8 +167,9 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         bits = tau.view(np.uint32).astype(np.int64)
         upper = (bits + 0x7FFF + (bits >> 16 & 1)) >> 16
         codes = np.where(tau < _LEAST_TAU, 0, np.clip(upper - TAU_BASE + 1, 1, TAU_CODES))
-        packed = packed_color(arrays.color[part])
-        words[part] = Codes(front, back, codes.astype(np.uint32), packed).words()
+        steps = np.rint(arrays.color[part] * np.float32(_COLOR_STEPS)).astype(np.uint32)
+        red, green, blue = (steps << np.array(_COLOR_BITS, np.uint32)).T
+        words[part] = Codes(front, back, codes.astype(np.uint32), red | green | blue).words()
     return Packed8(step, arrays.offsets, origins, strides, words)
 
 
@@ -179,22 +182,6 @@ def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
         last = int(ends[last_list - 1])
         yield slice(first_list, last_list), slice(first, last)
         first_list, first = last_list, last
-
-
-def packed_color(color: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """Return straight RGB, float32 (n, 3), in whole steps; uint32 (n,)."""
-    packed = aligned_empty(len(color), np.uint32)
-    packed[...] = 0
-    for channel, first_bit in enumerate(_COLOR_BITS):
-        code = np.rint(color[:, channel] * np.float32(_COLOR_STEPS)).astype(np.uint32)
-        packed |= code << np.uint32(first_bit)
-    return packed
-
-
-def unpacked_color(packed: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Return straight RGB, float32 (n, 3); one multiplication, which every device rounds alike."""
-    code = packed[:, np.newaxis] >> np.array(_COLOR_BITS, np.uint32) & np.uint32(_COLOR_STEPS)
-    return code.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
 
 
 def _depth_codes(
@@ -226,86 +213,3 @@ def _depth_codes(
     codes = np.minimum(running, most[:, np.newaxis]) + needed
     front, back = codes.astype(np.uint32).T
     return origins, strides, front, back
-
-
-def stored_rows(packed: Packed8, name: str, first: int, last: int) -> NDArray[Any]:
-    """Return rows of an array as files store it: see :func:`packed_of_stored`.
-
-    Of ``front`` how far it is behind the back before it, in codes, and of ``back`` how far it is
-    behind its front. The first gap of a list is 0, as its code is; that of row ``first`` is its
-    front's code.
-    """
-    if name in ("origin", "stride"):
-        return (packed.origins if name == "origin" else packed.strides)[first:last]
-    front, back, tau, color = packed.codes(slice(first, last))
-    if name == "back":
-        return back - front
-    if name == "optical_depth":
-        return tau
-    if name == "color":
-        return color.astype("<u4").view(np.uint8).reshape(-1, 4)[:, 1:]
-    gaps = np.append(front[:1], front[1:] - back[:-1])
-    begin, end = np.searchsorted(packed.offsets, [first, last])
-    gaps[packed.offsets[begin:end].astype(np.int64) - first] = 0
-    return gaps
-
-
-def packed_of_stored(
-    step: float,
-    offsets: NDArray[np.uint64],
-    stored: Mapping[str, NDArray[Any]],
-    chunk_rows: int,
-) -> Packed8:
-    """Return the 8-byte form of what a file stores, checked.
-
-    ``step``: of the depth grid. ``stored``: what :func:`stored_rows` gives of every ``chunk_rows``
-    rows, by its name. Raises InvalidVDIError if packing gives no such codes.
-    """
-    if (offsets[1:] < offsets[:-1]).any():
-        raise InvalidVDIError("offsets must not decrease")
-    counts = np.diff(offsets).astype(np.int64)
-    mantissa, exponent = math.frexp(step)
-    if not (mantissa == 0.5 and _LEAST_STEP_EXPONENT < exponent <= 105):
-        raise InvalidVDIError(f"the step of depths must be a power of two; got {step}")
-    origins, strides = stored["origin"].astype(np.int64), stored["stride"].astype(np.int64)
-    last = origins + strides * DEPTH_CODES
-    if (np.abs(origins) > GRID).any() or (last > GRID + DEPTH_CODES + 1).any():
-        raise InvalidVDIError("a list's depths lie beyond the VDI's grid")
-    occupied = counts > 0
-    if ((strides > 0) != occupied).any() or origins[~occupied].any():
-        raise InvalidVDIError("the lists with a stride are not those with supersegments")
-    # Add up the codes, which begin anew with every list and every chunk
-    gaps, thicknesses = stored["front"].astype(np.int64), stored["back"].astype(np.int64)
-    n, tau = len(gaps), stored["optical_depth"].astype(np.uint32)
-    begins = np.zeros(n, bool)
-    begins[offsets[:-1][occupied].astype(np.int64)] = True
-    begins[::chunk_rows] = True
-    runs, starts = np.cumsum(gaps + thicknesses), np.flatnonzero(begins)
-    before = runs[starts] - gaps[starts] - thicknesses[starts]
-    back = runs - np.repeat(before, np.diff(np.append(starts, n)))
-    if n and not (thicknesses.min() > 0 and back.max() <= DEPTH_CODES and tau.max() <= TAU_CODES):
-        raise InvalidVDIError("a supersegment has no thickness, or a code beyond its largest")
-    color = np.pad(stored["color"], ((0, 0), (1, 0))).view("<u4").reshape(-1)
-    codes = (back - thicknesses, back, tau, color)
-    return Packed8(
-        step,
-        offsets,
-        origins.astype(np.int32),
-        strides.astype(np.uint16),
-        Codes(*(code.astype(np.uint32, copy=False) for code in codes)).words(),
-    )
-
-
-def channel_differences(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return (blue, green - blue, red - blue) of (red, green, blue), uint8 (n, 3), modulo 256.
-
-    Most colour maps' channels rise and fall together: the differences are small or repeat.
-    """
-    red, green, blue = colors.T
-    return np.stack([blue, green - blue, red - blue], axis=1)
-
-
-def colors_of_differences(differences: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return what :func:`channel_differences` was given."""
-    blue, green, red = differences.T
-    return np.stack([red + blue, green + blue, blue], axis=1)

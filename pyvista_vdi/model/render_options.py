@@ -68,17 +68,15 @@ class SceneOptions(Options):
     cropping: Any = option(
         None,
         "which of 27 regions of the data's own coordinates are drawn",
-        "As in ``vtkVolumeMapper``: a :class:`Cropping`, a mapper's, x_low, x_high, y_low, y_high, "
-        "z_low and z_high of a box, or a pair of those planes and the regions (flags, or "
-        '``"fence"``, ``"cross"`` ...).',
+        "A :class:`Cropping`, a mapper's, the six planes of a box, or a pair of these and regions: "
+        'flags, or ``"fence"``, ``"cross"`` ...',
         check=Cropping.from_any,
         takes="CroppingLike | None",
     )
     opacity_multiplier: float = option(
         1.0,
         "factor of the extinction, 0 or above",
-        "2 is twice as dense. For what is not opaque it is the same as dividing the opacity unit "
-        "distance by it.",
+        "2 is twice as dense, as by half of the opacity unit distance.",
         check=checked_opacity_multiplier,
     )
 
@@ -98,8 +96,8 @@ class RenderOptions(SceneOptions):
     preview_samples: int | None = option(
         None,
         "look a VDI up at so many points of each ray",
-        "In place of intersecting its supersegments: an approximation (paper section 5). A smaller "
-        "``window_size`` is the better one: see docs/decisions/previews.md. For a single VDI only.",
+        "An approximation (paper section 5); a smaller ``window_size`` is the better one. For a "
+        "single VDI only.",
         check=Number(
             f"a whole number from 1 to {MAX_PREVIEW_SAMPLES}", 1, MAX_PREVIEW_SAMPLES, whole=True
         ),
@@ -107,9 +105,8 @@ class RenderOptions(SceneOptions):
     transmittance_cutoff: float = option(
         TRANSMITTANCE_CUTOFF,
         "a ray ends where less light than this is left, 0 to below 1",
-        "No channel loses more than that: 0.004 changes a picture of 8 bits by one step at most, "
-        "and saves a fifth to two fifths of the work where things are opaque. For a single VDI "
-        "only.",
+        "No channel loses more: 0.004 changes a picture of 8 bits by one step at most, and saves a "
+        "fifth to two fifths of the work where things are opaque. For a single VDI only.",
         check=Number(
             "a number from 0 to below 1, such as 0.004 for a difference of 1/255 at most",
             high=np.nextafter(1.0, 0.0),
@@ -188,40 +185,34 @@ class DrawingOptions(Options):
     adjust_multi_samples: bool = option(
         True,
         "go without multisampling while the view moves and frames would be late",
-        "It smooths the edges of meshes. At rest, and in pictures that are kept, it is as the "
-        "plotter has it.",
+        "At rest, and in pictures that are kept, it is as the plotter has it.",
         setting=True,
     )
     regenerate: Policy = option(
         "auto",
         "when a view gets a VDI of its own",
-        '``"auto"``: where the estimated SSIM of its picture against volume rendering is below '
-        "``regenerate_below``; in windows on the screen only, and a VDI without its volume says "
-        "once that it is seen from where it does not serve. A callable gets ``actor.status`` once "
-        "per frame and returns whether to regenerate; it is asked off-screen, too, and the VDI is "
-        'then made before the frame. ``"never"``: only ``actor.regenerate()``. Changed data and '
-        "transfer functions are always made anew.",
+        '``"auto"``: in windows on the screen, where the estimated SSIM of its picture is below '
+        "``regenerate_below``. A callable gets ``actor.status`` once per frame and returns whether "
+        "to regenerate, off-screen too, before the frame. "
+        '``"never"``: only ``actor.regenerate()``. Changed data and transfer functions are always '
+        "made anew.",
         check=checked_policy,
     )
     regenerate_below: float | None = option(
         None,
         "estimated SSIM, 0 to 1, below which a VDI does not do for a view",
-        '``regenerate="auto"`` makes another, by default below 0.95 (while the view moves, twice '
-        'the error is borne), and ``draw="auto"`` draws the volume in its place, by default below '
-        "0.98 or without the detail of the picture's pixels.",
+        '``regenerate="auto"`` makes another, by default below 0.95, and ``draw="auto"`` draws the '
+        "volume in its place, by default below 0.98.",
         check=Number("an SSIM between 0 and 1", 0, 1),
         setting=True,
     )
     draw: Draw = option(
         "auto",
         "what is raycast where the volume is at hand",
-        '``"auto"``: in windows on the screen, each frame by what is expected to give the better '
-        "picture within ``target_fps``, the VDI near its generating view and the volume far from "
-        "it; at rest by what is there sooner, where the VDI does. Off-screen the volume, until so "
-        "many pictures of nearly the same view are taken that a VDI costs less, and then that "
-        'where it does; never by measured time. ``"vdi"``: always the VDI. ``"volume"``: always '
-        "the volume, by :func:`pyvista_vdi.render_volume`'s kernel, right from every view. Volumes "
-        "that overlap are drawn by VDIs. ``actor.status.drawn`` says what was.",
+        '``"auto"``: on the screen by what gives the better picture within ``target_fps``, the VDI '
+        "near its view and the volume far from it; off-screen the volume, until so many pictures "
+        "of nearly the same view are taken that a VDI costs less. Volumes that overlap are drawn "
+        "by VDIs. ``actor.status.drawn`` says what was drawn.",
     )
     coverage: Coverage = option(
         "bounds",

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_bounds
 
 #: Transfer functions by name, as arguments of ``Plotter.add_volume``; the rest is default.
 TRANSFER_FUNCTIONS: MappingProxyType[str, MappingProxyType[str, Any]] = MappingProxyType(
@@ -60,11 +61,7 @@ def filling_camera(
     looks along the z axis.
     """
     width, height = check_window_size(window_size)
-    box = np.asarray(bounds, dtype=np.float64)
-    if box.shape != (6,) or not np.isfinite(box).all() or (box[1::2] < box[::2]).any():
-        raise InvalidArgumentError(
-            f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
-        )
+    box = np.array(as_bounds(bounds))
     if not np.any(box[1::2] > box[::2]):
         raise InvalidArgumentError(f"the bounds {box.tolist()} are a point: nothing fills a view")
     if not abs(elevation) < 90:

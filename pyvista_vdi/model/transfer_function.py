@@ -65,12 +65,6 @@ class TransferFunction:
     table ends.
     """
 
-    colors: NDArray[np.float32]
-    opacities: NDArray[np.float32]
-    scalar_range: tuple[float, float]
-    unit_distance: float | None
-    interpolation: str
-    shading: Shading | None
     gradient_opacities: NDArray[np.float32] | None
     gradient_range: tuple[float, float] | None
 

@@ -61,9 +61,8 @@ Progress: TypeAlias = Callable[[float], object]
 #: A path is a file that ``read_volume`` reads.
 VolumeLike: TypeAlias = Union["Volume", VTKObject, str, "os.PathLike[str]"]
 CameraLike: TypeAlias = Union["Camera", VTKObject, Sequence[ArrayLike]]
-VDILike: TypeAlias = Union["VDI", VTKObject]
 #: What is shown for one VDI: of a set that which is nearest to the view.
-ShownLike: TypeAlias = Union[VDILike, "VDICollection", "DeferredVDI"]
+ShownLike: TypeAlias = Union["VDI", VTKObject, "VDICollection", "DeferredVDI"]
 #: What a plotter shows: a volume, or what is made of one already.
 AnyVolume: TypeAlias = VolumeLike | NDArray[Any] | ShownLike
 LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]

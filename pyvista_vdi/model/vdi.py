@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_floats, as_number, as_whole, not_taken
+from pyvista_vdi.model.checks import as_bounds, as_number, as_whole, not_taken
 from pyvista_vdi.model.packing import Arrays, Packed8, check_precision, lengths_of_lists, packing_of
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class LateArrays(Protocol):
         """Return the arrays, valid."""
 
 
-class Lists:
+class Lists(ABC):
     """A view, and sorted lists of disjoint supersegments along its rays."""
 
     #: The generating view V_O.
@@ -52,9 +53,18 @@ class Lists:
     metadata: dict[str, Any]
 
     @property
+    @abstractmethod
+    def lists(self) -> VDI:
+        """The lists in the form of a VDI, for storage."""
+
+    @abstractmethod
+    def with_precision(self, precision: str) -> Any:
+        """Return it with supersegments of fewer bytes."""
+
+    @property
     def arrays(self) -> Arrays:
-        """All arrays, not public."""
-        raise NotImplementedError
+        """All arrays, in the order of :class:`VDI`'s arguments."""
+        return self.lists.arrays
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
@@ -142,7 +152,11 @@ class VDI(Lists):
     """
 
     #: What makes the arrays when they are asked for, if they were not given; not public.
-    late: LateArrays | None = None
+    late: LateArrays | None
+    #: The same where that is their 8-byte form, not public; ``None`` where they are exact.
+    packing: Packed8 | None
+    #: What is known of values that the lists keep in the place of colours; not public.
+    kept: Mapping[str, Any] | None
     _arrays: Arrays | None
 
     def __init__(
@@ -161,17 +175,12 @@ class VDI(Lists):
     ) -> None:
         self.camera = Camera.from_any(camera)
         self.window_size = check_window_size(window_size)
-        origin, box = as_number(depth_origin), as_floats(bounds)
+        origin = as_number(depth_origin)
         if not math.isfinite(origin):
             raise InvalidVDIError(f"depth_origin must be finite; got {depth_origin!r}")
         if not isinstance(metadata, Mapping | None):
             raise InvalidVDIError(f"metadata must be a dictionary; got {type(metadata).__name__}")
-        if box.shape != (6,) or not np.isfinite(box).all() or (box[::2] > box[1::2]).any():
-            raise InvalidVDIError(
-                f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
-            )
-        x0, x1, y0, y1, z0, z1 = box.tolist()
-        self.bounds, self.depth_origin = (x0, x1, y0, y1, z0, z1), origin
+        self.bounds, self.depth_origin = as_bounds(bounds, InvalidVDIError), origin
         self.metadata = dict(metadata or {})
         arrays = Arrays(
             _array("offsets", offsets, np.uint64, ()),
@@ -180,16 +189,21 @@ class VDI(Lists):
             _array("color", color, np.float32, (3,)),
             _array("optical_depth", optical_depth, np.float32, ()),
         )
-        _check(arrays, self.window_size, self.nearest, origin)
-        self._arrays = _read_only(arrays)
+        _check(arrays, self.window_size, _nearest(self), origin)
+        self._arrays, self.late, self.packing, self.kept = _read_only(arrays), None, None, None
 
     @property
     def arrays(self) -> Arrays:
-        """All arrays, made now if they are wanted late; not public."""
+        """All arrays, in the order of the constructor's arguments; made now if they are not yet."""
         if self._arrays is None:
             assert self.late is not None
             self._arrays = _read_only(self.late.arrays())
         return self._arrays
+
+    @property
+    def lists(self) -> VDI:
+        """Itself: what is stored of it."""
+        return self
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
@@ -208,20 +222,12 @@ class VDI(Lists):
         return self.arrays.optical_depth
 
     @property
-    def nearest(self) -> float:
-        """Least front that is before the eye, not public."""
-        return -math.inf if self.camera.parallel_projection else -self.depth_origin
-
-    @property
-    def packing(self) -> Packed8 | None:
-        """The 8-byte form of the arrays, not public; ``None`` where they are exact."""
-        return self.late if isinstance(self.late, Packed8) else None
-
-    @property
     def nbytes(self) -> int:
-        """Bytes of the arrays and of what makes them, as far as these are in memory."""
-        arrays = self._arrays or ()
-        return sum(array.nbytes for array in arrays) + getattr(self.late, "nbytes", 0)
+        """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
+        if self._arrays is None:
+            return getattr(self.late, "nbytes", 0)
+        packed = 0 if self.packing is None else self.packing.nbytes
+        return sum(array.nbytes for array in self._arrays) + packed
 
     @property
     def precision(self) -> str:
@@ -281,7 +287,7 @@ class VDI(Lists):
         if check_precision(precision) == self.precision:
             return self
         exact = precision == "exact"
-        return with_arrays(self, self.arrays if exact else packing_of(self.arrays, self.nearest))
+        return with_arrays(self, self.arrays if exact else packing_of(self.arrays, _nearest(self)))
 
     def __repr__(self) -> str:
         width, height = self.window_size
@@ -339,11 +345,13 @@ def made_vdi(
     """Return a VDI of arrays that this package made, or of what makes them; nothing is checked."""
     vdi = VDI.__new__(VDI)
     vdi.camera, vdi.window_size, vdi.bounds = camera, window_size, bounds
-    vdi.depth_origin, vdi.metadata, vdi._arrays = depth_origin, dict(metadata or {}), None
+    vdi.depth_origin, vdi.metadata, vdi.kept = depth_origin, dict(metadata or {}), None
+    vdi._arrays, vdi.late = None, None
     if isinstance(arrays, Arrays):
         vdi._arrays = _read_only(arrays)
     else:
         vdi.late = arrays
+    vdi.packing = arrays if isinstance(arrays, Packed8) else None
     return vdi
 
 
@@ -351,6 +359,11 @@ def with_arrays(vdi: Lists, arrays: Arrays | LateArrays, **changes: Any) -> VDI:
     """Return a VDI that is like another but for its arrays, and changes of :func:`made_vdi`."""
     names = ("camera", "window_size", "bounds", "depth_origin", "metadata")
     return made_vdi(arrays=arrays, **{name: getattr(vdi, name) for name in names} | changes)
+
+
+def _nearest(vdi: VDI) -> float:
+    """Return the least front that is before the eye."""
+    return -math.inf if vdi.camera.parallel_projection else -vdi.depth_origin
 
 
 def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
@@ -381,10 +394,11 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
 
 
 def _read_only(arrays: Arrays) -> Arrays:
-    views: Any = Arrays(*(array.view() for array in arrays))  # type: ignore[arg-type]
+    given: Any = arrays
+    views = Arrays(*map(np.ndarray.view, given))
     for view in views:
         view.setflags(write=False)  # the caller's own stay writable
-    return views  # type: ignore[no-any-return]
+    return views
 
 
 def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: float) -> None:
@@ -446,6 +460,26 @@ def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: 
     starts = offsets[:-1].view(np.int64)
     ordered[starts[: np.searchsorted(starts, n)]] = True
     require(ordered, "sorted within its list and not overlapping")
+
+
+def lengths_of(lists: Lists) -> NDArray[np.float64]:
+    """Return the model length of each supersegment along its list's centre ray, float64 (n,)."""
+    across, along = ((2 * np.arange(n) + 1) / n - 1 for n in lists.window_size)
+    per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
+    thickness = lists.back.astype(np.float64) - lists.front
+    return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
+
+
+def length_per_depth(
+    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
+    constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
+        np.linalg.inv(camera.model_to_view)[:3, :3].T
+    )
+    return np.linalg.norm(
+        constant + u[:, np.newaxis] * along_u + v[:, np.newaxis, np.newaxis] * along_v, axis=-1
+    )
 
 
 def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> tuple[int, int]:

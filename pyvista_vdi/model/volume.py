@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
-from pyvista_vdi.model.checks import as_floats
+from pyvista_vdi.model.checks import as_floats, as_vector
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.host_memory import require_free_memory
 from pyvista_vdi.model.packed_values import packing_of
@@ -31,15 +31,16 @@ class Geometry:
     #: multi-scale store has the finest level's, so that all levels look the same; model units.
     unit_distance: float | None = None
 
-    @property
+    @functools.cached_property
     def index_to_model(self) -> NDArray[np.float64]:
         """Point index (x, y, z) to model coordinates, float64 (4, 4)."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.direction * np.asarray(self.spacing)
         matrix[:3, 3] = self.origin
+        matrix.setflags(write=False)
         return matrix
 
-    @property
+    @functools.cached_property
     def bounds(self) -> tuple[float, float, float, float, float, float]:
         """Axis-aligned bounds in the model frame: x0, x1, y0, y1, z0, z1; model units."""
         axes = self.index_to_model[:3, :3] * (np.asarray(self.dimensions) - 1)
@@ -161,8 +162,8 @@ class Volume(Geometry):
         self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
         nz, ny, nx = self.array.shape[:3]
         self.dimensions = nx, ny, nz
-        self.spacing = _checked_vector("spacing", spacing)
-        self.origin = _checked_vector("origin", origin)
+        self.spacing = as_vector(spacing, "spacing", error=InvalidVolumeError)
+        self.origin = as_vector(origin, "origin", error=InvalidVolumeError)
         matrix = np.eye(3) if direction is None else as_floats(direction)
         if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
             raise InvalidVolumeError(f"direction must be 3 x 3 finite numbers; got {direction!r}")
@@ -385,11 +386,3 @@ def _from_long_integers(array: NDArray[np.generic]) -> NDArray[np.generic]:
             "represent exactly: scale them, or convert them yourself"
         )
     return np.ascontiguousarray(array, dtype=np.float64)
-
-
-def _checked_vector(name: str, value: ArrayLike) -> tuple[float, float, float]:
-    vector = as_floats(value)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InvalidVolumeError(f"{name} must be three finite numbers; got {value!r}")
-    x, y, z = vector.tolist()
-    return x, y, z

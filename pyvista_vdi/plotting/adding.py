@@ -13,7 +13,12 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    UnsupportedError,
+    warn_external,
+)
 from pyvista_vdi.generation.deferred import kept_range
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
@@ -38,9 +43,9 @@ from pyvista_vdi.plotting.prepared import prepared
 from pyvista_vdi.plotting.progress import progress_callback
 from pyvista_vdi.plotting.refinement import Refinement
 from pyvista_vdi.plotting.uniform import UniformGrid
-from pyvista_vdi.plotting.volumes import as_image, held, require_grid
-from pyvista_vdi.quality.dial import refuse_settings
+from pyvista_vdi.plotting.volumes import as_grid, held, require_grid
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
+from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
@@ -49,6 +54,9 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
 
 #: What ``add_actor`` understands as culling, besides nothing.
 _CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
+
+#: ``add_volume``'s names of VTK's mappers.
+_MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
 
 #: SSIM by which a view may fall below what was asked for before it regenerates.
 _BELOW_GOAL = 0.02
@@ -72,6 +80,16 @@ def _culling(given: Any) -> str | bool:
     return "backface" if given is True else given
 
 
+def _note_mapper(name: Any) -> None:
+    if name not in (None, *_MAPPERS):
+        raise InvalidArgumentTypeError(
+            f"mapper={name!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
+            "its own: leave it out"
+        )
+    if name is not None:
+        warn_external(f"mapper={name!r} chooses among VTK's volume mappers and is ignored")
+
+
 @record
 @dataclass(frozen=True, eq=False)
 class Placement(Options):
@@ -82,6 +100,11 @@ class Placement(Options):
     culling: bool | str = option(False, "of faces, which a volume has none of", check=_culling)
     multi_colors: bool = option(
         False, "give each block of a ``MultiBlock`` a colour map of its own"
+    )
+    mapper: str | None = option(
+        None,
+        "of VTK's volume mappers; a VDI has its own, and none means a thing",
+        check=_note_mapper,
     )
     scalar_bar_args: Mapping[str, Any] = option(
         None,
@@ -219,52 +242,55 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
         shown = _deferred(first, asked)
     else:
         shown = _volume_shown(first, asked, plotter, stored)
-    actor = PlotterVDIActor()
+    actor, mapper = PlotterVDIActor(), _mapper(shown, asked, plotter._theme)
     if shown.prop is not None:
         actor.prop = shown.prop
-    mapper = _mapper(shown, asked, plotter._theme)
     thing = shown.thing if several is None else several
-    if isinstance(thing, VDI | VDICollection | DeferredInput):
+    if isinstance(thing, VDISource):
+        mapper.SetInputConnection(thing.GetOutputPort())
+        mapper.driver.input.of_scene = True
+    else:
         mapper.SetInputData(thing)
         if shown.prop is not None:  # which classifies what keeps values
             mapper.driver.input.prop = shown.prop
         if isinstance(first, DeferredVDI):
             mapper.driver.input.vdi()  # refuse now what cannot be classified, and warn once
-    else:
-        mapper.SetInputConnection(thing.GetOutputPort())
-        mapper.driver.input.of_scene = True
     actor.mapper = mapper
-    place = asked.place
-    actor.user_matrix = np.eye(4) if place.user_matrix is None else place.user_matrix
+    matrix = asked.place.user_matrix
+    actor.user_matrix = np.eye(4) if matrix is None else matrix
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
-    render = not plotter._first_time if place.render is None else place.render
-    camera = plotter.renderer.camera  # plotter.camera would set it
-    touched = camera.is_set or camera.parallel_projection
-    own = _own(first, several)
-    opens = own is not None and place.reset_camera is not False and not touched
     with _all_or_nothing(plotter, actor):
-        plotter.add_actor(
-            actor,
-            reset_camera=False if opens else place.reset_camera,
-            name=place.name,
-            culling=place.culling,
-            pickable=place.pickable,
-            render=render and not opens,
-        )
-        if opens:  # from its own view: others may show little of it
-            aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
-            if place.reset_camera:
-                plotter.reset_camera(render=False)
-            plotter.renderer.reset_camera_clipping_range()
-            if render:
-                plotter.render()
-        themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
-        if themed if shown.bar is None else shown.bar:
-            plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
+        _put(plotter, actor, _own(first, several), shown, asked.place)
     if stored is not None:
         actor._refinement = Refinement(actor, plotter.renderer, stored)
     plotter.renderer.Modified()
     return actor
+
+
+def _put(plotter: Any, actor: Any, own: Any, shown: _Shown, place: Placement) -> None:
+    """Put an actor and its scalar bar into a plotter, which opens from the view of its ``own``."""
+    render = not plotter._first_time if place.render is None else place.render
+    camera = plotter.renderer.camera  # plotter.camera would set it
+    touched = camera.is_set or camera.parallel_projection
+    opens = own is not None and place.reset_camera is not False and not touched
+    plotter.add_actor(
+        actor,
+        reset_camera=False if opens else place.reset_camera,
+        name=place.name,
+        culling=place.culling,
+        pickable=place.pickable,
+        render=render and not opens,
+    )
+    if opens:  # from its own view: others may show little of it
+        aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
+        if place.reset_camera:
+            plotter.reset_camera(render=False)
+        plotter.renderer.reset_camera_clipping_range()
+        if render:
+            plotter.render()
+    themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
+    if themed if shown.bar is None else shown.bar:
+        plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
 
 
 def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
@@ -375,7 +401,7 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source, preference = VDISource(), asked.array.preference
     uniform = volume if isinstance(volume, UniformGrid) else None
     if uniform is None:
-        image, array_name = as_image(volume, asked.array.scalars, asked.making.resolution)
+        image, array_name = as_grid(volume, asked.array.scalars, asked.making.resolution)
         data = held(image)
     else:
         data, array_name = uniform.image, uniform.name

@@ -20,7 +20,7 @@ from pyvista_vdi.errors import (
     VDIError,
     warn_external,
 )
-from pyvista_vdi.model.checks import as_float, not_taken
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.lighting import Shading
@@ -34,17 +34,11 @@ from pyvista_vdi.vtk_pipeline.filters.properties import (
     transfer_function_from_property,
 )
 
-#: Most entries of a table: building it takes PyVista time by the square, some seconds here.
-_MAX_COLORS = 16384
-
 #: Arguments whose whole effect is a lookup table.
 _IN_TABLES = {"clim", "n_colors", "opacity", "cmap", "flip_scalars", "log_scale", "theme"}
 #: Transfer functions by what they were made of, so many at most.
 _made: dict[tuple[Any, ...], TransferFunction] = {}
 _MOST_MADE = 64
-
-#: ``add_volume``'s names of VTK's mappers.
-_MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
 
 
 def _categories(count: Any) -> bool | int:
@@ -89,19 +83,13 @@ class Looks(Look):
             low = sys.float_info.min
         n_colors = self.n_colors
         if self.categories:
-            count = self.categories
-            n_colors = len(np.unique(scalars)) if count is True else int(count)
-        whole = isinstance(n_colors, int | np.integer)
-        if not (whole and 1 <= n_colors <= _MAX_COLORS):
-            error = InvalidArgumentError if whole else InvalidArgumentTypeError
-            raise error(
-                f"n_colors must be a whole number from 1 to {_MAX_COLORS}; got {n_colors!r}"
-            )
+            count = len(np.unique(scalars)) if self.categories is True else self.categories
+            n_colors = replace(self, n_colors=count).n_colors
         theme = self.theme or pv.global_theme
         colors = _color_map(theme.cmap if self.cmap is None else self.cmap)
         table = pv.LookupTable()
-        table.apply_cmap(colors.reversed() if self.flip_scalars else colors, int(n_colors))
-        _apply_opacity(table, self.opacity, int(n_colors))
+        table.apply_cmap(colors.reversed() if self.flip_scalars else colors, n_colors)
+        _apply_opacity(table, self.opacity, n_colors)
         table.scalar_range = (low, high)
         table.log_scale = bool(self.log_scale)
         if isinstance(self.annotations, dict):
@@ -128,10 +116,6 @@ class Looks(Look):
         an explicit one is honoured here.
         """
         given = self.opacity_unit_distance
-        if given is not None and not 0 < as_float(given) < np.inf:
-            raise not_taken(given)(
-                f"opacity_unit_distance must be a positive length in model units; got {given!r}"
-            )
         prop = pv.VolumeProperty(
             lookup_table=table,
             interpolation_type=self.interpolation,
@@ -181,18 +165,6 @@ def transfer_function_from_arguments(
             _made.clear()
         _made[made_of] = made
     return made
-
-
-def note_mapper(mapper: str) -> None:
-    """Warn that a name of VTK's mappers means nothing here, and refuse another."""
-    if mapper not in _MAPPERS:
-        raise InvalidArgumentTypeError(
-            f"mapper={mapper!r} is none of VTK's volume mappers, {', '.join(_MAPPERS)}; a VDI has "
-            "its own: leave it out"
-        )
-    warn_external(
-        f"mapper={mapper!r} chooses among VTK's volume mappers and is ignored: a VDI has its own"
-    )
 
 
 def stored_table(vdi: VDI) -> pv.LookupTable | None:

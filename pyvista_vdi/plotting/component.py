@@ -14,7 +14,6 @@ from pyvista_vdi.model.arguments import takes
 from pyvista_vdi.model.types import AnyVolume
 from pyvista_vdi.plotting.actor import PlotterVDIActor
 from pyvista_vdi.plotting.adding import Addition, added
-from pyvista_vdi.plotting.classify import note_mapper
 from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.vtk_pipeline.vtk import weakly
 
@@ -38,37 +37,29 @@ class AddVDI(Component):
         order=inspect.signature(pv.Plotter.add_volume).parameters,
         aliases={"rng": "clim", "colormap": "cmap", "backface_culling": "culling"},
     )
-    def __call__(
-        self, volume: AnyVolume, asked: Addition, *, mapper: str | None = None
-    ) -> PlotterVDIActor | list[Any]:
+    def __call__(self, volume: AnyVolume, asked: Addition) -> PlotterVDIActor | list[Any]:
         """Add a volume that turns fluently: frames are raycast from its VDI where it serves.
 
         All arguments of ``Plotter.add_volume`` are taken, with its names, defaults and meaning;
         what cannot be honoured is refused by name. The picture is ``add_volume``'s.
 
         In a window on the screen, frames get fewer pixels while the view moves, as many as
-        ``target_fps`` allows, and all of them as soon as it rests; a view for which the VDI does
-        not do is given one of its own, made in the background while the old one is drawn. What is
-        drawn off-screen, and every screenshot, is full, and drawn by the VDI or the volume itself,
-        whichever is right for the view; a script that takes one picture makes no VDI.
+        ``target_fps`` allows; a view for which the VDI does not do is given one of its own, in the
+        background. What is drawn off-screen, and every screenshot, is full, and drawn by the VDI or
+        the volume itself, whichever is right; a script that takes one picture makes no VDI.
 
         Parameters
         ----------
         volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, path, or VDIs
-            A file as :func:`pyvista_vdi.read_volume` or :func:`pyvista_vdi.read` reads it; of a
-            store, what :func:`pyvista_vdi.open_volume` opens, the level that the view requires
-            (``actor.level``), and a finer one when the view comes nearer. A
-            uniform grid, or a rectilinear one of equidistant points (other grids are refused,
-            with the remedy), a NumPy array as ``add_volume`` takes it, blocks of uniform grids, a
-            VDI, a VDI as ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
+            A uniform grid, or a rectilinear one of equidistant points; a NumPy array as
+            ``add_volume`` takes it; blocks of uniform grids; a file, or a store, of which the level
+            that the view requires is shown (``actor.level``). Or a VDI, also as
+            ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
-            view is drawn. With VDIs nothing is generated, and arguments that
-            only a volume can honour are refused; where nobody has set the camera, the plotter opens
-            from the VDI's own view, ``plotter.camera = vdi.camera.to_pyvista()``. A
-            :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``,
+            view is drawn. With VDIs nothing is generated, arguments that only a volume can honour
+            are refused, and where nobody has set the camera, the plotter opens from the VDI's own
+            view. A :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``,
             ``opacity``, ``clim`` ...), which ``actor.prop`` changes.
-        mapper : str, optional
-            Names of VTK's volume mappers are taken and mean nothing: a VDI has its own.
 
         Returns
         -------
@@ -99,8 +90,6 @@ class AddVDI(Component):
         >>> actor = plotter.add_vdi(pyvista_vdi.examples.load_brain(), cmap="bone")
         >>> plotter.show()  # doctest: +SKIP
         """
-        if mapper is not None:
-            note_mapper(mapper)
         asked = replace(asked, look=replace(asked.look, theme=self._plotter._theme))
         made = added(self._plotter, volume, asked)
         self._remember(made)

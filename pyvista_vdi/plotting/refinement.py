@@ -26,13 +26,7 @@ _FIRST = 10.0
 
 
 def load(volume: StoredVolume) -> Volume:
-    """Read a level of a store, and say which in the log.
-
-    Raises
-    ------
-    DeviceMemoryError
-        If the host has not so much memory free.
-    """
+    """Read a level of a store and log which; DeviceMemoryError if the host lacks the memory."""
     remedy = "open a coarser level by pyvista_vdi.open_volume(path, level=...), or generate a VDI"
     require_free_memory(volume.array.nbytes, f"the volume in {volume.store.path}", remedy)
     _log.info("%s: %s", volume.store.path, volume.describe())
@@ -45,12 +39,7 @@ class Refinement:
     In a window that somebody watches they are read by a thread, and the frames go on; elsewhere
     before the frame that needs them, so that a picture depends on its view alone. Levels never
     become coarser: what was read is finer than required, and costs nothing more to show. Colours
-    and opacities stay.
-
-    Attributes
-    ----------
-    shown : StoredVolume
-        The level whose voxels the actor shows.
+    and opacities stay. ``shown`` is the level whose voxels the actor shows.
     """
 
     def __init__(self, actor: Any, renderer: Any, shown: StoredVolume) -> None:

@@ -48,34 +48,13 @@ class UniformGrid(Algorithm):
     """A pipeline's step from a grid, and perhaps a mask, to the uniform grid that is drawn of them.
 
     It executes again when values, points or the mask have changed. A mask that is a NumPy array
-    tells nobody of its changes, and is compared with what it was at each update.
+    tells nobody of its changes, and is compared with what it was at each update; a data set is
+    followed, whichever array is its active one. Which arrays the grid has is decided now, as by
+    ``add_volume``. ``categorical``: resample by the nearest value.
 
-    Parameters
-    ----------
-    grid : vtkDataSet
-        Its arrays are shared; which ones it has is decided now, as by ``add_volume``.
-    name : str or None
-        Scalars; the active ones by default.
-    preference : {"point", "cell"}
-        Which array, where points and cells both have one of that name.
-    resample : "auto" or (int, int, int), optional
-        See ``add_vdi``.
-    mask : vtkDataSet or numpy.ndarray, optional
-        Labels at the grid's points, or of its cells. A data set is followed, whichever array is
-        its active one.
-    categorical : bool
-        Resample by the nearest value.
-
-    Attributes
-    ----------
-    image : pyvista.ImageData
-        The output.
-    name : str
-        The array that is drawn.
-    values : numpy.ndarray
-        The grid's own, of which ``add_volume`` takes the range.
-    unit_distance : float
-        The opacity unit distance that ``add_volume`` takes by default for the grid, model units.
+    ``image`` is the output, a ``pyvista.ImageData``, of which the array ``name`` is drawn;
+    ``values`` are the grid's own, of which ``add_volume`` takes the range, and ``unit_distance`` is
+    the opacity unit distance that it takes by default, model units.
     """
 
     bad_input = InvalidVolumeError

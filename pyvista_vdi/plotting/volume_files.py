@@ -17,7 +17,7 @@ from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, with_articl
 from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.volumes import as_image
+from pyvista_vdi.plotting.volumes import as_grid
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, volume_from_vtk
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
@@ -37,7 +37,7 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
         (data,) = grids or blocks
     if isinstance(data, pv.RectilinearGrid):
         with contextlib.suppress(UnsupportedError):
-            data, _ = as_image(data, None, None)
+            data, _ = as_grid(data, None, None)
     if not isinstance(data, pv.ImageData):
         kind = with_article(type(data).__name__)
         remedy = "resample it to a pyvista.ImageData first"
@@ -74,7 +74,7 @@ def _read(file: Path) -> Any:
     said = re.findall(r"(?s)(?:ERROR|(?i:warning)): In [^\n]*\n(.*?)(?=\n\n|\Z)", written)
     for text in (" ".join(one.split()).split("): ", 1)[-1] for one in said):
         if "rror" in text or "ERROR" in written:
-            raise InvalidVolumeError(f"{file} cannot be read as a volume: {text}: is it whole?")
+            raise InvalidVolumeError(f"{file} cannot be read as a volume: {text}: write it anew")
     return data
 
 

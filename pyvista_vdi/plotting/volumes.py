@@ -22,12 +22,9 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkCommonDataModel, vtkRectilinearGrid
 _UNNAMED = "Data"
 
 
-def as_image(volume: Any, scalars: Any, resolution: Any) -> tuple[Any, str | None]:
-    """Return a uniform grid and the name of its scalars: see :func:`as_grid`."""
-    return as_grid(volume, scalars, resolution, uniform=True)
-
-
-def as_grid(volume: Any, scalars: Any, resolution: Any, *, uniform: bool) -> tuple[Any, str | None]:
+def as_grid(
+    volume: Any, scalars: Any, resolution: Any, *, uniform: bool = True
+) -> tuple[Any, str | None]:
     """Return a grid and the name of its scalars, ``None`` for the active ones.
 
     ``volume`` is a grid, a NumPy array with the spacing ``resolution``, or a Volume; the user's own

@@ -16,7 +16,7 @@ from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.options import GenerationRequest, QualityTarget
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.probe import generate_to_target
+from pyvista_vdi.quality.targets import generate_to_target
 from pyvista_vdi.raycasting.raycast import render_vdi
 
 #: Does a job on a device, and returns what is not None; it is given what takes note of the fraction

@@ -48,7 +48,7 @@ class Costs:
         each = seconds / pixels / (1.0 if way == "volume" else rise(angle))
         before = getattr(self, way)
         mean = each if before is None else before + _NEWEST * (each - before)
-        return replace(self, **{way: mean})
+        return replace(self, volume=mean) if way == "volume" else replace(self, vdi=mean)
 
     def chosen(self, way: RenderMode) -> Costs:
         """Note which way is drawn."""

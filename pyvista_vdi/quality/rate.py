@@ -135,8 +135,7 @@ class FrameRate:
         frame, kept, doubtful = _Frame(samples, work, max(0.0, seconds - work)), self.frames, None
         # Set a stall aside until the next frame confirms it
         if kept:
-            overhead, each = self._cost()
-            over = (frame.work + frame.overhead) / (overhead + each * samples)
+            over = self._over(frame)
             if not 1 / _STALL <= over <= _STALL:
                 before, doubtful = self.doubtful, frame
                 if before is None or (self._over(before) > 1) != (over > 1):
@@ -216,7 +215,8 @@ class Pace:
 
     def late(self, seconds: float, target: float) -> bool:
         """Whether frames whose rays take so long miss a rate, and rays are what takes long."""
-        beside = self._beside[0] or self._beside[1]
+        # Multisampling goes first, and then no more than a quarter is left beside the rays
+        beside = self._beside[0] or min(self._beside[1], _SLOW_BESIDE / target)
         return seconds > max(1 / target - beside, _LEAST_WORK / target)
 
     def share(

@@ -6,8 +6,10 @@ with unequal probabilities), and what they tell scales the guess for the rest of
 docs/regeneration.md says how well that predicts.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -15,140 +17,56 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_whole
-from pyvista_vdi.model.metrics import SSIM_WINDOW, over_background
+from pyvista_vdi.model.coverage import bounds_corners
+from pyvista_vdi.model.metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.tiles import (
-    COARSE,
-    REACH,
-    Cells,
-    Floats,
-    Region,
-    TileSample,
-    contrast_ratio,
-    seen_region,
-    tiles_ssim,
-)
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import picture_room, raycast_medium
 
-Pause: TypeAlias = Callable[[], object]
+Floats: TypeAlias = NDArray[np.float64]
+#: Premultiplied RGBA, float32 (height, width, 4).
+Picture: TypeAlias = NDArray[np.float32]
 
 #: Tiles of an estimate, and their edge in pixels: docs/regeneration.md.
-TILES = 16
-TILE_SIZE = 24
-
+TILES, TILE_SIZE = 16, 24
+#: Pixels that an SSIM window reaches to each side of its centre.
+REACH = SSIM_WINDOW // 2
+#: Pixels of the picture along the edge of one pixel of the coarse pictures.
+COARSE = 5
 #: Most pixels of a coarse picture in one launch: a frame may have to wait for its end.
 _COARSE_LAUNCH = 8192
+#: Arguments of ``structural_similarity`` for the coarse pictures: a window of 5 of their pixels.
+_COARSE_SSIM = {**SSIM_ARGUMENTS, "sigma": 0.7}
+_COARSE_WINDOW = 5
+#: Edge in pixels of the blocks within which contrast is compared.
+_BLOCK = 4
+#: Weight of a difference between the coarse pictures against detail within one.
+_DIFFERENCE_WEIGHT = 3.0
+#: Share of the tiles that are spread evenly, whatever the coarse pictures show.
+_EVEN_SHARE = 0.1
 #: Distance of an eye from the centre, in diagonals of the bounds, below which it has no direction.
 _AT_CENTRE = 1e-6
 
 
 @dataclass(frozen=True)
 class ViewError:
-    """What is known of a VDI's error in a view.
+    """What is known of a VDI's error in a view."""
 
-    Parameters
-    ----------
-    ssim : float
-        Predicted SSIM of the VDI's picture against the volume's, 1 for equal pictures; NaN where
-        an edge of the window is below 11 pixels.
-    standard_error : float
-        Of ``ssim``, from how much the tiles differ from what was guessed.
-    angle : float
-        Degrees from V_O, see :func:`angle_from_generating_view`.
-    magnification : float
-        Pixels per list, see :func:`magnification`.
-    tiles : int
-        Tiles that were rendered; 0 where the volume is not in view.
-    contrast : float
-        Of the VDI's picture within blocks of 4 x 4 pixels, over the volume's, in those tiles: below
-        1 where detail is missing, which SSIM hardly tells.
-    """
-
-    ssim: float
-    standard_error: float
-    angle: float
-    magnification: float
-    tiles: int
-    contrast: float = 1.0
-
-
-def angle_from_generating_view(vdi: VDI, camera: Any) -> float:
-    """Return by how much a view has turned about the VDI's model since it was generated.
-
-    It is the angle between the directions from the centre of the bounds to the two eyes. Moving
-    the eye towards the centre, turning it about its own place and moving the model along with the
-    camera are no turn.
-
-    Parameters
-    ----------
-    vdi : VDI
-        Its camera is V_O, with the model transform of then.
-    camera : Camera or vtkCamera or pyvista.Camera
-        The new view V_N, with the model transform of now.
-
-    Returns
-    -------
-    float
-        Degrees, 0 to 180.
-
-    Notes
-    -----
-    Both directions are taken to the model frame, each by its own camera's model transform, and
-    compared as V_O's transform shows them: an actor that was scaled when the VDI was generated
-    gives the angle that one sees. In parallel projection the eye is infinitely far against the
-    direction of projection; that direction also stands in for an eye at the very centre.
-    """
-    shown = vdi.camera.model_transform[:3, :3]
-    old, new = (
-        eye_from_centre(view, vdi.bounds, shown)[0]
-        for view in (vdi.camera, Camera.from_any(camera))
-    )
-    sine, cosine = np.linalg.norm(np.cross(old, new)), old @ new
-    return math.degrees(math.atan2(sine, cosine))
-
-
-def magnification(vdi: VDI, camera: Any, window_size: Sequence[int] | None = None) -> float:
-    """Return how many pixels of a view's picture are as wide as one list.
-
-    It grows as one zooms in. Above 1 the picture asks for more detail than the lists have across
-    V_O's rays.
-
-    Parameters
-    ----------
-    vdi : VDI
-        Its camera and window give the lists' width.
-    camera : Camera or vtkCamera or pyvista.Camera
-        The new view V_N.
-    window_size : (int, int), optional
-        Width and height of its picture in pixels; by default the VDI's own.
-
-    Returns
-    -------
-    float
-        1 at V_O and the VDI's own window; 0 where the bounds lie behind the eye of V_N, infinite
-        where they lay behind that of V_O.
-
-    Notes
-    -----
-    The widths are square roots of what a pixel and a list cover, in the model frame, at the middle
-    of the view depths that the bounds have in front of the eye.
-    """
-    size = check_window_size(vdi.window_size if window_size is None else window_size)
-    pixel = _pixel_width(Camera.from_any(camera), size, vdi.bounds)
-    width = _pixel_width(vdi.camera, vdi.window_size, vdi.bounds)
-    if pixel == math.inf:
-        return 0.0
-    return width / pixel
+    ssim: float  # predicted, of the VDI's picture against the volume's; NaN below 11 pixels
+    standard_error: float  # of that, from how much the tiles differ from what was guessed
+    angle: float  # degrees, see angle_from_generating_view()
+    magnification: float  # pixels per list, see magnification()
+    tiles: int  # that were rendered; 0 where the volume is not in view
+    contrast: float = 1.0  # within 4 x 4 pixels over the volume's: below 1 where detail is missing
 
 
 class ViewErrorEstimator:
@@ -171,15 +89,7 @@ class ViewErrorEstimator:
     device : optional
         See :func:`pyvista_vdi.list_devices`.
     **changes
-        Options by name, in place of those in ``medium``: sample_distance, lights,
-        ambient_occlusion, memory_limit; see :class:`~pyvista_vdi.model.options.MediumOptions`.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If a number is out of range.
-    DeviceMemoryError
-        If the volume does not fit.
+        Options by name, in place of those in ``medium``.
 
     Notes
     -----
@@ -187,16 +97,9 @@ class ViewErrorEstimator:
     bounds (elsewhere both pictures are empty, and SSIM is 1). Both pictures are rendered at a
     fifth of the pixels along each edge to guess each cell's loss, 1 - SSIM, up to a factor. A
     systematic sample with probabilities in proportion to the guess is taken along a space-filling
-    curve through the cells [1]_. The factor is the ratio of what the tiles lost to what was
-    guessed for them, each weighted by one over its probability (the ratio estimator, [2]_). The
-    choice depends on the arguments alone, so that equal arguments give equal estimates.
-
-    References
-    ----------
-    .. [1] W. G. Madow, "On the theory of systematic sampling, II", Annals of Mathematical
-       Statistics 20(3), 1949.
-    .. [2] C.-E. Särndal, B. Swensson, J. Wretman, "Model Assisted Survey Sampling", Springer 1992,
-       section 5.6.
+    curve through the cells (Madow 1949). The factor is the ratio of what the tiles lost to what was
+    guessed for them, each weighted by one over its probability (the ratio estimator: Särndal,
+    Swensson and Wretman 1992, section 5.6). Equal arguments give equal estimates.
     """
 
     def __init__(
@@ -224,167 +127,126 @@ class ViewErrorEstimator:
         camera: Any,
         window_size: Sequence[int] | None = None,
         *,
-        picture: ArrayLike | None = None,
-        opaque_depth: ArrayLike | None = None,
         clipping_planes: ArrayLike | None = None,
         cropping: Any = None,
         opacity_multiplier: float = 1.0,
         background: Sequence[float] = (0.0, 0.0, 0.0),
-        pause: Pause | None = None,
     ) -> ViewError:
         """Estimate how similar the VDI's picture of a view is to the volume's.
 
-        Parameters
-        ----------
-        vdi : VDI
-            Of the same volume and look, or of former ones.
-        camera : Camera or vtkCamera or pyvista.Camera
-            The new view V_N; its ``model_transform`` says where volume and VDI are now.
-        window_size : (int, int), optional
-            Width and height of the whole picture in pixels; by default the VDI's own.
-        picture : array_like of float32, shape (height, width, 4), optional
-            What :func:`pyvista_vdi.render` returned for the same arguments, if it is at hand:
-            then only the volume is rendered.
-        opaque_depth : array_like of float, shape (height, width), optional
-            As for :func:`pyvista_vdi.render`; both pictures end there.
-        clipping_planes : array_like of float, shape (k, 6), optional
-            As for :func:`pyvista_vdi.render`; both pictures are clipped.
-        cropping, opacity_multiplier
-            As for :func:`pyvista_vdi.render`; both pictures are cropped, and as dense.
-        background : (float, float, float)
-            RGB that both pictures are blended over before they are compared.
-        pause : callable, optional
-            Called before each launch, which is a tile or a few thousand pixels of a coarse
-            picture. It may wait, to let frames pass; if it returns ``False`` the estimate ends.
-
-        Returns
-        -------
-        ViewError
-            The predicted SSIM, and where the view stands.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If an argument cannot be used.
-        Cancelled
-            If ``pause`` returned ``False``.
+        The view's ``model_transform`` says where volume and VDI are now, ``window_size`` (width,
+        height) is that of the whole picture, by default the VDI's own, and ``background`` the RGB
+        that both pictures are blended over before they are compared; planes, cropping and
+        multiplier are as for :func:`pyvista_vdi.render`, of both. InvalidArgumentError if an
+        argument cannot be used.
         """
         camera = Camera.from_any(camera)
         size = check_window_size(vdi.window_size if window_size is None else window_size)
         shown = RenderOptions(clipping_planes, cropping, opacity_multiplier)
-        depth = _of_window("opaque_depth", opaque_depth, size[::-1])
-        request = FrameRequest(camera, size, shown, depth, self._runtime)
-        picture = _of_window("picture", picture, (*size[::-1], 4))
-        pair = _PicturePair(self._medium, vdi, request, picture, background, pause)
+        request = FrameRequest(camera, size, shown, device=self._runtime)
         where = (angle_from_generating_view(vdi, camera), magnification(vdi, camera, size))
         if min(size) < SSIM_WINDOW:
             return ViewError(math.nan, math.nan, *where, 0)
-        tiles = self._sample(pair)
-        if tiles is None:
+        sample = self.sample(vdi, request, background)
+        if sample is None:
             return ViewError(1.0, 0.0, *where, 0)
-        old, new = pair.tiles(tiles)
-        ssim = tiles_ssim(old, new, background)
-        contrast = contrast_ratio(old, new, 1 / tiles.chances, background)
-        return ViewError(*tiles.infer(ssim), *where, len(ssim), contrast)
+        old, new = self.tiles(sample, request, vdi), self.tiles(sample, request)
+        ssim, error = sample.infer(tiles_ssim(old, new, background))
+        contrast = contrast_ratio(old, new, 1 / sample.chances, background)
+        return ViewError(ssim, error, *where, len(new), contrast)
 
-    def sample(self, vdi: VDI, camera: Camera, window_size: tuple[int, int]) -> TileSample | None:
+    def sample(
+        self, vdi: VDI, request: FrameRequest, background: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> TileSample | None:
         """Choose the tiles of a view, by a VDI that shows roughly where the error is.
 
         It may have fewer lists than the VDI that is to be judged. Returns None where the volume is
         not in view; both edges of the window have at least 11 pixels.
         """
-        request = FrameRequest(camera, window_size, device=self._runtime)
-        return self._sample(_PicturePair(self._medium, vdi, request))
-
-    def volume_tile(
-        self,
-        lens: Camera,
-        tile_size: tuple[int, int],
-        shown: RenderOptions | None = None,
-        *,
-        lit_from: Camera | None = None,
-    ) -> NDArray[np.float32]:
-        """Return the volume's picture through the lens of a tile, lit as seen from a view."""
-        frame = FrameRequest(lens, tile_size, shown or RenderOptions())
-        return raycast_medium(self._medium, frame, lit_from=lit_from)
-
-    def _sample(self, pair: "_PicturePair") -> TileSample | None:
-        camera, size = pair.request.camera, pair.request.size
-        region = seen_region(camera, size, (pair.vdi.bounds, self._medium.volume.bounds))
+        camera, size = request.camera, request.size
+        region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
         cells = Cells(region, size, self._edge)
         n = len(cells.corners)
-        guess = cells.guess(*pair.coarse(region)) if n > self._tiles else np.ones(n)
-        return cells.sample(guess, self._tiles)
-
-
-@dataclass(frozen=True, eq=False)
-class _PicturePair:
-    """One view of VDI and volume, of which parts are rendered."""
-
-    medium: DeviceVolume
-    vdi: VDI
-    request: FrameRequest  # of the whole view
-    picture: NDArray[Any] | None = None
-    background: Sequence[float] = (0.0, 0.0, 0.0)
-    pause: Pause | None = None
-
-    def coarse(self, region: Region) -> tuple[Floats, Floats]:
-        """Return coarse pictures of a region by VDI and volume, float64 (rows, columns, 3)."""
+        if n <= self._tiles:
+            return cells.sample(np.ones(n), self._tiles)
+        # Draw coarse pictures of the region both ways, in bands
         columns, rows = (-(-extent // COARSE) for extent in region.extent)
         left, top = region.first
-        # The last may lie beyond the window, which has no depth and no picture there
-        across, down = (
-            np.minimum(first + COARSE * np.arange(n) + COARSE // 2, edge - 1)
-            for first, n, edge in zip(region.first, (columns, rows), self.request.size, strict=True)
-        )
-        bands = []
         band = max(1, _COARSE_LAUNCH // columns)
+        pictures: tuple[list[Picture], list[Picture]] = ([], [])
         for row in range(0, rows, band):
-            n = min(band, rows - row)
+            high = min(band, rows - row)
             corner = (left, top + row * COARSE)
-            lens = self.request.camera.tile(
-                self.request.size, corner, (columns * COARSE, n * COARSE)
-            )
-            part = np.ix_(down[row : row + n], across)
-            bands.append(self._both(lens, (columns, n), part))
-        old, new = (
-            over_background(np.concatenate(band), self.background)
-            for band in zip(*bands, strict=True)
-        )
-        return old, new
+            lens = camera.tile(size, corner, (columns * COARSE, high * COARSE))
+            part = request.replace(camera=lens, size=(columns, high))
+            for drawn, of in zip(pictures, (vdi, None), strict=True):
+                drawn.append(self._picture(part, of))
+        old, new = (over_background(np.concatenate(each), background) for each in pictures)
+        return cells.sample(cells.guess(old, new), self._tiles)
 
-    def tiles(self, sample: TileSample) -> tuple[list[Any], list[Any]]:
-        """Return each tile's pictures by VDI and volume, float32 (height, width, 4)."""
-        width, height = sample.size
-        pairs = []
+    def tiles(
+        self,
+        sample: TileSample,
+        request: FrameRequest,
+        vdi: VDI | None = None,
+        lit_from: Camera | None = None,
+    ) -> list[Picture]:
+        """Return the pictures of a view's tiles, by a VDI or, without one, by the volume.
+
+        ``lit_from`` is the view whose light falls on the volume, in place of the picture's.
+        """
+        pictures = []
         for column, row in sample.corners.tolist():
-            lens = self.request.camera.tile(self.request.size, (column, row), sample.size)
-            part = np.s_[row : row + height, column : column + width]
-            pairs.append(self._both(lens, sample.size, part))
-        old, new = zip(*pairs, strict=True)
-        return list(old), list(new)
+            lens = request.camera.tile(request.size, (column, row), sample.size)
+            tile = request.replace(camera=lens, size=sample.size)
+            pictures.append(self._picture(tile, vdi, lit_from))
+        return pictures
 
-    def _both(
-        self, lens: Camera, size: tuple[int, int], part: Any
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """The pixels ``part`` of the window, seen through ``lens``, by VDI and volume."""
-        depth: Any = self.request.opaque_depth
-        request = self.request.replace(
-            camera=lens, size=size, opaque_depth=None if depth is None else depth[part]
-        )
-        if self.picture is not None:
-            of_vdi = self.picture[part]
-        else:
-            self._wait()
-            of_vdi = render_vdi(self.vdi, request)
-        self._wait()
-        return of_vdi, raycast_medium(self.medium, request)
+    def _picture(
+        self, request: FrameRequest, vdi: VDI | None, lit_from: Camera | None = None
+    ) -> Picture:
+        if vdi is not None:
+            return render_vdi(vdi, request)
+        return raycast_medium(self._medium, request, lit_from=lit_from)
 
-    def _wait(self) -> None:
-        if self.pause is not None and self.pause() is False:
-            raise Cancelled("the estimate of a view's error was cancelled")
+
+# Where a view stands
+
+
+def angle_from_generating_view(vdi: VDI, camera: Any) -> float:
+    """Return by how much a view has turned about the VDI's model since it was generated.
+
+    It is the angle, degrees from 0 to 180, between the directions from the centre of the bounds to
+    the two eyes, each taken to the model frame by its own camera's model transform, and compared as
+    that of the VDI's ``camera`` shows them. Moving the eye towards the centre, turning it about its
+    own place and moving the model along with the camera are no turn. In parallel projection the eye
+    is infinitely far against the direction of projection; that also stands in for an eye at the
+    very centre.
+    """
+    shown = vdi.camera.model_transform[:3, :3]
+    old, new = (
+        eye_from_centre(view, vdi.bounds, shown)[0]
+        for view in (vdi.camera, Camera.from_any(camera))
+    )
+    sine, cosine = np.linalg.norm(np.cross(old, new)), old @ new
+    return math.degrees(math.atan2(sine, cosine))
+
+
+def magnification(vdi: VDI, camera: Any, window_size: Sequence[int] | None = None) -> float:
+    """Return how many pixels of a view's picture are as wide as one list.
+
+    It grows as one zooms in: above 1 the picture asks for more detail than the lists have across
+    the rays of the generating view. ``window_size`` is the picture's, by default the VDI's own. The
+    widths are square roots of what a pixel and a list cover, in the model frame, at the middle of
+    the view depths that the bounds have in front of the eye; 0 where they lie behind that of the
+    view, infinite where they lay behind that of the generating view.
+    """
+    size = check_window_size(vdi.window_size if window_size is None else window_size)
+    pixel = _pixel_width(Camera.from_any(camera), size, vdi.bounds)
+    width = _pixel_width(vdi.camera, vdi.window_size, vdi.bounds)
+    return 0.0 if pixel == math.inf else width / pixel
 
 
 def world_centre(camera: Camera, bounds: Sequence[float]) -> Floats:
@@ -434,13 +296,216 @@ def _pixel_width(camera: Camera, size: tuple[int, int], bounds: Sequence[float])
     return math.sqrt(float(np.linalg.norm(np.cross(across, up))))
 
 
-def _of_window(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[Any] | None:
-    if values is None:
+# Tiles of a picture, and what their SSIM says of the whole's
+
+
+@dataclass(frozen=True)
+class TileSample:
+    """Tiles of a picture, and how the SSIM of the whole follows from theirs.
+
+    ``corners``: int64 (k, 2): column and row of each tile's first pixel, from the top left.
+    ``size``: width and height of a tile, pixels. ``chances``, ``guess``: float64 (k,): probability
+    of each tile to be chosen, and its guessed loss. ``guessed``: sum of the guesses for all cells
+    of the picture. ``share``: of the picture's pixels that have an SSIM, in one cell.
+    """
+
+    corners: NDArray[np.int64]
+    size: tuple[int, int]
+    chances: Floats
+    guess: Floats
+    guessed: float
+    share: float
+
+    def infer(self, ssim: Floats) -> tuple[float, float]:
+        """Return the SSIM of the whole picture, and its standard error, from the tiles'."""
+        losses, chances, guess = 1.0 - ssim, self.chances, self.guess
+        seen, expected = float((losses / chances).sum()), float((guess / chances).sum())
+        ratio = seen / expected if expected > 0 else 0.0
+        residuals, n = (losses - ratio * guess) / chances, len(losses)
+        variance = n / max(1, n - 1) * float(((1 - chances) * residuals**2).sum())
+        total = seen + ratio * (self.guessed - expected)
+        return float(1.0 - self.share * total), float(self.share * math.sqrt(variance))
+
+
+def tiles_ssim(
+    old: Sequence[Picture], new: Sequence[Picture], background: Sequence[float] = (0.0, 0.0, 0.0)
+) -> Floats:
+    """Return the mean SSIM of the inner pixels of pairs of tiles of one size, float64 (k,)."""
+    from skimage.metrics import structural_similarity  # loads SciPy
+
+    height, width = new[0].shape[:2]
+    # One above the other: a call for each would take five times as long
+    pair = (over_background(np.concatenate(tiles), background) for tiles in (old, new))
+    _, ssim = structural_similarity(*pair, full=True, **SSIM_ARGUMENTS)
+    inner = slice(REACH, -REACH)
+    by_tile = ssim.reshape(len(new), height, width, 3)[:, inner, inner]
+    return np.asarray(by_tile.mean(axis=(1, 2, 3)))
+
+
+def contrast_ratio(
+    old: Sequence[Picture],
+    new: Sequence[Picture],
+    weights: Floats,
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+) -> float:
+    """Return the contrast of tiles within blocks of pixels over that of others, weighted by tile.
+
+    It is the mean standard deviation of a channel within 4 x 4 pixels; 1 where neither has any.
+    """
+    sums = []
+    for tiles in (old, new):
+        height, width = tiles[0].shape[:2]
+        n, high, wide = len(tiles), height // _BLOCK, width // _BLOCK
+        pictures = over_background(np.concatenate(tiles), background)
+        blocks = pictures.reshape(n, height, width, 3)[:, : high * _BLOCK, : wide * _BLOCK]
+        blocks = blocks.reshape(n, high, _BLOCK, wide, _BLOCK, 3)
+        sums.append(float(weights @ blocks.std(axis=(2, 4)).mean(axis=(1, 2, 3))))
+    return sums[0] / sums[1] if sums[1] > 0 else 1.0
+
+
+@dataclass(frozen=True)
+class Region:
+    """A rectangle of pixels: first column and row from the top left, and how many."""
+
+    first: tuple[int, int]
+    extent: tuple[int, int]
+
+
+class Cells:
+    """A region of a window cut into cells, each the part of a tile whose SSIM the tile tells.
+
+    ``corners``: int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling
+    curve. ``tile_size``: width and height of a tile, pixels.
+    """
+
+    def __init__(self, region: Region, size: tuple[int, int], edge: int) -> None:
+        self._region = region
+        self._size = size
+        self._edges = [min(edge, s - 2 * REACH) for s in size]
+        axes = zip(region.first, region.extent, self._edges, size, strict=True)
+        columns, rows = self._starts = [_cell_starts(f, n, e, s - REACH) for f, n, e, s in axes]
+        self._order = _along_curve(len(columns), len(rows))
+        column, row = self._order.T
+        self.corners = np.stack([columns[column], rows[row]], axis=1) - REACH
+        self.tile_size = (self._edges[0] + 2 * REACH, self._edges[1] + 2 * REACH)
+        self.area = math.prod(max(n, e) for n, e in zip(region.extent, self._edges, strict=True))
+
+    def guess(self, old: Floats, new: Floats) -> Floats:
+        """Guess each cell's loss, up to a factor, from coarse pictures of the region.
+
+        The loss of the coarse pictures' own SSIM, and the root of the detail that is to be seen:
+        contrast between neighbours in either picture, and the pictures' difference.
+        """
+        from skimage.metrics import structural_similarity  # loads SciPy
+
+        contrast = np.maximum(_contrast(old), _contrast(new))
+        detail = contrast + _DIFFERENCE_WEIGHT * np.abs(old - new).max(axis=2)
+        loss = np.zeros(old.shape[:2])
+        if min(loss.shape) >= _COARSE_WINDOW:
+            _, ssim = structural_similarity(old, new, full=True, **_COARSE_SSIM)
+            loss = np.maximum(1.0 - ssim.mean(axis=2), 0.0)  # never below 0, but for rounding
+        return np.asarray(self._averages(loss) + np.sqrt(self._averages(detail)))
+
+    def sample(self, guess: Floats, tiles: int) -> TileSample:
+        """Return ``tiles`` of them, or all, the likelier the more of the loss a cell is guessed."""
+        n, mean = len(self.corners), guess.mean()
+        # Give each cell a chance in proportion to its weight; what is beyond 1 is certain
+        weight = _EVEN_SHARE + (1 - _EVEN_SHARE) * guess / mean if mean > 0 else np.ones(n)
+        chances, certain = np.ones(n), np.zeros(n, dtype=bool)
+        while not certain.all():
+            left = min(tiles, n) - np.count_nonzero(certain)
+            chances[~certain] = left * weight[~certain] / weight[~certain].sum()
+            beyond = ~certain & (chances >= 1)
+            if not beyond.any():
+                break
+            chances[beyond] = 1.0
+            certain |= beyond
+        # Sample systematically along the curve
+        turns = np.floor(np.concatenate([[0.0], np.cumsum(chances)]) + 0.5)
+        chosen = np.flatnonzero(np.diff(turns) > 0)
+        share = self.area / n / math.prod(edge - 2 * REACH for edge in self._size)
+        of = (chances[chosen], guess[chosen], float(guess.sum()))
+        return TileSample(self.corners[chosen], self.tile_size, *of, share)
+
+    def _averages(self, coarse: Floats) -> Floats:
+        """Mean over each cell of values at coarse pixels of the region, float64 (n,)."""
+        # Find the shares of coarse pixels in cells along each axis; those of a cell add up to 1
+        shares = []
+        axes = zip(self._starts, self._edges, self._region.first, coarse.shape[::-1], strict=True)
+        for starts, edge, first, count in axes:
+            begin = first + COARSE * np.arange(count)
+            low = np.maximum(begin[None], starts[:, None])
+            high = np.minimum(begin[None] + COARSE, starts[:, None] + edge)
+            share = np.maximum(high - low, 0.0)
+            shares.append(share / share.sum(axis=1, keepdims=True))
+        (across, down), (column, row) = shares, self._order.T
+        return np.asarray((down @ coarse @ across.T)[row, column])
+
+
+def seen_region(
+    camera: Camera, size: tuple[int, int], boxes: Sequence[Sequence[float]]
+) -> Region | None:
+    """Pixels whose SSIM the boxes can change; None if there are none.
+
+    The whole picture where a box reaches behind the eye. SSIM is not told within five pixels of
+    the picture's border.
+    """
+    corners = np.concatenate([bounds_corners(box) for box in boxes])
+    points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
+    depth, edges = points[:, 2], np.asarray(size)
+    if not camera.parallel_projection and depth.max() <= 0:
         return None
-    array = np.asarray(values)
-    if array.shape != shape:
-        raise InvalidArgumentError(f"{name} must have shape {shape}; got {array.shape}")
-    return array
+    first, last = np.zeros(2), edges.astype(np.float64)
+    if camera.parallel_projection or depth.min() > rays.NEAREST_DEPTH * depth.max():
+        viewport = points @ camera.viewport_matrix(size).T
+        u, v = viewport[:, :2].T / viewport[:, 3]
+        pixels = (np.stack([u, -v], axis=1) + 1) / 2 * edges
+        first, last = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0))
+    low = np.clip(first - REACH, REACH, edges - REACH).astype(int)
+    high = np.clip(last + REACH, REACH, edges - REACH).astype(int)
+    if (high <= low).any():
+        return None
+    (left, top), (width, height) = low.tolist(), (high - low).tolist()
+    return Region((left, top), (width, height))
+
+
+def _cell_starts(first: int, extent: int, edge: int, end: int) -> NDArray[np.int64]:
+    """Where cells begin that cover ``extent`` pixels evenly and end before ``end``."""
+    if extent <= edge:
+        return np.array([min(first, end - edge)])
+    count = -(-extent // edge)
+    return np.rint(np.linspace(first, first + extent - edge, count)).astype(np.int64)
+
+
+def _along_curve(columns: int, rows: int) -> NDArray[np.int64]:
+    """All (column, row) of a grid along Hilbert's curve, int64 (columns * rows, 2).
+
+    Neighbours along the curve are neighbours in the grid, so that a sample evenly spaced along it
+    is spread over the grid.
+    """
+    row, column = np.divmod(np.arange(columns * rows), columns)
+    cells = np.stack([column, row], axis=1)
+    x, y = cells.T.copy()
+    place = np.zeros_like(x)
+    for bit in reversed(range(max(columns, rows).bit_length())):
+        right, up = x >> bit & 1, y >> bit & 1
+        place = place << 2 | (3 * right ^ up)
+        # Turn the quadrant so that its curve runs as the whole does
+        low = (1 << bit) - 1
+        x, y = x & low, y & low
+        flipped = (up == 0) & (right == 1)
+        x, y = np.where(flipped, low - x, x), np.where(flipped, low - y, y)
+        x, y = np.where(up == 0, y, x), np.where(up == 0, x, y)
+    return np.asarray(cells[np.argsort(place)])
+
+
+def _contrast(picture: Floats) -> Floats:
+    """Largest difference of a channel from the four neighbours, float64 (rows, columns)."""
+    across = np.abs(np.diff(picture, axis=1)).max(axis=2)
+    down = np.abs(np.diff(picture, axis=0)).max(axis=2)
+    beside = (across, ((0, 0), (0, 1))), (across, ((0, 0), (1, 0)))
+    above = (down, ((0, 1), (0, 0))), (down, ((1, 0), (0, 0)))
+    return np.asarray(np.max([np.pad(step, by) for step, by in (*beside, *above)], axis=0))
 
 
 def _whole(name: str, value: Any, least: int) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -124,7 +124,13 @@ def pick_vdi(
     if not isinstance(vdi, VDI):
         raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
     camera, options = request.camera, request.options
-    ray = _Ray.of_pixel(vdi, camera, _checked_pixel(pixel, request.size), request.size)
+    (x, y), (width, height) = as_range(pixel), request.size
+    if not (-0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5):
+        raise InvalidArgumentError(
+            f"pixel must be (x, y) inside the window of {width} x {height}, y = 0 at the bottom; "
+            f"got {pixel!r}"
+        )
+    ray = _Ray.of_pixel(vdi, camera, (x, y), request.size)
     span = ray.span(vdi, request)
     if span is None:
         return None
@@ -138,6 +144,12 @@ def pick_vdi(
         return None
     row, column = divmod(int(met.list[k]), vdi.window_size[0])
     supersegment = int(met.supersegment[k])
+    value = None
+    if deferred is not None:  # whose list has also what was left out
+        begin, end = map(int, deferred.offsets[met.list[k] : met.list[k] + 2])
+        away = np.abs(deferred.front[begin:end] - vdi.front[supersegment])
+        low, high = deferred.value_range
+        value = low + (high - low) * float(deferred.mean[begin + int(np.argmin(away))])
     at_model = np.append(ray.origin + met.enters[k] * ray.direction, 1.0)
     return Pick(
         position=_triple((camera.model_transform @ at_model)[:3]),
@@ -148,11 +160,7 @@ def pick_vdi(
         color=_triple(vdi.color[supersegment]),
         optical_depth=float(met.optical_depth[k]),
         accumulated_optical_depth=float(met.optical_depth[: k + 1].sum()),
-        value=(
-            None
-            if deferred is None
-            else _value(deferred, int(met.list[k]), vdi.front[supersegment])
-        ),
+        value=value,
     )
 
 
@@ -226,9 +234,21 @@ def _media_along(
     vdi: VDI, ray: _Ray, first: float, last: float, kept: Floats, multiplier: float
 ) -> _Media:
     """Return every supersegment that a ray crosses between two t, in the parts that are kept."""
-    # Pieces of the ray, each within one list
-    cuts = _list_crossings(ray, first, last, vdi.window_size)
-    lists = _lists_at(ray, (cuts[:-1] + cuts[1:]) / 2, vdi.window_size)
+    # Cut the ray where it enters another list, and find the list of each piece by its middle
+    crossings = [np.array([first, last])]
+    for axis, edge in enumerate(vdi.window_size):
+        border = 2 * np.arange(edge + 1) / edge - 1
+        with np.errstate(divide="ignore", invalid="ignore"):  # a border that is never reached
+            t = -(ray.at[axis] - border * ray.at[3]) / (ray.slope[axis] - border * ray.slope[3])
+        crossings.append(t[(t > first) & (t < last)])
+    cuts = np.unique(np.concatenate(crossings))
+    u, v, _, d = ray.at[:, None] + ray.slope[:, None] * ((cuts[:-1] + cuts[1:]) / 2)
+    column, row = (
+        np.clip(np.floor((c / d + 1) / 2 * edge), 0, edge - 1).astype(np.int64)
+        for c, edge in zip((u, v), vdi.window_size, strict=True)
+    )
+    wide, high = vdi.window_size
+    lists = row * wide + column
 
     # All supersegments of these lists, each list from the end that the ray comes from
     begin, end = vdi.offsets[lists].astype(np.int64), vdi.offsets[lists + 1].astype(np.int64)
@@ -258,38 +278,11 @@ def _media_along(
     # tau l / L (docs/conventions.md, "A supersegment is a homogeneous medium")
     length = multiplier * drawn.sum(axis=1) * np.linalg.norm(ray.direction)
     thickness = vdi.back[member].astype(np.float64) - vdi.front[member].astype(np.float64)
-    whole = thickness * _centre_ray_scale(vdi, lists[piece])
-    return _Media(lists[piece], member, enters, vdi.optical_depth[member] * (length / whole))
-
-
-def _list_crossings(ray: _Ray, first: float, last: float, window_size: tuple[int, int]) -> Floats:
-    """Return ``first``, each t between where the ray enters another list, and ``last``; sorted."""
-    cuts = [np.array([first, last])]
-    for axis, edge in enumerate(window_size):
-        border = 2 * np.arange(edge + 1) / edge - 1
-        with np.errstate(divide="ignore", invalid="ignore"):  # a border that is never reached
-            t = -(ray.at[axis] - border * ray.at[3]) / (ray.slope[axis] - border * ray.slope[3])
-        cuts.append(t[(t > first) & (t < last)])
-    return np.unique(np.concatenate(cuts))
-
-
-def _lists_at(ray: _Ray, t: Floats, window_size: tuple[int, int]) -> Integers:
-    """Return the list in which the ray is at each t, which lies inside V_O's viewport."""
-    u, v, _, d = ray.at[:, None] + ray.slope[:, None] * t
-    places = [
-        np.clip(np.floor((c / d + 1) / 2 * edge), 0, edge - 1).astype(np.int64)
-        for c, edge in zip((u, v), window_size, strict=True)
-    ]
-    return places[1] * window_size[0] + places[0]
-
-
-def _centre_ray_scale(vdi: VDI, lists: Integers) -> Floats:
-    """Return the model length of one world unit of view depth along the lists' centre rays."""
-    wide, high = vdi.window_size
-    row, column = np.divmod(lists, wide)
-    pixels = np.stack([np.ones(len(lists)), column + 0.5 - wide / 2, row + 0.5 - high / 2], axis=1)
+    across, up = column[piece] + 0.5 - wide / 2, row[piece] + 0.5 - high / 2
     centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
-    return np.asarray(np.linalg.norm(pixels @ centre, axis=1))
+    directions = np.stack([np.ones(len(piece)), across, up], axis=1) @ centre
+    whole = thickness * np.linalg.norm(directions, axis=1)
+    return _Media(lists[piece], member, enters, vdi.optical_depth[member] * (length / whole))
 
 
 def _where_positive(value: Floats, slope: Floats) -> tuple[float, float] | None:
@@ -302,24 +295,6 @@ def _where_positive(value: Floats, slope: Floats) -> tuple[float, float] | None:
     return (first, last) if first < last else None
 
 
-def _checked_pixel(pixel: Sequence[float], size: tuple[int, int]) -> tuple[float, float]:
-    x, y = as_range(pixel)
-    if not (-0.5 <= x < size[0] - 0.5 and -0.5 <= y < size[1] - 0.5):
-        raise InvalidArgumentError(
-            f"pixel must be (x, y) inside the window of {size[0]} x {size[1]}, y = 0 at the "
-            f"bottom; got {pixel!r}"
-        )
-    return x, y
-
-
 def _triple(values: ArrayLike) -> tuple[float, float, float]:
     x, y, z = np.asarray(values, dtype=np.float64).tolist()
     return x, y, z
-
-
-def _value(deferred: DeferredVDI, number: int, front: Any) -> float:
-    """Return the mean of the supersegment of a list that begins there: it has those left out."""
-    begin, end = map(int, deferred.offsets[number : number + 2])
-    place = begin + int(np.argmin(np.abs(deferred.front[begin:end] - front)))
-    low, high = deferred.value_range
-    return low + (high - low) * float(deferred.mean[place])

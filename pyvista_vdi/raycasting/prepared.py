@@ -254,18 +254,6 @@ class PreparedVDI:
         """Bytes of the lists on the device: headers and supersegments."""
         return sum(buffer.nbytes for buffer in {self.headers, self.faces, self.media})
 
-    @property
-    def switches(self) -> dict[str, int | str]:
-        """``-D`` names of kernels that read the lists, and their values."""
-        switches: dict[str, int | str] = {
-            "OFFSET_T": "long" if self.long_offsets else "int",
-            "DEPTH": "PARALLEL" if self.parallel else "SHIFTED" if self.shifted else "RECIPROCAL",
-            "PACKED": int(self.packed),
-        }
-        if self.double_float:
-            switches["DOUBLE_FLOAT_RAYS"] = self.double_float
-        return switches
-
     def list_space(self, camera: Camera) -> NDArray[np.float64]:
         """Model frame to homogeneous list coordinates, float64 (4, 4).
 
@@ -305,7 +293,7 @@ class PreparedVDI:
             else:
                 made_on: Any = getattr(vdi.late, "on", None)
                 if made_on is not None:
-                    held = stack.enter_context(made_on(runtime))
+                    held |= stack.enter_context(made_on(runtime))
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     held = {name: upload(array, what) for (name, what), array in arrays}
@@ -369,6 +357,14 @@ class PreparedVDI:
         self.double_float = 0
         if lists_are_far(rounded.max(initial=0.0), thickness, far - near):
             self.double_float = 2 if back.max() - near < far - front.min() else 1
+        #: ``-D`` names of kernels that read the lists, and their values.
+        self.switches: dict[str, int | str] = {
+            "OFFSET_T": "long" if self.long_offsets else "int",
+            "DEPTH": "PARALLEL" if self.parallel else "SHIFTED" if self.shifted else "RECIPROCAL",
+            "PACKED": int(self.packed),
+        }
+        if self.double_float:
+            self.switches["DOUBLE_FLOAT_RAYS"] = self.double_float
         self.list_rows = self.list_space(self.camera)
 
 
@@ -402,7 +398,7 @@ class KeptValues(PreparedVDI):
             shown.lit = share_lit(self._lists, *self.depths, look.optical_depths)
         with (
             kept_together() as keep,
-            runtime.upload(look.integrals(), "integrals of a transfer function") as table,
+            runtime.upload(look.integrals(), "integrals") as table,
         ):
             shown.headers = keep(self._made((bundles,), "list headers", np.uint64))
             shown.faces = keep(self._made((self._entries, 2), "supersegment faces"))

@@ -80,14 +80,19 @@ class BrickLayout:
     """How a grid is cut into bricks.
 
     ``shift``: logarithm to base 2 of the cells along an edge; ``gradients``: whether samples need
-    the points that gradients read; ``counts``: bricks along x, y and z; ``point_bytes``: of a point
-    on the device.
+    the points that gradients read; ``counts``: bricks along x, y and z, ``n_bricks`` in all, each
+    of ``points`` along an edge, ``before`` of them before its first cell; ``brick_bytes``: of one
+    on the device; ``table_bytes``: of what says which bricks are wanted, and where they are.
     """
 
     shift: int
     gradients: bool
     counts: tuple[int, int, int]
-    point_bytes: int
+    n_bricks: int
+    before: int
+    points: int
+    brick_bytes: int
+    table_bytes: int
 
     @classmethod
     def of(
@@ -95,32 +100,9 @@ class BrickLayout:
     ) -> "BrickLayout":
         """Return the layout for a grid of so many points along x, y and z."""
         x, y, z = (-(-(points - 1) // 2**shift) for points in dimensions)
-        return cls(shift, gradients, (x, y, z), point_bytes)
-
-    @property
-    def before(self) -> int:
-        """Points that a brick holds before its first cell."""
-        return _GRADIENT_NEIGHBOURS[0] if self.gradients else _NEIGHBOURS[0]
-
-    @property
-    def points(self) -> int:
-        """Points along each edge that a brick holds."""
-        return 2**self.shift + sum(_GRADIENT_NEIGHBOURS if self.gradients else _NEIGHBOURS)
-
-    @property
-    def n_bricks(self) -> int:
-        """Bricks in all."""
-        return math.prod(self.counts)
-
-    @property
-    def brick_bytes(self) -> int:
-        """Bytes of a brick on the device."""
-        return self.points**3 * self.point_bytes
-
-    @property
-    def table_bytes(self) -> int:
-        """Bytes of the tables that say which bricks are wanted, and where they are."""
-        return 8 * self.n_bricks
+        before, behind = _GRADIENT_NEIGHBOURS if gradients else _NEIGHBOURS
+        n, points = x * y * z, before + 2**shift + behind
+        return cls(shift, gradients, (x, y, z), n, before, points, points**3 * point_bytes, 8 * n)
 
     @property
     def numbers(self) -> NDArray[np.void]:
@@ -255,9 +237,9 @@ class DeviceBricks:
 class StepSampler:
     """Samples the steps of rays in a volume that is on the device brick by brick.
 
-    ``medium``: arguments ``kernels.MEDIUM``; ``variant``: what kernels are compiled for; ``room``:
-    most steps of all rays at a time; ``ends``: where each ray ends in t, top row first. ``samples``
-    are those of the steps that were sampled last, for kernels that march.
+    ``medium``: arguments ``MEDIUM_PARAMETERS``; ``variant``: what kernels are compiled for;
+    ``room``: most steps of all rays at a time; ``ends``: where each ray ends in t, top row first.
+    ``samples`` are those of the steps that were sampled last, for kernels that march.
     """
 
     def __init__(

@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -47,7 +46,6 @@ from pyvista_vdi.volume.upload import (
     macrocells_over,
     other_bytes,
     shading_variant,
-    upload_blanked,
     uploads_of,
     voxel_reader,
 )
@@ -124,7 +122,10 @@ class DeviceVolume:
 
         # What samples are shaded by
         scalars = volume.finite_range if part is None else lambda: part.scalar_range
-        gradient = _gradient(runtime, volume, transfer_function, scalars, self.unit)
+        gradient = None
+        if transfer_function.gradient_opacities is not None:
+            values = gradient_table(volume.spacing, scalars(), transfer_function, self.unit)
+            gradient = runtime.upload(values, "gradient opacity")
         shading = shading_variant(transfer_function, self._lights)
         media = self.grid.length / self.sample_distance
         self.variant: Variant = replace(
@@ -135,6 +136,11 @@ class DeviceVolume:
             compensated=summation(media),
             **shading,
         )
+        blanked = None
+        if volume.blanked is not None:
+            octants, name = volume.blanked, f"what is blank of volume {volume.name!r}"
+            kept = uploads_of(volume).kept
+            blanked = kept(runtime, "blanked", None, lambda: runtime.upload(octants, name))
         asked = options.ambient_occlusion
         occlusion = None if asked is None else OcclusionGrid.of(self.grid, asked)
         strength = 0.0 if asked is None else asked.strength
@@ -143,7 +149,7 @@ class DeviceVolume:
             "voxels": voxels.buffer,
             "table": table.buffer,
             "distances": distances,
-            "blanked": None if volume.blanked is None else upload_blanked(runtime, volume),
+            "blanked": blanked,
             "gradient": gradient,
             "lighting": None,
             "ambient": None,
@@ -185,7 +191,7 @@ class DeviceVolume:
         return math.ceil(self.grid.length / self.sample_distance) + 1
 
     def medium_arguments(self, camera: Camera) -> dict[str, Any]:
-        """Return the arguments ``kernels.MEDIUM`` of the kernels that march.
+        """Return the arguments ``MEDIUM_PARAMETERS`` (``volume/medium.cl``) of kernels that march.
 
         ``camera`` is the view: lights may move with it.
         """
@@ -203,15 +209,12 @@ class DeviceVolume:
         opacity = looks.replace(colors=np.zeros_like(looks.colors), shading=None)
         radius, directions = occlusion.radius_in(self.volume), occlusion.directions
         key = (opacity, radius, directions, self.sample_distance)
-        uploads = uploads_of(self.volume)
-        with self.runtime.holding(uploads.lock):
-            kept = uploads.occlusions.get(self.runtime)
-            if kept is None or kept[0] != key:
-                uploads.occlusions.pop(self.runtime, None)  # its memory goes first
-                kept = None
-                found = ambient_transmittances(self.runtime, grid, **self._opacity_arguments())
-                uploads.occlusions[self.runtime] = kept = (key, found)
-        return kept[1]
+        return uploads_of(self.volume).kept(
+            self.runtime,
+            "occlusion",
+            key,
+            lambda: ambient_transmittances(self.runtime, grid, **self._opacity_arguments()),
+        )
 
     def part_opacities(
         self,
@@ -270,11 +273,8 @@ class _Classes:
         by_scalar: bool,
     ) -> "_Classes":
         """Return them, made once for a volume's last classification on a device."""
-        uploads, key = uploads_of(volume), (transfer_function, voxels.scale, by_scalar)
-        with runtime.holding(uploads.lock):
-            kept = uploads.classified.get(runtime)
-            if kept is not None and kept[0] == key:
-                return kept[1]  # type: ignore[no-any-return]
+
+        def make() -> "_Classes":
             table = _table(runtime, transfer_function, native=voxels.scale is None)
             visible = _visibility(runtime, volume, voxels, table, transfer_function)
             distances = _distances(runtime, volume, voxels, visible)
@@ -283,10 +283,12 @@ class _Classes:
                 ends = integer_ends(runtime, volume, voxels.ranges)
             if ends is not None:
                 table = _media_of_scalars(runtime, table, *ends)
-            made = cls(table, visible, distances)
-            runtime.finish()  # a thread with another queue may use them next
-            uploads.classified[runtime] = key, made
-            return made
+            return cls(table, visible, distances)
+
+        if voxels.buffer is None:  # the memory is for bricks
+            return make()
+        key = (transfer_function, voxels.scale, by_scalar)
+        return uploads_of(volume).kept(runtime, "classification", key, make)
 
 
 def _table(runtime: Runtime, transfer_function: TransferFunction, *, native: bool) -> _Table:
@@ -312,21 +314,6 @@ def _media_of_scalars(runtime: Runtime, table: _Table, first: int, last: int) ->
         launch(padded(n, GROUP), GROUP, **numbers, first=first, count=n)
         runtime.finish()  # the table may be host memory in use
     return _Table(media, n, float(first), 1.0, by_scalar=True)
-
-
-def _gradient(
-    runtime: Runtime,
-    volume: Volume,
-    transfer_function: TransferFunction,
-    scalar_range: Callable[[], tuple[float, float]],
-    per_difference: float,
-) -> DeviceBuffer | None:
-    """Upload gradient opacities, if there are any."""
-    if transfer_function.gradient_opacities is None:
-        return None
-    scalars = scalar_range()
-    values = gradient_table(volume.spacing, scalars, transfer_function, per_difference)
-    return runtime.upload(values, "gradient opacity")
 
 
 def _numbers(

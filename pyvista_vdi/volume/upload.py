@@ -7,7 +7,7 @@ import threading
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from pyvista_vdi.model.volume import Geometry, Volume
 from pyvista_vdi.volume.bricks import Room, in_parts
 from pyvista_vdi.volume.kernels import MACROCELL_RANGES
 from pyvista_vdi.volume.rays import Variant
+
+T = TypeVar("T")
 
 #: Voxel types that the kernels read as they are; the others are scaled to float32 on the host.
 _DEVICE_TYPES = {
@@ -149,8 +151,8 @@ def release_voxels(volume: Volume) -> None:
 class _Uploads:
     """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
 
-    Voxels and the scalar range of each macrocell, by device and scaling; the last classification,
-    and its ambient occlusion, by device, with what they were computed from.
+    Voxels and the scalar range of each macrocell, by device and scaling; and what :meth:`kept`
+    keeps by device.
     """
 
     def __init__(self) -> None:
@@ -162,9 +164,18 @@ class _Uploads:
         self.too_large: bool | None = None
         #: The least and the largest voxel of 16 bits; None before anyone has asked.
         self.ends: tuple[int, int] | None = None
-        self.blanked: dict[Runtime, DeviceBuffer] = {}
-        self.classified: dict[Runtime, tuple[Any, Any]] = {}
-        self.occlusions: dict[Runtime, tuple[Any, DeviceBuffer]] = {}
+        self._kept: dict[tuple[Runtime, str], tuple[Any, Any]] = {}
+
+    def kept(self, runtime: Runtime, what: str, key: Any, make: Callable[[], T]) -> T:
+        """Return what was made last, or make it if that was of another ``key``."""
+        with runtime.holding(self.lock):
+            kept = self._kept.get((runtime, what))
+            if kept is None or kept[0] != key:
+                self._kept.pop((runtime, what), None)  # its memory goes first
+                kept = None
+                self._kept[runtime, what] = kept = key, make()
+                runtime.finish()  # a thread with another queue may use it next
+            return kept[1]  # type: ignore[no-any-return]
 
 
 def macrocells_over(dimensions: Sequence[int]) -> tuple[int, int, int]:
@@ -241,18 +252,6 @@ def upload_voxels(
                 runtime.finish()  # a thread with another queue may use them next
             made[key] = (voxels, ranges)
         return made[key]
-
-
-def upload_blanked(runtime: Runtime, volume: Volume) -> DeviceBuffer:
-    """Return what is blank of a volume, made once per device."""
-    uploads = uploads_of(volume)
-    with runtime.holding(uploads.lock):
-        if runtime not in uploads.blanked:
-            assert volume.blanked is not None
-            blanked = runtime.upload(volume.blanked, f"what is blank of volume {volume.name!r}")
-            runtime.finish()  # a thread with another queue may use it next
-            uploads.blanked[runtime] = blanked
-        return uploads.blanked[runtime]
 
 
 def upload_ranges(

@@ -72,22 +72,6 @@ PLANES = r"clipping_planes must be \(k, 6\) finite"
 
 #: Which functions take an argument, values that they refuse, and the message.
 REFUSED = [
-    (
-        "make",
-        {"max_supersegments": wrong},
-        rf"max_supersegments must be a whole number from 1 to 4096; got {re.escape(repr(wrong))}$",
-    )
-    for wrong in (0, -1, 4097, 2.5, "many", None, np.nan, np.inf, [20])
-]
-REFUSED += [
-    ("make", {"tolerance": wrong}, "tolerance must be a number >= 0; got ")
-    for wrong in (-1e-9, np.nan, np.inf, "little", None, [0.1, 0.2])
-]
-REFUSED += [
-    ("make", {"view_cone": wrong}, "view_cone must be an angle between 0 and 90 degrees; got ")
-    for wrong in (-1, 90.5, np.nan, "wide", None)
-]
-REFUSED += [
     ("make draw", {"sample_distance": wrong}, rf"{SHORTEST}.*got {re.escape(repr(wrong))}$")
     for wrong in (0, -0.5, np.nan, np.inf, 1e-9, "small", [1])
 ]
@@ -149,7 +133,7 @@ def test_arguments_that_are_refused(make, draw, view, functions, change, message
         with pytest.raises(InvalidArgumentError, match=message):
             {"make": make, "draw": draw, "view": view}[name](**change)
     asked = {"window_size": WINDOW, **change}
-    if not {"max_supersegments", "window_size"}.isdisjoint(change):
+    if "window_size" in change:
         with pytest.raises(InvalidArgumentError, match=message):
             estimate(VOLUME, **asked)
 
@@ -240,6 +224,7 @@ def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
     for function in (make, draw):
         with pytest.raises(DeviceMemoryError, match=message):
             function(volume=volume)
+    del volume  # with which what is known of it is kept
     gc.collect()
     assert runtime.allocated == before
 

@@ -96,6 +96,7 @@ def test_by_position_and_by_other_names_it_is_the_same():
         ("generate", {"n_supersegments": 9}, "did you mean 'max_supersegments'"),
         ("generate", {"target_fps": 9}, "it is of add_vdi.*full_fps"),
         ("render_volume", {"skip_empty": True}, "passed by, without being asked"),
+        ("render_volume", {"precision": "exact"}, "how a VDI is made: give it to generate"),
         ("add_vdi", {"status": True}, r"call show_status\(plotter\) of the actor"),
         ("add_vdi", {"coverage": "view"}, r"Settings\(coverage=\.\.\.\)"),
         ("Settings", {"tolerence": 1}, "did you mean 'tolerance'"),

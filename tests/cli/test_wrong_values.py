@@ -63,7 +63,6 @@ WRONG = {
     "--compression": NO_CHOICE,
     "--compression-level": (*NO_WHOLE, "0", "-1", "10"),
     "--criterion": ("nothing", "''", "1", "nan"),
-    "--datasets": ("nothing", "''", "none.npy"),
     "--degrees": NO_NUMBER,
     "--device": ("nothing", "99", "-1"),
     "--diffuse": BELOW_0,
@@ -73,6 +72,7 @@ WRONG = {
     "--focal-point": NO_XYZ,
     "--fps": (*NOT_ABOVE_0, "1e9"),
     "--frames": NO_COUNT,
+    "--full-fps": NOT_ABOVE_0,
     "--generations": NO_COUNT,
     "--half-angle": (*NOT_ABOVE_0, "181"),
     "--host": ("'no such host'", "999.1.1.1"),
@@ -95,22 +95,18 @@ WRONG = {
     "--position": NO_XYZ,
     "--precision": NO_CHOICE,
     "--preference": NO_CHOICE,
-    "--profile": NO_CHOICE,
     "--quality": NO_CHOICE,
     "--rate": (*NOT_ABOVE_0, "1e9"),
     "--regenerate": NO_CHOICE,
     "--repeats": NO_COUNT,
     "--sample-distance": NOT_ABOVE_0,
     "--scalars": ("nothing", "''"),
-    "--seed": NO_COUNT,
     "--series": (),  # any text: what a file lacks is said when it is read
     "--size": ("x", "''", "12", "0x3", "-1x3", "12xnan", "99999x3", "3x2x1"),
-    "--sizes": ("x", "''", "12", "0x3"),
     "--spacing": (*NO_XYZ, "1 1 0", "1 1 -1"),
     "--specular": BELOW_0,
     "--specular-power": BELOW_0,
     "--sweep": ("nothing", "''", "lists=x", "lists=nan", "lists=0", "precision=x", "skip-empty=1"),
-    "--tables": (*NO_WHOLE, "3"),
     "--target-angle": (*NOT_ABOVE_0, "180"),
     "--target-fps": NOT_ABOVE_0,
     "--target-ssim": (*NOT_ABOVE_0, "1"),
@@ -128,7 +124,6 @@ WRONG = {
     "--view-cone": (*BELOW_0, "91"),
     "--view-up": (*NO_XYZ, "0 0 0"),
     "--views": NO_COUNT,
-    "--volume": ("none.npy", "a=none.npy", "''"),
     # Of stores of chunks, which refuse more
     "--channel": (),
     "--scheduler": (),
@@ -174,7 +169,6 @@ CALLED = {
     "--screenshot": "",
     "--sweep": "sweep|lists|precision",
     "--view-angle": "view.angle",
-    "--volume": "volume",
     "": "",
 }
 
@@ -200,6 +194,8 @@ def folder(tmp_path_factory):
         (path / f"empty{name}").touch()
     for name in ("vdi", "png", "gif", "exr", "vdis", "vdiset", "txt"):
         (path / f"old.{name}").write_text("what was here before")
+    for name in ("vdis", "vdiset"):
+        (path / f"old.{name}").write_bytes(b"PK\5\6" + bytes(18))  # a ZIP, which may be replaced
     return path
 
 

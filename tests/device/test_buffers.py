@@ -37,7 +37,9 @@ def test_upload_and_download(runtime, aligned):
             back = runtime.download(buffer)
             assert (back.dtype, back.shape) == (np.dtype(dtype), (5, 3, 4))
             np.testing.assert_array_equal(back, values)
-            np.testing.assert_array_equal(runtime.download(buffer, count=7), values.ravel()[:7])
+            np.testing.assert_array_equal(
+                runtime.download(buffer, np.empty(7, dtype)), values.ravel()[:7]
+            )
             for change in (runtime.write, runtime.fill):
                 with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
                     change(buffer, back if change == runtime.write else 0)
@@ -131,7 +133,7 @@ def test_results_outlive_their_buffers(runtime, shape):
         array = runtime.download(buffer)
         if runtime.is_cpu and 0 not in shape:
             assert runtime.download(buffer) is array
-        part = runtime.download(buffer, count=0)
+        part = runtime.download(buffer, np.empty(0, np.int32))
     assert runtime.allocated == before
     gc.collect()
     assert array.shape == shape
@@ -160,12 +162,6 @@ def test_a_target_gets_what_kernels_write(runtime, aligned):
         elsewhere = np.empty_like(array)
         np.testing.assert_array_equal(runtime.download(buffer, elsewhere), np.full((40, 50), 0.5))
     assert runtime.allocated == before
-    for bad in (array[:, ::2], array.T):
-        with pytest.raises(InvalidArgumentError, match="'values' must be C-contiguous"):
-            runtime.target(bad, "values")
-    array.flags.writeable = False
-    with pytest.raises(InvalidArgumentError, match="writeable=False"):
-        runtime.target(array, "values")
 
 
 def test_write_fill_and_download_into(runtime):
@@ -179,14 +175,13 @@ def test_write_fill_and_download_into(runtime):
         runtime.fill(buffer, np.int32(-5))
         assert np.all(runtime.download(buffer) == -5)
         for use, message in (
-            (lambda: runtime.write(buffer, np.zeros(6, np.float32)), "'six' exchanges 6 C-contig"),
-            (lambda: runtime.write(buffer, np.zeros(5, np.int32)), "'six' exchanges 6 C-contig"),
+            (
+                lambda: runtime.write(buffer, np.zeros(6, np.float32)),
+                "'six' exchanges C-contiguous",
+            ),
+            (lambda: runtime.write(buffer, np.zeros(7, np.int32)), "6 at most; the array has 7"),
             (lambda: runtime.download(buffer, out=np.zeros(6, np.float32)), "'six'"),
-            (lambda: runtime.download(buffer, out=np.zeros(5, np.int32)), "'six'"),
             (lambda: runtime.download(buffer, out=np.zeros((3, 2), np.int32).T[::-1]), "'six'"),
-            (lambda: runtime.fill(buffer, 256), "256 is no byte"),
-            (lambda: runtime.fill(buffer, np.complex128(0)), "does not divide"),
-            (lambda: runtime.download(buffer, count=7), "7 elements were asked"),
         ):
             with pytest.raises(InvalidArgumentError, match=message):
                 use()
@@ -205,21 +200,16 @@ def test_download_later(runtime, behind_frames):
         np.testing.assert_array_equal(out, np.arange(3, 9))
         runtime.download_later(buffer, out[:0], first=20)()
         for first in (-1, 15):
-            with pytest.raises(InvalidArgumentError, match=f"6 elements from {first} on"):
+            with pytest.raises(InvalidArgumentError, match=f"has 6 of float32 from {first} on"):
                 runtime.download_later(buffer, out, first=first)
         with pytest.raises(InvalidArgumentError, match="float32"):
             runtime.download_later(buffer, out.astype(np.float64))
         out.flags.writeable = False
-        with pytest.raises(InvalidArgumentError, match="not writable"):
+        with pytest.raises(InvalidArgumentError, match="writeable=False"):
             runtime.download_later(buffer, out)
 
 
-def test_sizes_are_bytes_or_shapes(runtime):
-    with runtime.buffer(12, np.float32) as buffer:
-        assert (buffer.shape, buffer.nbytes) == ((3,), 12)
-    for wrong in (13, -4, (3, -1)):
-        with pytest.raises(InvalidArgumentError):
-            runtime.buffer(wrong, np.float32)
+def test_buffers_may_be_empty(runtime):
     empty = np.empty((0, 4), np.float32)
     with runtime.buffer((0, 4)) as a, runtime.upload(empty) as b:
         assert a.nbytes == b.nbytes == 0
@@ -249,8 +239,8 @@ def test_accounting_is_safe_between_threads(runtime):
 
     def work() -> None:
         for _ in range(500):
-            runtime.buffer(4).release()
-            kept = runtime.buffer(4)
+            runtime.buffer((1,)).release()
+            kept = runtime.buffer((1,))
             del kept  # goes back by itself
 
     threads = [threading.Thread(target=work) for _ in range(4)]
@@ -274,16 +264,16 @@ def test_too_large_a_buffer_is_refused_before_it_is_taken(small):
     before = small.allocated
     message = r"'colours' needs 1.50 MiB \(1572864 bytes\).*1.00 MiB.*per buffer"
     with pytest.raises(DeviceMemoryError, match=message) as caught:
-        small.buffer(3 * 2**19, name="colours")
+        small.buffer((3 * 2**17,), name="colours")
     assert isinstance(caught.value, MemoryError)
     assert "max_supersegments" in str(caught.value)
     for array in (np.zeros(2**19), ocl.aligned_empty(2**19, np.float64)):
         with pytest.raises(DeviceMemoryError, match="'volume' needs 4.00 MiB"):
             small.upload(array, name="volume")
-    with small.buffer(2**20, name="one"), small.buffer(2**20 - 4, name="two"):
+    with small.buffer((2**18,), name="one"), small.buffer((2**18 - 1,), name="two"):
         with pytest.raises(DeviceMemoryError, match=r"'three' needs .* are in use already"):
-            small.buffer(8, name="three")
-        with small.buffer(4, name="the rest"):
+            small.buffer((2,), name="three")
+        with small.buffer((1,), name="the rest"):
             assert small.allocated == before + 2**21
     assert small.allocated == before
 
@@ -296,7 +286,7 @@ def test_drivers_refusal_of_a_buffer_is_a_memory_error(runtime, monkeypatch):
     if not runtime.is_cpu:
         pytest.skip("NVIDIA's driver takes no memory before it is used")
     with pytest.raises(DeviceMemoryError, match=message):
-        runtime.buffer(2**61, name="vast")
+        runtime.buffer((2**59,), name="vast")
     assert runtime.allocated == before
 
 
@@ -322,7 +312,7 @@ def test_driver_errors_keep_their_cause_and_kind(runtime, monkeypatch, code, exp
     def refused(*_, **__):
         raise driver_error
 
-    with runtime.buffer(4, name="soup") as buffer:
+    with runtime.buffer((1,), name="soup") as buffer:
         monkeypatch.setattr(devices.opencl(), "enqueue_fill_buffer", refused)
         with pytest.raises(expected, match="while filling.*'soup'.*as the driver says") as caught:
             runtime.fill(buffer, 0)
@@ -398,5 +388,5 @@ def test_pictures_come_through_pinned_memory_on_a_gpu(runtime, monkeypatch):
     with runtime.result(shape, name="image") as image:
         runtime.fill(image, np.float32(9))
         assert runtime.download(image, out) is out
-        assert runtime.download(image, count=5).tolist() == [9] * 5
+        assert runtime.download(image, np.empty(5, np.float32)).tolist() == [9] * 5
     assert (out == 9).all()

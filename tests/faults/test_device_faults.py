@@ -21,8 +21,9 @@ from faulty_driver import (
     same,
     state_of,
 )
+from runtimes import fresh_runtime
 
-from pyvista_vdi.device import devices, get_runtime, programs
+from pyvista_vdi.device import programs
 from pyvista_vdi.errors import Cancelled, DeviceError, DeviceMemoryError, KernelBuildError
 
 #: Buffers of a volume and of a VDI that are on the device, and those that are always small.
@@ -158,9 +159,7 @@ def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch)
         return expand(path) + ("int broken = missing_name;\n" if str(path) in files else "")
 
     # In a context of its own nothing is compiled yet
-    cl, info = devices.opencl(), runtime.info
-    device = cl.get_platforms()[info.platform_index].get_devices()[info.device_index]
-    fresh = get_runtime(cl.Context([device]))
+    fresh = fresh_runtime(runtime)
     before = state_of(fresh)
     with monkeypatch.context() as patched:
         patched.setattr(programs, "expand", spoiled)

@@ -27,7 +27,6 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.io.vdi_file import chunks, writer
 from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
-from pyvista_vdi.model.packing import channel_differences, colors_of_differences
 
 CODECS = ("lz4", "zstd", "deflate", "none")
 PRECISIONS = ("exact", "8-byte")
@@ -162,20 +161,6 @@ def test_compressed_and_packed_files_are_smaller(tmp_path):
             sizes[codec, precision] = path.stat().st_size
         assert sizes[codec, "exact"] > sizes[codec, "8-byte"]
     assert sizes["zstd", "exact"] < 0.9 * sizes["none", "exact"]
-
-
-def test_colours_are_stored_as_differences_of_channels():
-    colors = np.random.default_rng(3).integers(0, 256, (1000, 3), dtype=np.uint8)
-    stored = channel_differences(colors)
-    np.testing.assert_array_equal(stored[:, 0], colors[:, 2])
-    np.testing.assert_array_equal(colors_of_differences(stored), colors)
-
-
-@pytest.mark.parametrize("suffix", cases("vdi", "exr", "html"))
-def test_no_level_is_the_usual_one(suffix, tmp_path):
-    path = tmp_path / f"a.{suffix}"
-    usual = small_vdi().save(path).read_bytes()
-    assert small_vdi().save(path, level=None).read_bytes() == usual
 
 
 def test_save_takes_text_overwrites_and_makes_metadata_of_numpy_plain(tmp_path):

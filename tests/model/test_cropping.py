@@ -27,8 +27,8 @@ def kept_by_points(cropping, bounds, n=12):
 
 
 def kept_by_box(box, bounds, n=12):
-    box = np.reshape(bounds, (3, 2))
-    axes = [low + (np.arange(n) + 0.5) / n * (high - low) for low, high in box]
+    ends = np.reshape(bounds, (3, 2))
+    axes = [low + (np.arange(n) + 0.5) / n * (high - low) for low, high in ends]
     inside = [
         (x >= low) & (x < high) for x, (low, high) in zip(axes, box, strict=True)
     ]  # NaN: nothing

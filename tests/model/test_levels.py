@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import Camera
-from pyvista_vdi.model.levels import nearest_depth, nearest_list_width, required_level
+from pyvista_vdi.model.levels import nearest_depth, required_level
 from pyvista_vdi.model.volume import Grid
 
 #: A cube from -1 to 1 at four levels: voxels of 2/64, 2/32, 2/16 and 2/8.
@@ -18,8 +18,8 @@ FROM_TEN = Camera(position=(0, 0, 10), focal_point=(0, 0, 0), view_up=(0, 1, 0),
 def test_width_at_the_nearest_face():
     # The face is 9 in front of the eye, where 90 lists share 18
     assert nearest_depth(LEVELS[0], FROM_TEN, (90, 90)) == pytest.approx(9, rel=1e-12)
-    assert nearest_list_width(LEVELS[0], FROM_TEN, (90, 90)) == pytest.approx(0.2, rel=1e-12)
-    assert nearest_list_width(LEVELS[0], FROM_TEN, (180, 90)) == pytest.approx(0.2, rel=1e-12)
+    for size in ((90, 90), (180, 90)):
+        assert "half a list's width, 0.1 where" in required_level(LEVELS, FROM_TEN, size)[1]
 
 
 # Half a list's width at 9 is 9 / lists; voxels are .03125, .0625, .125, .25
@@ -36,7 +36,7 @@ def test_level_is_the_coarsest_that_is_no_coarser_than_half_a_list(lists, level)
 
 def test_parallel_lists_are_equally_wide_everywhere():
     view = FROM_TEN.replace(parallel_projection=True, parallel_scale=3.0)
-    assert nearest_list_width(LEVELS[0], view, (20, 10)) == pytest.approx(0.6)
+    assert "half a list's width, 0.3 where" in required_level(LEVELS, view, (20, 10))[1]
     assert required_level(LEVELS, view, (94, 47))[0] == 1  # half a list is a little over .0625
     assert required_level(LEVELS, view, (98, 49))[0] == 0
 
@@ -84,7 +84,7 @@ def test_axes_that_no_level_makes_coarser_do_not_count():
 
     for between_planes in (10 / 64, 2 / 64):
         few = levels(between_planes)
-        half = nearest_list_width(few[0], FROM_TEN, (100, 100)) / 2
+        half = nearest_depth(few[0], FROM_TEN, (100, 100)) / 100  # a list is 2 Z / 100 wide
         assert 2 / 32 < half < 2 / 16
         assert required_level(few, FROM_TEN, (100, 100))[0] == 1
         assert required_level(few, FROM_TEN, (200, 200))[0] == 0

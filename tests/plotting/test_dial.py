@@ -11,10 +11,9 @@ from watched_windows import finish, small_vdi
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.model.options import QualityTarget
-from pyvista_vdi.quality import probe as dial_measurement
 from pyvista_vdi.quality.background import Worker, vdi_job
-from pyvista_vdi.quality.dial import LADDER
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
+from pyvista_vdi.quality.targets import LADDER
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 
@@ -149,7 +148,6 @@ def test_what_is_made_in_the_background_is_chosen_there():
     source = ready_source()
     source.SetDial("balanced")
     request = source.MakeRequest()
-    dial_measurement.forget()
     background = Worker("pyvista-vdi generation")
     background.put(vdi_job(request.generation, request.target))
     finish()

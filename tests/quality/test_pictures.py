@@ -7,7 +7,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.coverage import coverage
-from pyvista_vdi.quality.tiles import contrast_ratio
+from pyvista_vdi.quality.view_error import contrast_ratio
 
 SIZE = (64, 64)
 BOUNDS = (-1.0, 1.0) * 3

@@ -10,16 +10,22 @@ import pytest
 from drawing import generate_vdi, raycast_volume, render_vdi
 
 from pyvista_vdi import VDI, Camera, Light, Lights, Shading, TransferFunction, Volume
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidCameraError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.metrics import compare_images, over_background
+from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.quality.tiles import COARSE, REACH, Cells, Region, TileSample, seen_region
 from pyvista_vdi.quality.view_error import (
+    COARSE,
+    REACH,
     TILE_SIZE,
     TILES,
+    Cells,
+    Region,
+    TileSample,
     ViewErrorEstimator,
     angle_from_generating_view,
     magnification,
+    seen_region,
 )
 
 #: Frames; a hundred cells of the default tiles' 14 pixels, of which the bounds take about 60.
@@ -130,27 +136,17 @@ CLOSE_UP = VIEW.azimuth(30).replace(parallel_projection=True, parallel_scale=5)
 
 
 @pytest.mark.parametrize("camera", [INSIDE, CLOSE_UP], ids=["inside", "parallel"])
-@pytest.mark.parametrize(
-    "change", ["nothing", "clipping_planes", "opaque_depth", "background", "picture"]
-)
+@pytest.mark.parametrize("change", ["nothing", "clipping_planes", "background"])
 def test_with_all_tiles_the_estimate_is_the_truth(scene, camera, change):
-    column = np.arange(EVEN[0])
-    # Before the middle of what is to be seen
-    near = 3.0 if camera is INSIDE else np.linalg.norm(np.subtract(camera.position, CENTRE)) - 8
-    near = np.where(column < 40, near, np.inf)
     options = {
         "nothing": {},
-        "picture": {},
         "clipping_planes": {"clipping_planes": [[*CENTRE, 1, 0.5, 0.2]]},
-        "opaque_depth": {"opaque_depth": np.broadcast_to(near, EVEN[::-1])},
         "background": {"background": (0.9, 0.5, 0.1)},
     }[change]
     vdi = scene.vdi("coarse")
     truth = scene.truth(vdi, camera, EVEN, **options)
     plain = scene.truth(vdi, camera, EVEN)
-    if change == "picture":
-        options["picture"] = scene.pictures(vdi, camera, EVEN)[0]
-    elif change != "nothing":
+    if change != "nothing":
         assert abs(truth - plain) > 20 * EXACT  # the change is one
     found = scene.estimator().estimate(vdi, camera, EVEN, **options)
     assert found.tiles == 15
@@ -213,10 +209,7 @@ def test_windows_of_any_shape(scene, size):
     ids=["behind", "beside", "parallel"],
 )
 def test_a_volume_out_of_view_has_no_error(scene, camera):
-    def pause():
-        raise AssertionError("something was rendered")
-
-    found = scene.estimator().estimate(scene.vdi("coarse"), camera, WINDOW, pause=pause)
+    found = scene.estimator().estimate(scene.vdi("coarse"), camera, WINDOW)
     assert (found.ssim, found.standard_error, found.tiles) == (1, 0, 0)
 
 
@@ -240,37 +233,17 @@ def test_the_same_question_has_the_same_answer(scene):
 
 def test_coarse_pictures_are_made_in_bands(scene):
     vdi, camera, size = scene.vdi("coarse"), VIEW.azimuth(33), (1000, 750)
-    calls = []
-    scene.estimator().estimate(vdi, camera, size, pause=lambda: calls.append(1))
-    assert len(calls) > 2 * TILES + 2
     region = seen_region(camera, size, (vdi.bounds, VOLUME.bounds))
     pixels = tuple(-(-extent // COARSE) for extent in region.extent)
     lens = camera.tile(size, region.first, tuple(COARSE * n for n in pixels))
     coarse = [over_background(p, (0, 0, 0)) for p in scene.pictures(vdi, lens, pixels)]
     cells = Cells(region, size, TILE_SIZE - 2 * REACH)
     expected = cells.sample(cells.guess(*coarse), TILES)
-    found = scene.estimator().sample(vdi, camera, size)
+    found = scene.estimator().sample(vdi, FrameRequest(camera, size, device=scene.runtime))
     np.testing.assert_array_equal(found.corners, expected.corners)
     # Rays about another centre differ by float32 roundings, 5e-5 of pictures; guesses are of 0.1
     np.testing.assert_allclose(found.guess, expected.guess, rtol=1e-3)
     assert found.guessed == pytest.approx(expected.guessed, rel=1e-3)
-
-
-def test_a_picture_at_hand_saves_rendering_the_vdi(scene):
-    vdi, camera = scene.vdi("coarse"), VIEW.azimuth(33)
-    picture, _ = scene.pictures(vdi, camera)
-    calls = []
-    estimate = scene.estimator().estimate
-    without = estimate(vdi, camera, WINDOW, pause=lambda: calls.append("without"))
-    found = estimate(vdi, camera, WINDOW, picture=picture, pause=lambda: calls.append("with"))
-    assert calls.count("without") == 2 * TILES + 2
-    assert calls.count("with") == TILES + 1
-    # The coarse picture ends with the window, so that tiles may be others
-    assert found.ssim == pytest.approx(without.ssim, abs=CLOSE)
-    answers = iter([None, True, 0, False])  # False ends an estimate
-    with pytest.raises(Cancelled, match="estimate of a view's error was cancelled"):
-        estimate(vdi, camera, WINDOW, pause=lambda: next(answers))
-    assert list(answers) == []
 
 
 @pytest.mark.parametrize(
@@ -292,9 +265,6 @@ def test_what_makes_no_estimator_is_refused(scene, options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"picture": np.zeros((120, 160, 3))}, r"picture must have shape \(120, 160, 4\); got"),
-        ({"opaque_depth": np.zeros((160, 120))}, r"opaque_depth must have shape \(120, 160\)"),
-        ({"opaque_depth": np.full((120, 160), np.nan)}, "opaque_depth holds NaN"),
         ({"clipping_planes": [[0, 0, 0]]}, "clipping_planes must be"),
         ({"background": (2, 0, 0)}, "background must be three numbers from 0 to 1"),
         ({"window_size": (0, 5)}, "window_size must be between 1 and"),

@@ -41,6 +41,14 @@ def soft_ball(n: int = 24, *, direction: Any = None) -> pv.ImageData:
     return grid
 
 
+def soft_volume(n: int = 24, scale: float = 1.0) -> pvdi.Volume:
+    """A ball that is denser towards its middle, bounds ±1, bytes of 0 to 255 times a scale."""
+    x = np.linspace(-1, 1, n)
+    radius = np.sqrt(x[:, None, None] ** 2 + x[None, :, None] ** 2 + x[None, None, :] ** 2)
+    values = 255 * scale * np.clip(1 - radius, 0, 1)
+    return pvdi.Volume(values.astype(np.uint8), (2 / (n - 1),) * 3, (-1,) * 3)
+
+
 def vdi_of_one_list() -> pvdi.VDI:
     """A VDI without metadata: one supersegment in one list."""
     camera = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))

@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.device.devices import find_candidates
 from pyvista_vdi.errors import DeviceMemoryError
-
-
-def candidate_of(runtime):
-    """The device of a runtime, as the drivers list it."""
-    (found,) = (c for c in find_candidates()[0] if c.info.index == runtime.info.index)
-    return found
 
 
 def fresh_runtime(runtime):
     """Another runtime on the device of one: its peak of allocated memory is 0."""
-    return Runtime(candidate_of(runtime))
+    return Runtime(runtime.info)
 
 
 def let_lack(monkeypatch, runtime, name):

@@ -22,7 +22,6 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.volume import classified_volume as device_volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.upload import uploads_of
 
 WINDOW = (7, 6)
 
@@ -33,9 +32,9 @@ TOLERANCE = 1e-5
 
 def nodes_of(runtime, volume, function, occlusion):
     """Mean transmittance at the nodes, by the device, (nz, ny, nx)."""
-    DeviceVolume(runtime, volume, function, ambient_occlusion=occlusion)
-    _, nodes = uploads_of(volume).occlusions[runtime]
-    return runtime.download(nodes)
+    medium = DeviceVolume(runtime, volume, function, ambient_occlusion=occlusion)
+    camera = Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))  # lights have no part in it
+    return runtime.download(medium.medium_arguments(camera)["ambient"])
 
 
 def homogeneous(opacity, unit_distance=1.0):

@@ -11,12 +11,7 @@ EXTENSION = Extension(
         "generate_series": "pyvista_vdi.extensions.series.generate:generate_series",
     },
     formats=(
-        FileFormat(
-            ".vdis",
-            "pyvista_vdi.extensions.series.files",
-            holds="series",
-            head="series.json",
-        ),
+        FileFormat(".vdis", "pyvista_vdi.extensions.series.files", "series", head="series.json"),
     ),
     shown={
         "pyvista_vdi.extensions.series.series:VDISeries": (
@@ -32,5 +27,5 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.series.cli:series",
         ),
     ),
-    methods={"VDISeries.save": "pyvista_vdi.extensions.series.files:save"},
+    methods={"VDISeries.save": "pyvista_vdi.extensions.series.archive:save"},
 )

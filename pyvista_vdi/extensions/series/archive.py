@@ -23,7 +23,6 @@ from pyvista_vdi.io.vdi_file.description import from_json, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.classification import IN_PLACE, Look
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
 from pyvista_vdi.registry import FileFormat
 
@@ -89,10 +88,8 @@ class Archive(Sequence[Any]):
             reason = getattr(error, "strerror", None) or error
             raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
         if not begin.startswith(b"PK"):
-            raise VDIFileError(
-                f"{self.path} is not a {self._kind.holds} of VDIs, or of an earlier format, which is "
-                f"not read any more: it begins with {begin!r}; make it anew"
-            )
+            kind = f"not a {self._kind.holds} of VDIs, or of an earlier format"
+            raise VDIFileError(f"{self.path} is {kind}: it begins with {begin!r}; make it anew")
         try:
             archive = zipfile.ZipFile(stream)
         except reader.ARCHIVE_ERRORS as error:
@@ -129,19 +126,14 @@ def head_bytes(kind: FileFormat, about: Mapping[str, Any]) -> bytes:
     return to_json({**head, "written_by": f"pyvista-vdi {__version__}", **about}).encode()
 
 
-def save(
-    vdis: Sequence[Any], path: str | os.PathLike[str], kind: FileFormat, about: Any, **options: Any
-) -> Path:
-    """Write one file, or a page that shows it, whole or not at all; it replaces what was there.
-
-    ``options``: those of :meth:`VDICollection.save`.
-    """
+def save(vdis: Any, path: str | os.PathLike[str], **options: Any) -> Path:
+    """Write a series or a set as one file, or as a page: see :meth:`VDICollection.save`."""
     if look := ", ".join(name for name in options if name in (*Look.declared, *IN_PLACE)):
         raise InvalidArgumentError(
             f"save() takes no look, got {look}: give it to classified(), where values are kept, "
             "and save what that returns"
         )
-    found = format_named(path)
+    found, kind = format_named(path), vdis.kind
     if found is not None and found.page:
         return found.load().write(vdis, path, **options)  # type: ignore[no-any-return]
     target = check_writable(with_suffix(as_path(path), (kind.suffix,), f"a {kind.holds}"))
@@ -150,31 +142,28 @@ def save(
     if options.get("precision") is None:
         options["precision"] = vdis[0].precision if kind == SERIES else "8-byte"
     with whole_file(target) as out:
-        write_to(out, kind, about, vdis, **options)
+        write_to(out, vdis, **options)
     return target
 
 
 def write_to(
     stream: IO[bytes],
-    kind: FileFormat,
-    about: Mapping[str, Any],
-    vdis: Sequence[Any],
+    vdis: Any,
     *,
     progress: Progress | None = None,
     precision: str = "8-byte",
     compression: str = "zstd",
     level: int | None = None,
 ) -> int:
-    """Write one file to a stream; return how many bytes hold the JSON and the first VDI."""
+    """Write a series or a set to a stream; return the bytes of the JSON and the first VDI."""
     one_of(compression, "compression", (*CODECS, "none"))
     check_level(level)
     done, first = Pieces(progress, len(vdis)), 0
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
-        archive.writestr(writer.stored(kind.head), head_bytes(kind, about))
+        archive.writestr(writer.stored(vdis.kind.head), head_bytes(vdis.kind, vdis.about))
         for i in range(len(vdis)):
             vdi, file = vdis[i].with_precision(precision), io.BytesIO()
-            lists, values = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
-            writer.write_to(file, lists, compression, level, coarse=False, deferred=values)
+            writer.write_to(file, vdi.lists, compression, level, coarse=False)
             archive.writestr(writer.stored(name_of(i)), file.getvalue())
             first = first or stream.tell()
             done()

@@ -26,7 +26,7 @@ from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.extensions.series.generate import StepMaker
-from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range, range_of
+from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range
 from pyvista_vdi.io import is_vdi_file, read, read_info
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
@@ -34,6 +34,7 @@ from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 
+#: Options that are for volumes alone.
 _OF_VOLUMES = (*OF_VOLUMES, *LOOK, *PLACE, "view_angle", "sample_distance", "memory_limit")
 
 
@@ -45,13 +46,22 @@ def series(options: argparse.Namespace) -> int:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
     if of_vdis:
         refuse(options, (*_OF_VOLUMES, "scheduler", *declared(Deferral)), "volumes")
-        times = [as_number(read_info(file).metadata.get("time")) for file in files]
-        known = [None if math.isnan(time) else time for time in times]
+        known = (as_number(read_info(file).metadata.get("time")) for file in files)
         steps = [Step(f, t, partial(read, f)) for f, t in zip(files, known, strict=True)]
     else:
         steps = steps_of_volumes(files, options, in_chunks=True)
+
+    def vdi_of(i: int) -> VDI:
+        with naming(f"{steps[i].name}: step {i}"):
+            found = steps[i].read() if i else first
+            if not of_vdis:
+                return make(as_seen(options, found, view))
+            check_range(found, getattr(first, "value_range", None), steps[i].name)
+            return found  # type: ignore[no-any-return]
+
     # Refuse what cannot be before a volume is read
-    times = _times(steps, options.times)
+    times = _times(steps) if options.times is None else options.times
+    vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
     look = classification(options)
     Classification.composited(look, "series")
     refuse_with_values(options)
@@ -64,38 +74,19 @@ def series(options: argparse.Namespace) -> int:
             view = generating_view(options, first)
             how |= {"device": options.device, "client": options.scheduler}
             make = StepMaker("series", view, options.size, **how)
-
-        def vdi_of(i: int) -> VDI:
-            with naming(f"{steps[i].name}: step {i}"):
-                found = steps[i].read() if i else first
-                if not of_vdis:
-                    return make(as_seen(options, found, view))
-                check_range(found, range_of(first), steps[i].name)
-                return found  # type: ignore[no-any-return]
-
-        vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
         how = {"precision": "8-byte", **file_options(options)}
         target = vdis.save(options.output, progress=bar, **how)
-    n_bytes = mebibytes(target.stat().st_size)
-    print(f"{printable(options.output)}: {len(vdis)} steps, {n_bytes}")
+    print(f"{printable(options.output)}: {len(vdis)} steps, {mebibytes(target.stat().st_size)}")
     return 0
 
 
-def _times(steps: Sequence[Step], asked: Sequence[float] | None) -> Sequence[float]:
-    """Return the times that are given, else the files' where these ascend, else numbers."""
-    if asked is not None:
-        if len(asked) != len(steps):
-            raise InvalidArgumentError(
-                f"--times gives a time to each step: there are {len(steps)} steps and "
-                f"{len(asked)} times"
-            )
-        return asked
-    known = [step.time for step in steps if step.time is not None]
+def _times(steps: Sequence[Step]) -> Sequence[float]:
+    """Return the times that the files have where these ascend, else numbers."""
+    known = [t for t in (step.time for step in steps) if t is not None and not math.isnan(t)]
     if len(known) == len(steps) and all(a < b for a, b in pairwise(known)):
         return known
     if known:
-        said = "The times in the files do not ascend, or some have none: steps are numbered"
-        print(f"{said} (--times gives times)", file=sys.stderr)
+        print("Times in the files do not ascend, or some lack: steps are numbered", file=sys.stderr)
     return range(len(steps))
 
 

@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
-from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.extensions.series import archive
 from pyvista_vdi.extensions.series.archive import SERIES, Archive
 from pyvista_vdi.extensions.series.series import VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-
-
-def save(series: VDISeries, path: str | os.PathLike[str], **options: Any) -> Path:
-    """Write one file with a series, or a page that plays it: see :meth:`VDISeries.save`."""
-    return archive.save(series, path, SERIES, {"times": series.times}, **options)
 
 
 def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:

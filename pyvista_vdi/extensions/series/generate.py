@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence, Sized
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import bytes_of
+from pyvista_vdi.quality.targets import bytes_of
 
 _GRID = ("spacing", "origin")
 _RECORDS = (QualityTarget, Deferral, GenerationOptions)
@@ -111,15 +112,11 @@ def generate_series(
     sized: Any = steps if known is None else known
     done = Pieces(progress, len(sized) if isinstance(sized, Sized) else 0)
     vdis: list[VDI] = []
-    for volume in steps:
-        if known is not None and len(vdis) == len(known):
-            raise InvalidArgumentError(f"there are more steps than the {len(vdis)} times")
+    for volume in islice(steps, None if known is None else len(known) + 1):  # one is too many
         with naming(f"step {len(vdis)}"):
             vdis.append(make(volume))
         done()
-    if not vdis:
-        raise InvalidArgumentError("there is no step: pass at least one volume")
-    return VDISeries(vdis, range(len(vdis)) if known is None else known)
+    return VDISeries(vdis, known)
 
 
 class StepMaker:
@@ -170,8 +167,7 @@ class StepMaker:
             if self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
                 warn_external(
                     f"max_bytes={self._max_bytes} is not kept by all steps: one has "
-                    f"{bytes_of(vdi)} bytes on the device, with what was chosen for the first "
-                    "step; allow less, or begin with a step that has as much to show"
+                    f"{bytes_of(vdi)} on the device; begin with a step that has as much to show"
                 )
                 self._max_bytes = None  # it is said once
         elif dial := vdi.metadata.get("dial"):

@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
-from pyvista_vdi.extensions.series.archive import Archive
+from pyvista_vdi.extensions.series.archive import SERIES, Archive
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -48,6 +48,7 @@ class VDISeries(VDICollection):
     """
 
     times: tuple[float, ...]
+    kind = SERIES
 
     def __init__(self, steps: Iterable[VDI], times: Iterable[float] | None = None) -> None:
         self._steps = as_steps(steps, "a series")
@@ -62,6 +63,11 @@ class VDISeries(VDICollection):
     def _first(self) -> Any:
         """The first step, or what its file says of it."""
         return self._steps.info() if isinstance(self._steps, Archive) else self[0]
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What a file says of it beside its steps."""
+        return {"times": self.times}
 
     @property
     def camera(self) -> Camera:
@@ -151,18 +157,13 @@ def as_steps(vdis: Any, what: str) -> Any:
         return vdis
     steps = tuple(v if isinstance(v, DeferredVDI) else as_vdi(v) for v in each_of(vdis))
     for i, step in enumerate(steps):
-        check_range(step, range_of(steps[0]), f"number {i}")
+        check_range(step, getattr(steps[0], "value_range", None), f"number {i}")
     return steps
-
-
-def range_of(vdi: Any) -> tuple[float, float] | None:
-    """Return the range of the values that a VDI keeps; None if it has colours."""
-    return getattr(vdi, "value_range", None)
 
 
 def check_range(vdi: Any, first: tuple[float, float] | None, which: str) -> None:
     """Raise InvalidVDIError unless a VDI keeps values of the first one's range, or as little."""
-    if (ends := range_of(vdi)) != first:
+    if (ends := getattr(vdi, "value_range", None)) != first:
         said, of_first = (
             "has colours" if k is None else f"keeps values from {k[0]} to {k[1]}"
             for k in (ends, first)

@@ -14,7 +14,7 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming, warn_
 from pyvista_vdi.extensions.series.archive import SERIES, Archive, head_bytes, name_of
 from pyvista_vdi.extensions.series.files import times_of
 from pyvista_vdi.extensions.series.generate import StepMaker
-from pyvista_vdi.extensions.series.series import check_range, checked_time, range_of
+from pyvista_vdi.extensions.series.series import check_range, checked_time
 from pyvista_vdi.io import check_write_options
 from pyvista_vdi.io.vdi_file.description import to_json
 from pyvista_vdi.model.checks import as_flag
@@ -22,9 +22,6 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, whole_file, with_suffix
-
-#: Metadata that are the same in all steps.
-_CLASSIFICATION = ("transfer_function", "lights", "ambient_occlusion")
 
 
 class SeriesWriter:
@@ -124,9 +121,12 @@ class SeriesWriter:
                 steps = Archive(self.path, SERIES)
                 self._times = list(times_of(steps))
                 self._before = steps[-1] if self._times else None
-                self._range = range_of(self._before)
+                self._range = getattr(self._before, "value_range", None)
             elif numbered:
-                raise refused(self.path, f" with {len(numbered)} .vdi files")
+                raise VDIFileError(
+                    f"{self.path} is there already with {len(numbered)} .vdi files: pass "
+                    "append=True to continue it, overwrite=True to replace it, or another name"
+                )
             self._write_times(self._times)
         except BaseException:
             self.close()
@@ -164,10 +164,15 @@ class SeriesWriter:
                 )
             with naming(f"step {len(self)}"):
                 step = self._make(step)
-        if self._before is not None:
-            check_goes_on(self.path, self._before, step)
+        had, has = (_view_and_look(vdi) for vdi in (self._before or step, step))
+        if differ := [name for name in had if had[name] != has[name]]:
+            raise InvalidArgumentError(
+                f"{self.path} cannot be continued: its {differ[0]} is {had[differ[0]]!s:.99}, and "
+                f"that of this step {has[differ[0]]!s:.99}; give the same view and classification "
+                "(clim, too), or begin another series"
+            )
         if not self._times:
-            self._range = range_of(step)
+            self._range = getattr(step, "value_range", None)
         check_range(step, self._range, f"number {len(self)}")
         # The step first: one whose time is not known is none, and is replaced by the next
         step.save(self.path / name_of(len(self)), **self._how)
@@ -217,9 +222,7 @@ def _locked(folder: Path) -> IO[bytes]:
         stream = (folder / "writer.lock").open("ab")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise VDIFileError(
-            f"{folder} cannot be written: {reason}; choose another folder"
-        ) from error
+        raise VDIFileError(f"{folder} cannot be written: {reason}; choose another") from error
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -253,25 +256,8 @@ def checked_way(append: Any, overwrite: Any) -> tuple[bool, bool]:
     return append, overwrite
 
 
-def refused(path: Path, with_what: str) -> VDIFileError:
-    """Return the error by which a file is kept from being replaced."""
-    return VDIFileError(
-        f"{path} is there already{with_what}: pass append=True to go on with it, overwrite=True to "
-        "replace it, or another name"
-    )
-
-
-def check_goes_on(path: Any, before: Any, step: Any) -> None:
-    """Raise InvalidArgumentError if a VDI has another view or classification than one before."""
-    told = [
-        {n: getattr(vdi, n, None) for n in ("camera", "window_size", "value_range", "importance")}
-        | json.loads(to_json({n: vdi.metadata.get(n) for n in _CLASSIFICATION}))
-        for vdi in (before, step)
-    ]
-    for name, had in told[0].items():
-        if had != told[1][name]:
-            raise InvalidArgumentError(
-                f"{path} cannot be continued: its {name} is {had!s:.99}, and that of this step "
-                f"{told[1][name]!s:.99}; give the same view and classification (clim, too), or "
-                "begin another series"
-            )
+def _view_and_look(vdi: Any) -> dict[str, Any]:
+    """Return what is the same in all steps of a series that is continued."""
+    said = {n: vdi.metadata.get(n) for n in ("transfer_function", "lights", "ambient_occlusion")}
+    names = ("camera", "window_size", "value_range", "importance")
+    return {n: getattr(vdi, n, None) for n in names} | json.loads(to_json(said))  # type: ignore[no-any-return]

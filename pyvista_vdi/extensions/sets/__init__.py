@@ -9,14 +9,7 @@ EXTENSION = Extension(
         "VDISet": "pyvista_vdi.extensions.sets.vdi_set:VDISet",
         "generate_set": "pyvista_vdi.extensions.sets.generate:generate_set",
     },
-    formats=(
-        FileFormat(
-            ".vdiset",
-            "pyvista_vdi.extensions.sets.files",
-            holds="set",
-            head="set.json",
-        ),
-    ),
+    formats=(FileFormat(".vdiset", "pyvista_vdi.extensions.sets.files", "set", head="set.json"),),
     shown={
         "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput"
     },
@@ -29,6 +22,6 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.sets.cli:generate",
         ),
     ),
-    methods={"VDISet.save": "pyvista_vdi.extensions.sets.files:save"},
+    methods={"VDISet.save": "pyvista_vdi.extensions.series.archive:save"},
     requires=("series",),  # which are stored in the same way
 )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
 from pyvista_vdi.extensions.series.series import Called, as_steps
+from pyvista_vdi.extensions.sets import EXTENSION
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.collection import VDICollection
@@ -65,6 +66,8 @@ class VDISet(VDICollection):
         As above.
     """
 
+    kind = EXTENSION.formats[0]
+
     def __init__(
         self,
         views: Iterable[VDI],
@@ -101,6 +104,16 @@ class VDISet(VDICollection):
         self._begin = self._cameras[0] if camera is None else Camera.from_any(camera)
         self._places = self._places_of(self._cameras)
         self._blend = BLEND
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What a file says of it beside its VDIs."""
+        return {
+            "views": [view.to_dict() for view in self.cameras],
+            "camera": self.camera.to_dict(),
+            "picture_size": list(self.window_size),
+            "bounds": list(self.bounds),
+        }
 
     @property
     def camera(self) -> Camera:

@@ -25,12 +25,6 @@ from importlib import resources
 WORKER = "worker.js"
 SPAWN = "spawn.js"
 
-#: What reads and plays series, which pages without a series do not have.
-OF_SERIES = ("player.js", "series.js", "surround.js")
-
-#: What edits the transfer function of values, which pages of colours do not have.
-OF_VALUES = ("editor.js",)
-
 #: What takes the place of SPAWN.
 _SPAWN_BUNDLED = """\
 export const waysToSpawn = [() => {
@@ -55,32 +49,17 @@ _COMMENT = re.compile(
 
 
 @cache
-def viewer_script(
-    *,
-    scene: bool = False,
-    remote: bool = False,
-    series: bool = False,
-    values: bool = False,
-    module: bool = False,
-) -> str:
+def viewer_script(*more: str, module: bool = False) -> str:
     """Return the viewer as one script, UTF-8 text that may stand in a ``<script>``.
 
-    ``scene``: it draws meshes and text beside VDIs. ``remote``: it can be fed by ``pyvista-vdi
-    serve``. ``series``: it plays series; ``values``: it edits transfer functions; otherwise the
-    names that these modules export are null. ``module``: the text of an ES module, for what is
-    written behind it; by default it is a function that is called, and shows but its element.
+    ``more``: modules beside the element, "scene.js" (meshes and texts beside VDIs) or "remote.js"
+    (VDIs from ``pyvista-vdi serve``). ``module``: the text of an ES module, for what is written
+    behind it; by default it is a function that is called, and shows but its element.
     """
     folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
-    sources = {
-        entry.name: entry.read_text(encoding="utf-8")
-        for entry in folder.iterdir()
-        if entry.name.endswith(".js")
-    }
-    for name in (*(() if series else OF_SERIES), *(() if values else OF_VALUES)):
-        names = _EXPORT.findall(sources[name])
-        sources[name] = "".join(f"export const {each} = null;\n" for each in names)
-    entries = ["element.js", *["scene.js"] * scene, *["remote.js"] * remote]
-    script = bundled(sources, entries)
+    modules = [entry for entry in folder.iterdir() if entry.name.endswith(".js")]
+    sources = {entry.name: entry.read_text(encoding="utf-8") for entry in modules}
+    script = bundled(sources, ["element.js", *more])
     return script if module else f'(() => {{\n"use strict";\n{script}}})();\n'
 
 
@@ -91,16 +70,17 @@ def bundled(sources: Mapping[str, str], entries: Iterable[str]) -> str:
     asks.
     """
     sources = {**sources, SPAWN: _SPAWN_BUNDLED}
-    wanted = _in_order(entries, sources)
-    in_worker = _in_order([WORKER], sources) if SPAWN in wanted else []
-    script = "".join(_joined(name, sources[name]) for name in wanted if name not in in_worker)
-    if in_worker:
+    wanted, in_worker = _in_order(entries, sources), _in_order([WORKER], sources)
+    script = ""
+    if SPAWN in wanted:
+        wanted = [name for name in wanted if name not in in_worker]
         shared = ", ".join(each for name in in_worker for each in _EXPORT.findall(sources[name]))
         body = "".join(_joined(name, sources[name]) for name in in_worker)
         script = (
             f"const workerPart = () => {{\n{body}return {{ {shared} }};\n}};\n"
-            f"const {{ {shared} }} = workerPart();\n{script}"
+            f"const {{ {shared} }} = workerPart();\n"
         )
+    script += "".join(_joined(name, sources[name]) for name in wanted)
     if re.search(r"</script|<!--", script, re.IGNORECASE):
         raise ValueError("a module holds what would end a <script> or begin a comment of HTML")
     return script

@@ -18,26 +18,12 @@ _ENTRIES = (
 
 
 def viewer_camera(camera: Any, window_size: Sequence[int] = (1, 1)) -> dict[str, Any]:
-    """Return a camera as ``viewer.camera`` takes it.
+    """Return any camera, or a dictionary of that form, as ``viewer.camera`` takes it.
 
-    Parameters
-    ----------
-    camera : Camera or vtkCamera or pyvista.Camera or dict
-        The view. Its model transform has no place there.
-    window_size : (int, int)
-        Width and height of its picture, which turn a horizontal opening angle into a vertical one.
-
-    Returns
-    -------
-    dict
-        ``position``, ``focal_point``, ``view_up`` as lists of three floats, world units, and
-        ``view_angle`` (vertical, degrees) in perspective or ``parallel_scale`` (half the height,
-        world units) in parallel projection; ``window_center`` where it is not the middle.
-
-    Raises
-    ------
-    InvalidCameraError
-        If it is no camera, or a dictionary with other entries or values.
+    It has ``position``, ``focal_point``, ``view_up``, and ``view_angle`` (vertical, degrees) or
+    ``parallel_scale``; ``window_center`` where it is not the middle. ``window_size``: of its
+    picture, which turns a horizontal opening angle into a vertical one. InvalidCameraError if it is
+    no camera, or has other entries or values.
     """
     view = camera_of(camera) if isinstance(camera, dict) else Camera.from_any(camera)
     _, half_height = view.half_extent(window_size)
@@ -52,13 +38,7 @@ def viewer_camera(camera: Any, window_size: Sequence[int] = (1, 1)) -> dict[str,
 
 
 def camera_of(state: dict[str, Any]) -> Camera:
-    """Return the camera that a dictionary of the viewer's form describes.
-
-    Raises
-    ------
-    InvalidCameraError
-        If an entry is unknown, missing or out of its range.
-    """
+    """Return the camera that a dictionary of the viewer's form describes; InvalidCameraError."""
     unknown = sorted(set(state) - set(_ENTRIES))
     if unknown:
         raise InvalidCameraError(

@@ -43,28 +43,18 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     PyVista takes a backend that a package brings by itself where trame's are not installed. So a
     scene without VDIs is shown as if there were no such backend.
 
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-        All of its renderers are shown.
-    screenshot : path-like or file-like, optional
-        Where a picture is saved besides.
-    **options
-        Those of PyVista's other backends, for scenes without VDIs.
-
-    Returns
-    -------
-    PlotterWidget or SubplotsWidget
-        The viewer, or a box with one for each renderer; or what another backend returns.
+    All renderers of the plotter are shown, and a picture is saved as ``screenshot``; ``options``
+    are those of PyVista's other backends.
     """
     import pyvista as pv
     from pyvista.jupyter.notebook import handle_plotter
 
-    from pyvista_vdi.extensions.web.scene import scenes_of, shows_vdis
+    from pyvista_vdi.extensions.web.scene import is_vdi, scenes_of
 
     plotter.render()  # VDIs are made in the first frame
+    props = (prop for renderer in plotter.renderers for prop in renderer.GetViewProps())
     try:
-        if shows_vdis(plotter):
+        if any(is_vdi(prop) and prop.GetVisibility() for prop in props):
             from pyvista_vdi.extensions.web.plotter_widget import PlotterWidget, SubplotsWidget
 
             scenes = scenes_of(plotter, "the notebook's viewer", follow=True)

@@ -8,8 +8,7 @@ import html
 import io
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,7 +19,7 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
-from pyvista_vdi.extensions.web.shown import Shown, as_shown, file_of, needs_of, seen_of
+from pyvista_vdi.extensions.web.shown import Shown, as_shown, file_of, seen_of
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
@@ -54,7 +53,7 @@ _NAME_AT, _NAMES = 30, 128
 _DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
 
 # Nothing is loaded, from nowhere: what the page needs is in it.
-_POLICY = "default-src 'unsafe-inline' 'unsafe-eval' data: blob:"
+POLICY = "default-src 'unsafe-inline' 'unsafe-eval' data: blob:"
 
 # The coarse level stands before the script, which finds it there; the rest may still be coming.
 _PAGE = """\
@@ -96,20 +95,6 @@ _NO_SCRIPT = (
 )
 
 
-@dataclass
-class View:
-    """What a viewer in a page shows."""
-
-    parts: Sequence[bytes]  # of its file, the first of which gives a first picture; none: a scene
-    background: str  # as CSS has it
-    still: NDArray[np.uint8]  # (H, W, 3), the picture where nothing can be turned
-    size: Sequence[int]  # width and height that it is shown as, or smaller
-    needs: dict[str, bool]  # of the viewer's script
-    #: What is seen beside the VDI: see :mod:`pyvista_vdi.extensions.web.scene`
-    scene: bytes | None = None
-    attributes: dict[str, str] = field(default_factory=dict)  # of the element
-
-
 def page(
     shown: Shown,
     *,
@@ -138,39 +123,56 @@ def page(
     # That of the view that it was made for
     size = seen.window_size if "screen" in seen.metadata else seen.picture_size
     size = shown.window_size if isinstance(shown, VDISet) else size
-    view = View(
-        in_parts(*file_of(shown, precision or "8-byte", level, seen=seen, progress=progress)),
-        background=f"rgb({percents})",
-        still=still.astype(np.uint8),
-        size=size,
-        needs=needs_of(shown),
+    color = f"rgb({percents})"
+    element = viewer(
+        file_of(shown, precision or "8-byte", level, seen=seen, progress=progress),
+        still.astype(np.uint8),
+        size,
+        title=title,
+        background=color,
         attributes={"autoplay": ""} if autoplay else {},
+        controls=controls,
     )
-    return assembled([view], title=title, controls=controls)
+    return html_page(title, element, color, POLICY).encode()
 
 
-def assembled(views: Sequence[View], *, title: str, controls: str = "all") -> bytes:
-    """Return a page with one or several viewers. :func:`read` gives the first one's VDI back."""
-    needs = {name: any(view.needs[name] for view in views) for name in views[0].needs}
-    title, body = html.escape(title), ""
-    for number, view in enumerate(views):
-        said = {"fit": "{}/{}".format(*view.size), **view.attributes}
-        said |= {} if controls == "all" else {"controls": controls}
-        before, script, of = "", "", f' data-of="{number}"'  # read() looks for the first one's
-        if number == 0:
-            said["hash"] = ""  # what the first one shows is in the address
-            before, script, of = _NO_SCRIPT, f"<script>\n{viewer_script(**needs)}</script>\n", ""
-        texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in view.parts]
-        if view.scene is not None:
-            script = f'<script type="{_SCENE_TYPE}">{_text(view.scene)}</script>\n{script}'
-        body += _VIEW.format(
-            title=title,
-            background=view.background,
-            attributes="".join(f' {name}="{html.escape(value)}"' for name, value in said.items()),
-            still=_text(_jpeg(view.still, view.size)),
-            parts="".join([before, *texts[:1], script, *texts[1:]]),
-        )
-    return html_page(title, body, views[0].background, _POLICY).encode()
+def viewer(
+    file: tuple[bytes, int] | None,
+    still: NDArray[np.uint8],
+    size: Sequence[int],
+    *,
+    title: str,
+    background: str,
+    attributes: Mapping[str, str],
+    controls: str,
+    scene: bytes | None = None,
+    number: int = 0,
+) -> str:
+    """Return a viewer in a page, with what it shows.
+
+    ``file``: of :func:`file_of`; ``None`` if all is in the ``scene``, see web/scene.py. ``still``:
+    uint8 (H, W, 3), the picture where nothing can be turned; it is shown as ``size``, or smaller.
+    ``background``: as CSS has it. ``number``: of several in a page, the first of which has the
+    script, and what is seen in its address; :func:`read` gives its VDI back.
+    """
+    said = {"fit": "{}/{}".format(*size), **attributes}
+    said |= {} if controls == "all" else {"controls": controls}
+    before, script, of = "", "", f' data-of="{number}"'
+    if number == 0:
+        said["hash"] = ""
+        text = viewer_script(*["scene.js"] * (scene is not None))
+        before, script, of = _NO_SCRIPT, f"<script>\n{text}</script>\n", ""
+    parts = [] if file is None else in_parts(*file)
+    texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in parts]
+    if scene is not None:
+        script = f'<script type="{_SCENE_TYPE}">{_text(scene)}</script>\n{script}'
+    return _VIEW.format(
+        title=html.escape(title),
+        background=background,
+        attributes="".join(f' {name}="{html.escape(value)}"' for name, value in said.items()),
+        still=_text(_jpeg(still, size)),
+        parts="".join([before, *texts[:1], script, *texts[1:]]),
+    )
 
 
 def html_page(title: str, body: str, background: str, policy: str, style: str = "") -> str:
@@ -178,7 +180,7 @@ def html_page(title: str, body: str, background: str, policy: str, style: str = 
     return _PAGE.format(
         version=__version__,
         policy=policy,
-        title=title,
+        title=html.escape(title),
         background=background,
         style=style,
         body=body,

@@ -13,11 +13,11 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from pyvista_vdi.extensions.web.camera import viewer_camera
+from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.extensions.web.scene import Scene, look_of, part_of, scene_of, state_of
-from pyvista_vdi.extensions.web.shown import png, stand_in
+from pyvista_vdi.extensions.web.shown import png, with_still
 from pyvista_vdi.extensions.web.widget import VDIWidget
-from pyvista_vdi.vtk_pipeline.filters.view import as_array
+from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
 from pyvista_vdi.vtk_pipeline.interaction import browser
 
 #: Seconds without a turn from which a view rests.
@@ -34,24 +34,27 @@ class PlotterWidget(VDIWidget):
     the browser; the step at which it is paused is the actor's, and the other way round.
     """
 
-    _has_scene = True
-    _look: Any = None  # what the VDIs that the browser has depend on
-
     def __init__(self, plotter: Any, renderer: Any, scene: Scene, picture: Any) -> None:
         self._plotter = weakref.ref(plotter)
         self._renderer = weakref.ref(renderer)  # another one may be active later
         self._picture = picture
         self._rest: asyncio.TimerHandle | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._loop: Any = None
         with suppress(RuntimeError):  # none runs: then the plotter is rendered by who holds it
             self._loop = asyncio.get_running_loop()
+        self._look = None if scene.actor is None else look_of(scene.actor)
         super().__init__(scene.shown, camera=renderer.camera)
         self._picture_size = list(renderer.GetSize())
         self._take(renderer, scene)
         self.observe(self._turn, "camera")
         self.observe(self._play, "time")
         me = weakref.ref(self)
-        renderer.AddObserver("EndEvent", lambda *_: (widget := me()) and widget._follow())
+
+        def drawn(*_: Any) -> None:
+            if (widget := me()) is not None:
+                widget._follow()
+
+        renderer.AddObserver("EndEvent", drawn)
         browser.follow(self)
 
     @property
@@ -62,23 +65,16 @@ class PlotterWidget(VDIWidget):
 
     def draw(self) -> None:
         """Render the plotter, if it is there."""
-        self._rest = None
-        if self.window is not None:
-            self._plotter().render()
+        self._rest, plotter = None, self._plotter()
+        if plotter is not None and plotter.render_window is not None:
+            plotter.render()
 
     def _turn(self, change: Any) -> None:
         """Set the renderer's camera to the one that has changed in the browser, or here."""
         renderer = None if self.window is None else self._renderer()
         if renderer is None or _same(_camera_of(renderer), change.new):
             return
-        state, camera = change.new, renderer.camera
-        camera.position, camera.focal_point = state["position"], state["focal_point"]
-        camera.up = state["view_up"]
-        camera.parallel_projection = "parallel_scale" in state
-        camera.parallel_scale = state.get("parallel_scale", camera.parallel_scale)
-        if "view_angle" in state:
-            camera.SetUseHorizontalViewAngle(False)
-            camera.view_angle = state["view_angle"]
+        aim(renderer.camera, camera_of(change.new))
         renderer.ResetCameraClippingRange()
         self._draw_later()
 
@@ -127,9 +123,8 @@ class PlotterWidget(VDIWidget):
         if actor is None:
             return
         self._placed, self.clipping_planes = as_array(actor.GetMatrix()), scene.planes
-        look, self._look = self._look, look_of(actor)
-        if look not in (None, self._look):
-            self.vdi = scene.shown
+        if self._look != (look := look_of(actor)):
+            self._look, self.vdi = look, scene.shown
         if actor.series is not None:
             self.time = actor.time
 
@@ -175,9 +170,7 @@ class SubplotsWidget(ipywidgets.GridBox):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the view, and a picture for where there can be no view."""
-        data, shown = super()._repr_mimebundle_(**kwargs), png(self._picture)
-        stand_in(shown, self._key, self.model_id)
-        return {**data, "image/png": shown}
+        return with_still(super()._repr_mimebundle_(**kwargs), png(self._picture), self)
 
 
 def _camera_of(renderer: Any) -> dict[str, Any]:

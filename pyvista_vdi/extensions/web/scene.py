@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,8 +22,8 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
-from pyvista_vdi.extensions.web.page import CONTROLS, View, assembled, in_parts
-from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of, needs_of
+from pyvista_vdi.extensions.web.page import CONTROLS, POLICY, html_page, viewer
+from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.cropping import PRESETS, Cropping
 from pyvista_vdi.model.vdi import VDI
@@ -34,19 +35,8 @@ from pyvista_vdi.vtk_pipeline.filters.view import as_array
 #: The numbers of a scene's arrays in JavaScript: their names there, by NumPy's.
 _KINDS = {"float32": "Float32Array", "uint8": "Uint8Array"}
 
-#: What is drawn flat where the view says: right in one view alone.
-_OF_A_VIEW = (
-    *("vtkCubeAxesActor", "vtkAxisActor2D"),
-    *("vtkLabelPlacementMapper", "vtkLabeledDataMapper"),
-)
-
-#: How gradients begin in CSS, by vtkViewport's modes.
-_GRADIENTS = (
-    "linear-gradient(to top",
-    "linear-gradient(to right",
-    "radial-gradient(farthest-side",
-    "radial-gradient(farthest-corner",
-)
+#: What is drawn flat in the same place whatever the view.
+_FLAT = ("vtkTextActor", "vtkCornerAnnotation", "vtkScalarBarActor", "vtkLegendBoxActor")
 
 
 @dataclass
@@ -61,22 +51,21 @@ class Scene:
     left_out: list[str]  # what is not shown, by name
 
 
-def shows_vdis(plotter: Any) -> bool:
-    """Whether a VDI is among what a plotter shows."""
-    props = [prop for renderer in plotter.renderers for prop in renderer.GetViewProps()]
-    return any(isinstance(prop, VDIActorMethods) and prop.GetVisibility() for prop in props)
+def is_vdi(prop: Any) -> bool:
+    """Whether a prop shows a VDI."""
+    return isinstance(prop, VDIActorMethods)
 
 
-def scenes_of(plotter: Any, viewer: str, *, follow: bool = False) -> list[Scene]:
+def scenes_of(plotter: Any, where: str, *, follow: bool = False) -> list[Scene]:
     """Return what each renderer of a plotter that has been drawn shows; warn of what is left out.
 
-    ``viewer``: what the warning calls it. ``follow``: as for :func:`scene_of`.
+    ``where``: what the warning calls it. ``follow``: as for :func:`scene_of`.
     """
     scenes = [scene_of(renderer, follow=follow) for renderer in plotter.renderers]
     left_out = dict.fromkeys(what for scene in scenes for what in scene.left_out)
     if left_out:
         more = ': see all by jupyter_backend="server"' if follow else ""
-        warn_external(f"{viewer} shows the scene without {', '.join(left_out)}{more}")
+        warn_external(f"{where} shows the scene without {', '.join(left_out)}{more}")
     return scenes
 
 
@@ -89,34 +78,33 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     names = {prop: name for name, prop in getattr(renderer, "actors", {}).items()}
     left_out = _effects(renderer)
     meshes: list[dict[str, Any]] = []
-    vdis: list[tuple[Any, Any, VDI, dict[str, Any]]] = []
+    vdis: list[Any] = []  # tuples of the actor, the series or set, the VDI, and where it is seen
     flat: list[Any] = []
     of_this_view: list[Any] = []
 
     # Sort what is drawn into VDIs, meshes and what is flat
     for prop in filter(lambda prop: prop.GetVisibility(), renderer.GetViewProps()):
         missing: list[str] = []
-        drawn_by = getattr(prop, "GetMapper", lambda: None)() or prop
-        if isinstance(prop, VDIActorMethods):
+        if is_vdi(prop):
             matrix, several = as_array(prop.GetMatrix()), prop.series or prop.vdi_set
-            vdi = prop.vdi if follow else drawn_by.driver.vdi_of_view(renderer, matrix)
+            vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
             if vdi is not None:
                 limits = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
                 vdis.append((prop, several, _thinned(vdi, prop.opacity_multiplier), limits))
                 # The viewer plays the first series, or follows the first set
                 if several is not None and sum(each[1] is not None for each in vdis) > 1:
                     missing.append(f"all but one of {len(several)} VDIs")
-        elif any(prop.IsA(kind) or drawn_by.IsA(kind) for kind in _OF_A_VIEW):
+        elif any(prop.IsA(kind) for kind in _FLAT):
+            flat.append(prop)
+        elif prop.IsA("vtkActor2D") or prop.IsA("vtkCubeAxesActor"):
             of_this_view.append(prop)
             missing.append("its place in other views than the first")
-        elif prop.IsA("vtkActor2D"):
-            flat.append(prop)
         elif isinstance(prop, vtk.vtkActor):
             meshes += _meshes(prop, missing)
         else:
             missing.append("all of it")
         # By the name that it was given, or else its class
-        name = names.get(prop, "").partition("(Addr")[0] or type(prop).__name__
+        name = re.split(r"\((?:Addr|0x)", names.get(prop, ""))[0] or type(prop).__name__
         left_out += [f"{what} ({name})" for what in missing]
     vdis.sort(key=lambda each: each[1] is None)
     boxes = [np.reshape(actor.GetBounds(), (3, 2)).T for actor, *_ in vdis]
@@ -138,14 +126,14 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
             for k, (_, _, vdi, limits) in enumerate(vdis)
         ],
     }
-    actor, several, shown, _ = vdis[0] if vdis else (None, None, None, None)
+    first: Any = vdis[0] if vdis else (None, None, None, {"planes": []})
+    actor, several, shown, limits = first
     if several is not None:
         if several.value_range is not None:  # pages show colours
             several = several.classified(volume_property=actor.GetProperty())
         factor = actor.opacity_multiplier
         shown = several if factor == 1 else several._mapped(lambda vdi: _thinned(vdi, factor))
-    planes = vdis[0][3]["planes"] if vdis else []
-    return Scene(shown, actor, planes, _packed(head), _background(renderer), left_out)
+    return Scene(shown, actor, limits["planes"], _packed(head), _background(renderer), left_out)
 
 
 def state_of(renderer: Any) -> Any:
@@ -153,7 +141,7 @@ def state_of(renderer: Any) -> Any:
     states: list[Any] = []
     for prop in renderer.GetViewProps():
         own = prop.GetRedrawMTime()
-        if isinstance(prop, VDIActorMethods):  # its mapper is modified in each frame
+        if is_vdi(prop):  # its mapper is modified in each frame
             own = (look_of(prop), as_array(prop.GetMatrix()).tolist(), _planes(prop, []))
         states.append((prop.GetAddressAsString(""), bool(prop.GetVisibility()), own))
     others = [(other.GetAddressAsString(""), other.GetViewport()) for other in _around(renderer)]
@@ -337,6 +325,7 @@ def _effects(renderer: Any) -> list[str]:
     """Name what changes a renderer's picture as a whole, and cannot be shown."""
     window = renderer.GetRenderWindow()
     behind = [other for other in window.GetRenderers() if other.GetLayer() < renderer.GetLayer()]
+    gradient = renderer.GetGradientBackground() and renderer.GetGradientMode() != 0
     effects = {
         "its render pass": renderer.GetPass() is not None,
         "enable_hidden_line_removal": renderer.GetUseHiddenLineRemoval(),
@@ -344,19 +333,16 @@ def _effects(renderer: Any) -> list[str]:
         "enable_shadows": renderer.GetUseShadows(),
         "add_background_image": any(other.VisibleActorCount() for other in behind),
         "the background's texture (set_environment_texture)": renderer.GetTexturedBackground(),
+        "a background's gradient other than from the bottom to the top": gradient,
     }
     return [name for name, is_used in effects.items() if is_used]
 
 
 def _background(renderer: Any) -> str:
     """Return a renderer's background as CSS."""
-    low, high = (
-        f"rgb({' '.join(f'{100 * channel:g}%' for channel in color)})"
-        for color in (renderer.GetBackground(), renderer.GetBackground2())
-    )
-    if not renderer.GetGradientBackground():
-        return low
-    return f"{_GRADIENTS[renderer.GetGradientMode()]}, {low}, {high})"
+    colors = (renderer.GetBackground(), renderer.GetBackground2())
+    low, high = ("rgb({:%} {:%} {:%})".format(*color) for color in colors)
+    return f"linear-gradient(to top, {low}, {high})" if renderer.GetGradientBackground() else low
 
 
 def _packed(head: dict[str, Any]) -> bytes:
@@ -385,35 +371,50 @@ def export_html(
     All of its renderers are shown; it is drawn, and VDIs that are missing are made.
     """
     one_of(controls, "controls", CONTROLS)
-    picture = _drawn(plotter)
-    views = []
-    # Which they are, not how they look: cameras of PyVista that are alike are equal
-    cameras = [r.GetActiveCamera().GetAddressAsString("") for r in plotter.renderers]
-    scenes = scenes_of(plotter, "the page")
-    for renderer, scene, camera in zip(plotter.renderers, scenes, cameras, strict=True):
-        left, bottom, right, top = renderer.GetViewport()
-        view = View(
-            [] if scene.shown is None else in_parts(*file_of(scene.shown)),
-            background=scene.background,
-            still=part_of(picture, renderer),
-            size=renderer.GetSize(),
-            needs={**needs_of(scene.shown), "scene": True},
-            scene=scene.data,
-        )
-        if len(scenes) > 1:
-            place = f"left: {left:%}; bottom: {bottom:%}"
-            size = f"width: {right - left:%}; height: {top - bottom:%}"
-            view.attributes["style"] = f"position: absolute; {place}; {size}"
-            view.attributes["data-link"] = str(cameras.index(camera))
-        views.append(view)
+
+    # Draw it, off-screen where it has not been shown
+    window = plotter.render_window
+    if plotter._first_time:  # as Plotter.show begins
+        plotter._on_first_render_request()
+    off_screen = window.GetOffScreenRendering()
+    window.SetOffScreenRendering(off_screen or not window.GetMapped())
+    try:
+        plotter.render()
+        picture = plotter.screenshot(return_img=True)[..., :3]
+    finally:
+        window.SetOffScreenRendering(off_screen)
+
+    # Put a viewer where each renderer is in the window; linked ones turn together
     target = None if filename is None else Path(filename).with_suffix(".html")
-    views.sort(key=lambda view: not view.parts)  # the first can be read again
     title = plotter.title if target is None else target.stem
-    page = assembled(views, title=title, controls=controls)
+    # Which cameras they are, not how they look: PyVista's that are alike are equal
+    cameras = [r.GetActiveCamera().GetAddressAsString("") for r in plotter.renderers]
+    shown = list(zip(plotter.renderers, scenes_of(plotter, "the page"), cameras, strict=True))
+    shown.sort(key=lambda each: each[1].shown is None)  # the first can be read again
+    body = ""
+    for number, (renderer, scene, camera) in enumerate(shown):
+        attributes = {}
+        if len(shown) > 1:
+            left, bottom, right, top = renderer.GetViewport()
+            place = f"position: absolute; left: {left:%}; bottom: {bottom:%}"
+            size = f"width: {right - left:%}; height: {top - bottom:%}"
+            attributes = {"style": f"{place}; {size}", "data-link": str(cameras.index(camera))}
+        body += viewer(
+            None if scene.shown is None else file_of(scene.shown),
+            part_of(picture, renderer),
+            renderer.GetSize(),
+            title=title,
+            background=scene.background,
+            attributes=attributes,
+            controls=controls,
+            scene=scene.data,
+            number=number,
+        )
+    page = html_page(title, body, shown[0][1].background, POLICY)
     if target is None:
-        return io.StringIO(page.decode())
+        return io.StringIO(page)
     with whole_file(target) as stream:
-        stream.write(page)
+        stream.write(page.encode())
     return None
 
 
@@ -423,22 +424,3 @@ def part_of(picture: Any, renderer: Any) -> Any:
     height, width = picture.shape[:2]
     rows = slice(round(height * (1 - top)), round(height * (1 - bottom)))
     return picture[rows, round(width * left) : round(width * right)]
-
-
-def _drawn(plotter: Any) -> Any:
-    """Draw a plotter, so that its VDIs are there; return its picture, uint8 (H, W, 3).
-
-    A window that has not been shown is drawn off-screen.
-    """
-    window = plotter.render_window
-    if plotter._first_time:  # as Plotter.show begins
-        plotter._on_first_render_request()
-    hidden = not window.GetMapped() and not window.GetOffScreenRendering()
-    if hidden:
-        window.SetOffScreenRendering(1)
-    try:
-        plotter.render()
-        return plotter.screenshot(return_img=True)[..., :3]
-    finally:
-        if hidden:
-            window.SetOffScreenRendering(0)

@@ -43,5 +43,5 @@ def served_page(host: str) -> str:
         "style-src 'unsafe-inline'; img-src data: blob:; "
         f"connect-src 'self' ws://{host} wss://{host}; base-uri 'none'; form-action 'none'"
     )
-    body = _BODY % (nonce, viewer_script(remote=True, module=True))
+    body = _BODY % (nonce, viewer_script("remote.js", module=True))
     return html_page("A volume, to be turned", body, "#202020", policy, _STYLE)

@@ -24,7 +24,6 @@ from urllib.parse import quote, urlsplit
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
 from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, Wish, wish_after
 from pyvista_vdi.extensions.web.served_page import served_page
-from pyvista_vdi.extensions.web.shown import bare_file
 from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
@@ -275,7 +274,7 @@ class Server:
                 await client.say("status", doing="vdi")
                 try:
                     lists, file = await asyncio.get_running_loop().run_in_executor(
-                        self._threads, self._made, wish, client.cancelled.is_set
+                        self._threads, self._source.make, wish, client.cancelled.is_set
                     )
                 except Cancelled:
                     continue
@@ -293,10 +292,6 @@ class Server:
         except Exception:
             _log.exception("a client was sent away")
             await client.end(WSCloseCode.INTERNAL_ERROR, "the server has failed")
-
-    def _made(self, wish: Wish, cancelled: Callable[[], bool]) -> tuple[tuple[int, int], bytes]:
-        vdi = self._source.make(wish, cancelled)
-        return ((0, 0), b"") if vdi is None else (vdi.window_size, bare_file(vdi))
 
 
 def serve(
@@ -376,8 +371,9 @@ def serve(
     several = hasattr(volume, "__len__") and hasattr(volume, "__getitem__") and not single
     steps: Any = volume if several else [volume]
     source = Source(steps, looks, options, lists=lists, device=device)
-    listening = {"host": host, "port": port, "token": token, "hosts": hosts}
-    server = Server(source, max_clients=max_clients, **listening).start()
+    server = Server(
+        source, host=host, port=port, token=token, hosts=hosts, max_clients=max_clients
+    ).start()
     if announce is not None:
         announce(f"Serving at {server.url} (Ctrl-C ends it)")
     if wait:

@@ -15,10 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.api import render
 from pyvista_vdi.errors import InvalidVDIError, NoDeviceError, UnsupportedError
-from pyvista_vdi.extensions.series.archive import SERIES
 from pyvista_vdi.extensions.series.archive import write_to as write_several
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.files import SET, about
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.io import to_bytes
@@ -55,9 +53,6 @@ _STAND_IN = """\
 }})(typeof element === "undefined" ? null : element[0] ?? element);
 """
 
-#: Longest edge of a picture that is kept in a saved notebook, pixels.
-_EDGE = 800
-
 
 def as_shown(shown: Any) -> Shown:
     """Return what a viewer can show, or raise InvalidVDIError."""
@@ -92,14 +87,6 @@ def seen_of(shown: Shown, *, camera: Any = None, time: float | None = None, **lo
     return shown
 
 
-def needs_of(shown: Any) -> dict[str, bool]:
-    """Return what a viewer's script must be able to do."""
-    return {
-        "series": isinstance(shown, VDISeries | VDISet),
-        "values": isinstance(shown, DeferredVDI),
-    }
-
-
 def file_of(
     shown: Shown,
     precision: str = "8-byte",
@@ -115,37 +102,30 @@ def file_of(
     """
     stream = io.BytesIO()
     if isinstance(shown, VDISeries | VDISet):
-        series = isinstance(shown, VDISeries)
-        kind, entries = (SERIES, {"times": shown.times}) if series else (SET, about(shown))
-        options = {"precision": precision, "compression": DEFLATE, "level": level}
-        first = write_several(stream, kind, entries, shown, progress=progress, **options)
+        options: Any = {"precision": precision, "compression": DEFLATE, "level": level}
+        first = write_several(stream, shown, progress=progress, **options)
         return stream.getvalue(), first
-    lists, values = shown.with_precision(precision), None
-    if isinstance(lists, DeferredVDI):
-        kept, values = lists, lists.about
-        lists = copy.copy(kept.lists)
+    kept = shown.with_precision(precision)
+    lists = kept.lists
+    if isinstance(kept, DeferredVDI):
         begun = kept.classified() if seen is None else seen
+        lists = copy.copy(lists)
         lists.metadata = {**kept.metadata, "transfer_function": begun.metadata["transfer_function"]}
-    write_to(stream, lists, DEFLATE, level, progress, coarse=coarse, deferred=values)
+    write_to(stream, lists, DEFLATE, level, progress, coarse=coarse)
     with zipfile.ZipFile(stream) as archive:
         members = archive.infolist()
     behind = members[2 if members[1].filename == COARSE else 1]
     return stream.getvalue(), behind.header_offset
 
 
-def bare(vdi: VDI) -> VDI:
-    """Return a VDI in the 8-byte form without metadata, of which a page need know nothing.
+def bare_file(vdi: VDI) -> bytes:
+    """Return the file of a VDI in the 8-byte form without metadata, of which a page knows nothing.
 
     A table of 4096 colours would be longer than a small VDI.
     """
     bare = copy.copy(vdi.with_precision("8-byte"))
     bare.metadata = {}
-    return bare
-
-
-def bare_file(vdi: VDI) -> bytes:
-    """Return the file of a bare VDI."""
-    return file_of(bare(vdi), level=EFFORT)[0]
+    return file_of(bare, level=EFFORT)[0]
 
 
 def picture(
@@ -166,9 +146,7 @@ def picture(
     return to_bytes(render(vdi, view, window_size, clipping_planes=clipping_planes), background)
 
 
-def still(
-    vdi: VDI, camera: dict[str, Any] | None = None, *, longest: int = _EDGE, **how: Any
-) -> str | None:
+def still(vdi: VDI, camera: Any = None, *, longest: int = 800, **how: Any) -> str | None:
     """Return a view, the VDI's own by default, as base64 PNG; ``None`` without a device.
 
     Its longer edge has at most ``longest`` pixels. ``how``: of :func:`picture`.
@@ -191,23 +169,25 @@ def png(pixels: NDArray[np.uint8]) -> str:
     return b64encode(stream.getvalue()).decode()
 
 
+def in_a_terminal() -> bool:
+    """Whether IPython shows text alone; other notebooks may have no IPython."""
+    return _shell() is not None and not hasattr(_shell(), "kernel")
+
+
 def _shell() -> Any:
-    """Return IPython's shell; other notebooks may have none."""
     ipython = sys.modules.get("IPython")
     return None if ipython is None else ipython.get_ipython()
 
 
-def in_a_terminal() -> bool:
-    """Whether IPython shows text alone."""
-    shell = _shell()
-    return shell is not None and not hasattr(shell, "kernel")
+def with_still(data: Any, picture: str | None, widget: Any) -> Any:
+    """Return a widget's output with a picture, base64 PNG, for where there can be no view.
 
-
-def stand_in(picture: str, key: str, model_id: str) -> None:
-    """Show a picture, base64 PNG, in a notebook in which a widget has no view.
-
-    It is an output of its own: of one output, what shows notebooks takes the view alone.
+    In a notebook in which it has no view the picture is shown by an output of its own: of one
+    output, what shows notebooks takes the view alone.
     """
-    if hasattr(shell := _shell(), "kernel"):
-        script = _STAND_IN.format(picture=picture, key=key, model_id=model_id)
-        shell.display_pub.publish({"application/javascript": script})
+    if picture is None:
+        return data
+    if hasattr(_shell(), "kernel"):
+        script = _STAND_IN.format(picture=picture, key=widget._key, model_id=widget.model_id)
+        _shell().display_pub.publish({"application/javascript": script})
+    return {**data, "image/png": picture}

@@ -7,28 +7,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.extensions.web.camera import viewer_camera
 from pyvista_vdi.extensions.web.messages import Wish
+from pyvista_vdi.extensions.web.shown import bare_file
 from pyvista_vdi.generation.generate import generate_vdi
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.coverage import bounds_corners, view_in_sight
+from pyvista_vdi.model.coverage import SLACK, bounds_corners, projected
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.rays import checked_sample_distance
-
-#: Volumes, and looks of them, that are kept on host and device.
-_VOLUMES = 2
-_LOOKS = 4
 
 #: The colour maps and opacity mappings that clients may choose.
 _CMAPS = (
@@ -63,14 +64,16 @@ class Source:
             return as_volume(volumes[step], looks.scalars, looks.preference)
 
         def classify(step: int, look: tuple[tuple[str, Any], ...]) -> TransferFunction:
-            return looks.changed(dict(look)).transfer_function_of(self._volume(step))
+            return replace(looks, **dict(look)).transfer_function_of(self._volume(step))
 
-        self._volume = lru_cache(_VOLUMES)(load)
-        self._transfer_function = lru_cache(_LOOKS)(classify)
+        # Those that are kept on host and device
+        self._volume = lru_cache(2)(load)
+        self._transfer_function = lru_cache(4)(classify)
         self._runtime = get_runtime(device)
         self._options, self._lists = options, lists
         # What is wrong with the look or the step is refused now, not to a client
-        first, look = self._volume(0), self._transfer_function(0, ())
+        first, table = self._volume(0), self._transfer_function(0, ())
+        begun: dict[str, Any] = {"cmap": looks.cmap, "opacity": looks.opacity}
         checked_sample_distance(first, options.sample_distance)
         free = find_spec("pyvista") is not None and not first.rgba and not looks.in_place
         self.offer: dict[str, Any] = {
@@ -79,29 +82,51 @@ class Source:
             "steps": len(volumes),
             "cmaps": list(_CMAPS) if free else [],
             "opacities": list(_OPACITIES) if free else [],
-            "look": {
-                name: value
-                for name in ("cmap", "opacity")
-                if isinstance(value := getattr(looks, name), str)
-            },
-            "range": list(look.scalar_range),
+            "look": {name: look for name, look in begun.items() if isinstance(look, str)},
+            "range": list(table.scalar_range),
         }
 
-    def make(self, wish: Wish, cancelled: Callable[[], bool]) -> VDI | None:
-        """Make the VDI of a client's view; ``None`` where nothing of the volume is in view."""
+    def make(self, wish: Wish, cancelled: Callable[[], bool]) -> tuple[tuple[int, int], bytes]:
+        """Make the VDI of a client's view; return its size and its file.
+
+        That is empty where nothing of the volume is in view.
+        """
         assert wish.view is not None
         camera, size = wish.view.camera, wish.view.size
         # Before the device is held: these wait for each other
         volume = self._volume(wish.step)
         look = self._transfer_function(wish.step, wish.look)
         corners = bounds_corners(volume.bounds)
-        seen = view_in_sight(camera, size, corners)
+        seen = _view_in_sight(camera, size, corners)
         if seen is not None and math.prod(seen[1]) > self._lists:
             share = math.sqrt(self._lists / math.prod(seen[1]))
             fewer = tuple(max(1, int(edge * share)) for edge in size)
-            seen = view_in_sight(camera, fewer, corners)
+            seen = _view_in_sight(camera, fewer, corners)
         if seen is None:
-            return None
+            return (0, 0), b""
         with self._runtime.background(cancelled):
             request = GenerationRequest(volume, look, *seen, self._options, self._runtime)
-            return generate_vdi(request)
+            vdi = generate_vdi(request)
+        return vdi.window_size, bare_file(vdi)
+
+
+def _view_in_sight(
+    camera: Camera, size: Sequence[int], corners: NDArray[np.float64]
+) -> tuple[Camera, tuple[int, int]] | None:
+    """Cut a view's window down to the whole pixels in which a volume's corners can be seen.
+
+    All of the window where a corner is behind the eye or close to it. ``None`` if nothing of the
+    volume is in the window.
+    """
+    pixels = projected(camera, size, corners)
+    low, high = np.zeros(2), np.asarray(size, dtype=np.float64)
+    if pixels is not None:
+        low = np.maximum(low, np.floor(pixels.min(axis=0) + SLACK))
+        high = np.minimum(high, np.ceil(pixels.max(axis=0) - SLACK))
+    elif ((corners @ camera.model_to_view[2, :3] + camera.model_to_view[2, 3]) <= 0).all():
+        return None
+    width, height = (int(n) for n in high - low)
+    if width <= 0 or height <= 0:
+        return None
+    corner = (int(low[0]), size[1] - int(high[1]))
+    return camera.tile(size, corner, (width, height)), (width, height)

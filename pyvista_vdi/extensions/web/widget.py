@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, MissingDependencyError
 from pyvista_vdi.extensions.series.series import VDISeries
-from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web import shown as of_viewers
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, camera_of, viewer_camera
@@ -32,17 +31,14 @@ except ImportError as error:
         'pip install "pyvista-vdi[notebook]"'
     ) from error
 
-#: What anywidget calls in the page: a view of the model that the kernel's widget is. The element
-#: has another name where it can play or edit: in the page there may be one that can not.
+#: What anywidget calls in the page: a view of the model that the kernel's widget is.
 _RENDER = """
-const NAME = "vdi-viewer%s";
-if (!customElements.get(NAME)) customElements.define(NAME, class extends VDIViewer {});
 const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
 
 function render({ model, el }) {
-  const viewer = document.createElement(NAME), [width, height] = model.get("_picture_size");
+  const viewer = document.createElement("vdi-viewer"), [width, height] = model.get("_picture_size");
   viewer.style.cssText =
-    `display: block; width: 100%%; max-width: ${width}px; aspect-ratio: ${width} / ${height}`;
+    `display: block; width: 100%; max-width: ${width}px; aspect-ratio: ${width} / ${height}`;
   const bytesOf = (name) => {
     const { buffer, byteOffset, byteLength } = model.get(name) ?? new Uint8Array();
     return new Uint8Array(buffer, byteOffset, byteLength);
@@ -175,7 +171,7 @@ class VDIWidget(anywidget.AnyWidget):
     >>> widget  # doctest: +SKIP
     """
 
-    _has_scene = False
+    _esm = viewer_script("scene.js", module=True) + _RENDER
     _placed: Any = None  # where the model is in the world, where its VDI does not say it
     _file = traitlets.Bytes().tag(sync=True)
     _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
@@ -202,7 +198,6 @@ class VDIWidget(anywidget.AnyWidget):
         one_of(controls, "controls", ("all", "none"))
         self._precision, self._first_look = precision, look
         self._vdi = shown = self._accept(vdi)
-        self._esm = self._script(shown)
         super().__init__(
             _file=self._sent(shown),
             _picture_size=[1, 1] if shown is None else list(picture_view(shown)[1]),
@@ -239,8 +234,6 @@ class VDIWidget(anywidget.AnyWidget):
     @vdi.setter
     def vdi(self, vdi: Any) -> None:
         shown = self._accept(vdi)
-        if not isinstance(shown, VDI):
-            self._esm = self._script(shown)  # views are made anew where it is another
         self._file = self._sent(shown, coarse=False)  # the one before is better meanwhile
         self._vdi = shown
         series = isinstance(shown, VDISeries)
@@ -275,7 +268,8 @@ class VDIWidget(anywidget.AnyWidget):
         VDIFileError
             If the file cannot be written.
         """
-        pixels = of_viewers.picture(self._now(), self.camera, window_size, **self._shown_as())
+        seen, camera, how = self._now()
+        pixels = of_viewers.picture(seen, camera, window_size, **how)
         if filename is not None:
             write_png(pixels, filename)
         return pixels
@@ -287,25 +281,16 @@ class VDIWidget(anywidget.AnyWidget):
         """Return what can be shown, or raise InvalidVDIError."""
         return of_viewers.as_shown(vdi)
 
-    def _now(self) -> VDI:
-        """Return the VDI that is seen: of a series the present step, of a set the nearest one."""
+    def _now(self) -> tuple[VDI, dict[str, Any], dict[str, Any]]:
+        """Return the VDI that is seen, of a series the present step, of a set the nearest; how."""
         if self._vdi is None:
             raise InvalidVDIError("there is no VDI here: plotter.screenshot() is the picture")
-        camera = camera_of(self.camera)
-        return of_viewers.seen_of(self._vdi, camera=camera, time=self.time, **self._first_look)
-
-    def _shown_as(self) -> dict[str, Any]:
-        """Return how it is seen."""
+        seen_by = {"camera": camera_of(self.camera), "time": self.time}
+        seen = of_viewers.seen_of(self._vdi, **seen_by, **self._first_look)
         color = self.background
         rgb = None if color is None else [value / 255 for value in bytes.fromhex(color[1:])]
-        return {"background": rgb, "clipping_planes": self.clipping_planes, "placed": self._placed}
-
-    def _script(self, shown: Any) -> str:
-        """Return what runs in the page: what plays series, chooses of a set, or edits values."""
-        needs = of_viewers.needs_of(shown)
-        script = viewer_script(scene=self._has_scene, **needs, module=True)
-        kind = next((f"-of-{name}" for name, needed in needs.items() if needed), "")
-        return script + _RENDER % kind
+        planes, placed = self.clipping_planes, self._placed
+        return seen, self.camera, {"background": rgb, "clipping_planes": planes, "placed": placed}
 
     def _sent(self, shown: Any, *, coarse: bool = True) -> bytes:
         """Return the file that the browser is sent."""
@@ -313,9 +298,7 @@ class VDIWidget(anywidget.AnyWidget):
             return b""
         seen = of_viewers.seen_of(shown, **self._first_look)
         precision = self._precision or "8-byte"
-        if isinstance(shown, VDISeries | VDISet):
-            shown = shown._mapped(of_viewers.bare)
-        elif self._precision is None and shown.counts.max() > DEPTH_CODES:
+        if self._precision is None and seen.counts.max() > DEPTH_CODES:
             precision = "exact"
         # A cell waits for it: a twentieth more bytes than by level 6, in half the time
         return of_viewers.file_of(shown, precision, 1, seen=seen, coarse=coarse)[0]
@@ -323,15 +306,12 @@ class VDIWidget(anywidget.AnyWidget):
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the view, and a picture for where there can be no view."""
         data, metadata = super()._repr_mimebundle_(**kwargs)
-        shown = self._still()
-        if shown is None:
-            return data, metadata
-        of_viewers.stand_in(shown, self._key, self.model_id)
-        return {**data, "image/png": shown}, metadata
+        return of_viewers.with_still(data, self._still(), self), metadata
 
     def _still(self) -> str | None:
         """Return that picture as base64 PNG, if it can be had."""
-        return of_viewers.still(self._now(), self.camera, **self._shown_as())
+        seen, camera, how = self._now()
+        return of_viewers.still(seen, camera, **how)
 
 
 def _hex(color: Any) -> str:

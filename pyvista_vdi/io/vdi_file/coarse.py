@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.model.deferred import length_per_depth
-from pyvista_vdi.model.vdi import VDI, with_arrays
+from pyvista_vdi.model.vdi import VDI, length_per_depth, with_arrays
 
 
 def coarser(vdi: VDI, step: int = 4) -> VDI:

@@ -19,6 +19,7 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError, PackedArray, workers
+from pyvista_vdi.io.vdi_file.codes import colors_of_differences, packed_of_stored
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -37,12 +38,7 @@ from pyvista_vdi.io.vdi_file.layout import (
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.packing import (
-    Arrays,
-    check_precision,
-    colors_of_differences,
-    packed_of_stored,
-)
+from pyvista_vdi.model.packing import Arrays, check_precision
 from pyvista_vdi.model.vdi import VDI, with_arrays
 
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
@@ -275,11 +271,6 @@ class _OpenFile:
             if d["chunk_rows"] != CHUNK_ROWS:
                 self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {CHUNK_ROWS}")
             n_lists = window_size[0] * window_size[1]
-            if d.get("precision") == "16-byte":
-                raise VDIFileError(
-                    f"{self._path} has supersegments of 16 bytes, which are no longer read: "
-                    "generate it again, with the precision '8-byte' or 'exact'"
-                )
             precision = check_precision(d["precision"]) if d["version"] >= 3 else "exact"
             packed_bytes = {"exact": 0, "8-byte": 8 * n + 6 * n_lists}
             return FileInfo(

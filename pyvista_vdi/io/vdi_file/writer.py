@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
 from pyvista_vdi.io.vdi_file.coarse import coarser
+from pyvista_vdi.io.vdi_file.codes import channel_differences, stored_rows
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -29,9 +30,8 @@ from pyvista_vdi.io.vdi_file.layout import (
     layouts,
     version_of,
 )
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.packing import DEPTH_CODES, channel_differences, stored_rows
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.packing import DEPTH_CODES
+from pyvista_vdi.model.vdi import VDI, Lists
 from pyvista_vdi.model.whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
@@ -39,7 +39,7 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def write(
-    vdi: VDI | DeferredVDI,
+    vdi: Lists,
     path: str | os.PathLike[str],
     *,
     compression: str = "lz4",
@@ -59,9 +59,8 @@ def write(
     VDI's own by default. ``progress``: as for :func:`pyvista_vdi.io.write`.
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
-    lists, about = (vdi.lists, vdi.about) if isinstance(vdi, DeferredVDI) else (vdi, None)
     with whole_file(path) as stream:
-        write_to(stream, lists, compression, level, progress, deferred=about)
+        write_to(stream, vdi.lists, compression, level, progress)
     return Path(os.path.realpath(path))
 
 
@@ -73,14 +72,12 @@ def write_to(
     progress: Progress | None = None,
     *,
     coarse: bool = True,
-    deferred: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a .vdi file to a stream that can be sought in.
 
     ``stream``: takes the bytes. ``vdi``, ``compression``, ``level``, ``progress``: as for
     :func:`write`; the VDI has the precision to write. ``coarse``: whether a file of version 4
-    begins with a coarse level. ``deferred``: what a :class:`DeferredVDI` is about, whose lists
-    ``vdi`` are; they have no coarse level, as values do not mix as media do.
+    begins with a coarse level; lists that keep values have none, as these do not mix as media do.
     """
     longest = int(vdi.counts.max())
     kind = next(kind for kind in ("<u1", "<u2", "<u4", "<u8") if longest <= np.iinfo(kind).max)
@@ -96,8 +93,8 @@ def write_to(
     )
     # Describe them
     entries = describe(vdi, version)
-    if deferred is not None:
-        entries |= {"format": DEFERRED_NAME, "deferred": dict(deferred)}
+    if vdi.kept is not None:
+        entries |= {"format": DEFERRED_NAME, "deferred": vdi.kept}
     metadata = entries.pop("metadata")
     if version >= 3:
         entries["precision"] = vdi.precision
@@ -111,7 +108,7 @@ def write_to(
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(stored(DESCRIPTION), description)
         shrinks = min(vdi.window_size) >= COARSE_STEP and longest <= DEPTH_CODES
-        if coarse and compression == DEFLATE and shrinks and deferred is None:
+        if coarse and compression == DEFLATE and shrinks and vdi.kept is None:
             small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
             few = io.BytesIO()
             write_to(few, small, DEFLATE, effort, coarse=False)

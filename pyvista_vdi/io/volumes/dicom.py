@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable
 from functools import lru_cache, partial
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,25 +24,12 @@ from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, head_of, stack
 _APART = "put those that belong together into a folder of their own"
 
 
-class _Slice(NamedTuple):
-    """A frame of a file: lengths are millimetres, arrays are empty where the file says nothing."""
-
-    file: Path
-    frame: int
-    header: Any
-    position: NDArray[np.float64]  # centre of its first pixel, (3,), in the patient's frame
-    turn: NDArray[np.float64]  # directions of columns and rows, (6,)
-    spacing: NDArray[np.float64]  # between rows and between columns
-    line: tuple[float, float]  # slope and intercept of its values
-
-
 def dicom(path: Path) -> list[VolumeInFile]:
     """Return the series of a folder, or that of a file of several frames."""
     import pydicom
 
     series, found = defaultdict(list), []
-    damaged: list[str] = []
-    refused: list[tuple[int, VDIError]] = []  # and how many slices each has
+    wrong: list[tuple[int, Exception]] = []  # and how many slices cannot be shown; 0: damage
     files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
     with pydicom.config.disable_value_validation():  # else it warns of each long number
         for file in files:
@@ -48,31 +37,37 @@ def dicom(path: Path) -> list[VolumeInFile]:
                 for one in _slices(file):
                     series[one.header.get("SeriesInstanceUID", "")].append(one)
             except UnsupportedError as error:
-                refused.append((len(files), error))
+                wrong.append((len(files), error))
             except Exception as error:  # damage shows at whatever pydicom comes to first
-                damaged.append(f"{file} cannot be read as a DICOM slice: {error}")
-        if damaged and series:
-            left_out = f"{len(damaged)} of {len(files)} files in the folder {path} are left out"
-            warn_external(f"{left_out}, as they are damaged; the first: {damaged[0]}")
+                said = f"{file} cannot be read as a DICOM slice: {error}"
+                wrong.append((0, InvalidVolumeError(said)))
+        damaged = [why for count, why in wrong if not count]
         for uid, those in series.items():
             try:
                 name = str(those[0].header.get("SeriesDescription") or uid)
                 found.append(_volume(path, those, name))
             except VDIError as error:
-                refused.append((len(those), error))
-    if not found and refused:
-        raise max(refused, key=lambda each: each[0])[1]
+                wrong.append((len(those), error))
     if not found:
         none = f"{path} holds no slices of DICOM, TIFF or PNG: give the folder that holds them"
-        raise InvalidVolumeError(damaged[0] if damaged else none)
-    for count, why in refused:
+        raise max(wrong, key=itemgetter(0), default=(0, InvalidVolumeError(none)))[1]
+    if damaged:
+        left_out = f"{len(damaged)} of {len(files)} files in the folder {path} are left out"
+        warn_external(f"{left_out}, as they are damaged; the first: {damaged[0]}")
+    for count, why in wrong:
         if count > 1:
             warn_external(f"a series of {count} slices is left out: {why}")
     return found
 
 
-def _slices(file: Path) -> list[_Slice]:
-    """Return the frames of a file, none where it is no DICOM image."""
+def _slices(file: Path) -> list[Any]:
+    """Return the frames of a file, none where it is no DICOM image.
+
+    Each has its ``frame`` in the ``file``, the ``header`` of that; ``position``, the centre of its
+    first pixel, (3,), in the patient's frame; ``turn``, directions of columns and rows, (6,);
+    ``spacing`` between rows and between columns, millimetres: of these what the file does not say
+    is empty; and ``line``, slope and intercept of its values.
+    """
     import pydicom
 
     if head_of(file)[128:132] != b"DICM":
@@ -110,11 +105,12 @@ def _slices(file: Path) -> list[_Slice]:
         slope = data.get("DoseGridScaling") or of(i, values, "RescaleSlope", 1)
         line = float(slope) or 1.0, float(of(i, values, "RescaleIntercept", 0))
         spacing = of(i, "PixelMeasuresSequence", "PixelSpacing", ())
-        found.append(_Slice(file, i, data, position, turn, spacing, line))
+        told = {"position": position, "turn": turn, "spacing": spacing, "line": line}
+        found.append(SimpleNamespace(file=file, frame=i, header=data, **told))
     return found
 
 
-def _volume(path: Path, slices: list[_Slice], name: str) -> VolumeInFile:
+def _volume(path: Path, slices: list[Any], name: str) -> VolumeInFile:
     """Return a series in the order of its places."""
     if len(slices) < 2:
         raise InvalidVolumeError(f"{path} holds one slice: give the folder of all of its series")
@@ -175,7 +171,7 @@ def _decoded(file: Path) -> tuple[Any, NDArray[Any]]:
         ) from error
 
 
-def _pixels(decoded: Callable[[Path], tuple[Any, NDArray[Any]]], one: _Slice) -> NDArray[Any]:
+def _pixels(decoded: Callable[[Path], tuple[Any, NDArray[Any]]], one: Any) -> NDArray[Any]:
     """Return the values that a slice means: whole numbers where slope and intercept are."""
     from pydicom.pixels import apply_modality_lut
 

@@ -130,7 +130,7 @@ def mrc(file: Path) -> list[VolumeInFile]:
     words, reals = (np.frombuffer(head, f"{order}{kind}4", 56) for kind in "if")
     shape, mode, mapped = words[2::-1].tolist(), int(words[3]), words[16:19].tolist()
     if head[208:212] != b"MAP " or mode not in _MODES or sorted(mapped) != [1, 2, 3]:
-        raise InvalidVolumeError(f"it is no map, or of mode {mode}, and {[*_MODES]} are read")
+        raise InvalidVolumeError(f"it is no map, or of a mode ({mode}) that is none of {[*_MODES]}")
     axes = "".join("?xyz"[n] for n in mapped)
     counts = np.maximum(words[7:10], 1)
     step = np.where(reals[10:13] > 0, reals[10:13].astype(np.float64) / counts, 1.0)

@@ -196,11 +196,10 @@ def _explained(file: Path, kind: VolumeFormat) -> Iterator[None]:
     except Exception as error:  # each library has exceptions of its own
         if isinstance(error, VDIError) and str(file) in str(error):
             raise
-        kind_of = type(error) if isinstance(error, VDIError) else InvalidVolumeError
+        raised = type(error) if isinstance(error, VDIError) else InvalidVolumeError
         why = " ".join(str(error).split())[-500:] or type(error).__name__
-        raise kind_of(
-            f"{file} cannot be read as {kind.name} ({why}): is it whole? Write it anew, or {REMEDY}"
-        ) from error
+        said_of = f"{file} cannot be read as {kind.name} ({why})"
+        raise raised(f"{said_of}: is it whole? Write it anew, or {REMEDY}") from error
     finally:
         for each in loggers:
             each.removeFilter(passes)

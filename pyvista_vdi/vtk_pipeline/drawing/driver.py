@@ -100,6 +100,7 @@ class Driver:
         self._images, self._last = Images(), NOTHING
         self._texture, self._no_depth, self._scissor = ImageTexture(), NoDepth(), Scissor()
         self._selection, self._scene_at_hand = Selection(), SceneAtHand(self._say_not_exported)
+        self._view: View | None = None
         self._counted = self._generation = 0  # the VDI that was shown last, and how many were
         # What plans go by
         self._background, self._timer = Background(), Timer(self._tick)
@@ -120,8 +121,7 @@ class Driver:
         self._pictures, self._costs = Pictures(), Costs()
         self._seen: Seen | None = None  # the last frame that somebody watched
         self._stamp: Any = None  # of all that it depended on
-        self._view: View | None = None  # of the last frame
-        self._moved_at, self._number = -math.inf, None
+        self._moved_at, self._number = -math.inf, (0, 0)  # and of what frame of which window
         self._pixels = 0.0  # of the last frame, in which the volume may be seen
         if failures:
             self._failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
@@ -279,7 +279,7 @@ class Driver:
         if frame is None:
             return self._last
         window, settings = self.window, self.settings
-        if frame.volume is None:  # which has no lists to be merged by
+        if frame.volume is None and len(window.shown_in(renderer)) > 1:
             part = window.shared(Overlaps).part(frame)
             if part is not None:
                 return part
@@ -330,17 +330,21 @@ class Driver:
         source, settings = self.input, self.settings
         window = Window.of(frame.renderer.GetRenderWindow())
         self._window = weakref.ref(window)
-        if any(
-            v.mapper is frame.mapper and v.driver is None for v in window.shown_in(frame.renderer)
-        ):
-            self._warnings.warn(_BEHIND_ANOTHER)
+        volumes = window.shown_in(frame.renderer)
+        for each in volumes:
+            if each.mapper is frame.mapper and each.driver is None:
+                self._warnings.warn(_BEHIND_ANOTHER)
         if source is None:
             return None
-        source.note_scene(self.renderers(), frame.model_transform)
+        renderers = self.renderers()
+        source.note_scene(renderers, frame.model_transform)
         if settings.automatic_view:
             source.set_view_if_missing(*_seen_from(frame))
         if isinstance(source, SourceInput):
-            shown = self._planned(source, frame, joint=overlapped(frame))
+            # What is drawn in several views is out of date in none of them by itself
+            one_view = len(renderers) == 1 and source.alone
+            joint = len(volumes) > 1 and overlapped(frame)
+            shown = self._planned(source, frame, joint=joint, one_view=one_view)
         else:
             shown = self._stored(source, frame)
         if shown is None:
@@ -352,8 +356,8 @@ class Driver:
         # A volume has the light of its VDI in a window, so that nothing jumps
         volume, view = shown.volume, frame.view
         if volume is not None:
-            watched = settings.draw != "volume" and window.watched_behind(settings)
-            by_vdi = watched and source.last() is not None
+            by_vdi = self._seen is not None and source.last() is not None
+            by_vdi = by_vdi and settings.draw != "volume"
             if volume.shaded and view is not None and not by_vdi:
                 shown = replace(shown, lit_from=view.camera)
             return shown
@@ -384,11 +388,13 @@ class Driver:
         full = not self.window.previews(self.settings)
         return replace(frame.showing(vdi, number_of(vdi)), full=full)
 
-    def _planned(self, source: SourceInput, frame: Frame, *, joint: bool) -> Frame | None:
+    def _planned(
+        self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool
+    ) -> Frame | None:
         """Plan a frame of what comes from a volume, do that, and return what the frame shows."""
         settings = self.settings
         try:
-            seen, sighted = self._look(source, frame, joint=joint)
+            seen, sighted = self._look(source, frame, joint=joint, one_view=one_view)
             while True:
                 planned = plan(seen)
                 self._costs, self._pictures = planned.costs, planned.pictures
@@ -425,12 +431,12 @@ class Driver:
             found = frame.showing(shown, number_of(shown))
         return replace(found, full=planned.full, stand_in=planned.stand_in)
 
-    def _look(self, source: SourceInput, frame: Frame, *, joint: bool) -> tuple[Seen, Frame | None]:
+    def _look(
+        self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool
+    ) -> tuple[Seen, Frame | None]:
         """Look at all that decides what the frame shows; also return the VDI as it shows it."""
         window, settings, view = self.window, self.settings, frame.view
         assert view is not None
-        # What is drawn in several views is out of date in none of them by itself
-        one_view = len(self.renderers()) == 1 and source.alone
         watched = one_view and window.watched_behind(settings)
         stamp = source.stamp()
         if self._wanted is None or self._wanted[0] != stamp or self._wanted[1] is None:
@@ -461,7 +467,7 @@ class Driver:
         by_policy, failed = callable(settings.regenerate), stamp in self._failed
         asks = by_policy and first and one_view and made is not None
         asks = asks and not (watched and (self._making is not None or failed))
-        previews, rate = window.previews(settings), window.rate(settings)
+        previews = window.previews(settings)
         content, volume = None if wanted is None else wanted.content, "whole"
         bounds = () if wanted is None else wanted.volume.bounds
         self._pixels = replace(frame, bounds=bounds).covered if watched and bounds else 0.0
@@ -491,8 +497,8 @@ class Driver:
             estimate=self._estimate,
             failed=failed,
             volume=volume,  # type: ignore[arg-type]
-            late=self._late,
-            seconds=1 / (window.pace.headroom * rate) if previews else None,
+            late=watched and self._late,
+            seconds=1 / (window.pace.headroom * window.rate(settings)) if previews else None,
             costs=self._costs,
             pictures=self._pictures,
         )
@@ -547,11 +553,10 @@ class Driver:
                 for_view = not (seen.stale or seen.chosen)
                 self._making = Making(request.content, planned.make, for_view)
                 self._background.generate(request)
-        vdi, request = source.last(), source.source.GetCurrentRequest()
-        if planned.estimate == "background" and vdi is not None and request is not None:
-            made = seen.made
-            assert made is not None
-            self._background.estimate(made.number, vdi, request, seen.view, made.options)
+        if planned.estimate == "background":
+            vdi, of, made = source.last(), source.source.GetCurrentRequest(), seen.made
+            assert vdi is not None and of is not None and made is not None  # noqa: PT018
+            self._background.estimate(made.number, vdi, of, seen.view, made.options)
         if planned.update:
             self._update(source)
 
@@ -606,6 +611,8 @@ class Driver:
         self._background.drop_vdi()
         self._background.drop_estimate()
         self._making = None
+        if self.settings.draw == "vdi":
+            self._volume = None  # which stood in
 
     def _fail(self, error: BaseException) -> None:
         """Note that a VDI cannot be made of what there is now, and say it once."""
@@ -960,8 +967,8 @@ class Driver:
 
     def renderers(self) -> list[Any]:
         """Return all renderers that show the actor, by itself or as a part of an assembly."""
-        there = consumers(self._actor())
-        return list(dict.fromkeys(c for c in there if c.IsA("vtkRenderer")))
+        there = [each for each in consumers(self._actor()) if each.IsA("vtkRenderer")]
+        return list(dict.fromkeys(there))
 
     def _watch(self, renderer: Any) -> None:
         """From now on, know which renderer is between its StartEvent and EndEvent."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -309,14 +308,16 @@ def _framebuffer_depth(window: Any, corner: tuple[int, int], size: tuple[int, in
     return z.reshape(height, width)
 
 
-def consumers(prop: Any) -> Iterator[Any]:
-    """Yield the renderers that show a prop, the assemblies that it is a part of, and theirs."""
-    for i in range(0 if prop is None else prop.GetNumberOfConsumers()):
-        consumer = prop.GetConsumer(i)
-        if consumer is not None:
-            yield consumer
-            if consumer.IsA("vtkProp"):
-                yield from consumers(consumer)
+def consumers(prop: Any) -> list[Any]:
+    """Return the renderers that show a prop, the assemblies that it is a part of, and theirs."""
+    found, props = [], [] if prop is None else [prop]
+    for each in props:
+        there = [each.GetConsumer(i) for i in range(each.GetNumberOfConsumers())]
+        found += [consumer for consumer in there if consumer is not None]
+        props += [
+            consumer for consumer in found if consumer.IsA("vtkProp") and consumer not in props
+        ]
+    return found
 
 
 def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:

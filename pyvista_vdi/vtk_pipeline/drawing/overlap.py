@@ -204,8 +204,6 @@ def _frames(own: Frame) -> list[Frame]:
 def overlapped(own: Frame) -> bool:
     """Whether the data of another VDI may be seen where those of this one are."""
     shown = [v for v in own.window.shown_in(own.renderer) if v.driver is not None and v.visible]
-    if len(shown) < 2:
-        return False
     # Look at all once in this view: two eyes have two
     place = (own.renderer.GetAddressAsString(""), own.origin, own.size, own.camera.window_center)
     joint = own.window.of_frame.get(("overlapped", place, own.to_view.tobytes()))

@@ -22,7 +22,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.io.vdi_file.description import plain_number
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, Lists
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.vtk_pipeline import vtk
 
@@ -288,7 +288,7 @@ def volume_to_image(volume: Volume, name: str | None = None) -> vtk.vtkImageData
     return image
 
 
-def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
+def vdi_to_image(vdi: Lists) -> vtk.vtkImageData:
     """Return a VDI in its canonical VTK form.
 
     Parameters
@@ -305,24 +305,23 @@ def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
         arrays share the VDI's memory, so they must not be written to. A ``.vti`` file keeps every
         bit.
     """
-    kept: dict[str, Any] = {}
-    if isinstance(vdi, DeferredVDI):
-        kept, vdi = {"deferred": vdi.about}, vdi.with_precision("exact").lists
-    width, height = vdi.window_size
+    lists: VDI = vdi.with_precision("exact").lists
+    kept = {} if lists.kept is None else {"deferred": lists.kept}
+    width, height = lists.window_size
     image = vtk.vtkImageData()
     image.SetDimensions(width, height, 1)
-    counts = np.diff(vdi.offsets).astype(np.uint32)
+    counts = np.diff(lists.offsets).astype(np.uint32)
     image.GetPointData().SetScalars(to_vtk(COUNT, counts))
     field = image.GetFieldData()
     for name in _RAGGED:
-        field.AddArray(to_vtk(name, getattr(vdi, name)))
+        field.AddArray(to_vtk(name, getattr(lists, name)))
     # Everything that is not an array, as a field string of JSON
     about = {
         "form_version": FORM_VERSION if kept else 1,
-        "camera": vdi.camera.to_dict(),
-        "bounds": list(vdi.bounds),
-        "depth_origin": vdi.depth_origin,
-        "metadata": vdi.metadata,
+        "camera": lists.camera.to_dict(),
+        "bounds": list(lists.bounds),
+        "depth_origin": lists.depth_origin,
+        "metadata": lists.metadata,
         **kept,
     }
     try:

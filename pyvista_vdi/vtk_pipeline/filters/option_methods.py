@@ -25,7 +25,7 @@ def _pair(told: Option) -> tuple[Callable[..., None], Callable[..., Any]]:
     def getter(self: Any) -> Any:
         return getattr(self.GetOptions(), name)
 
-    setter.__doc__ = f"Set `{name}`, as of :func:`pyvista_vdi.generate`: {told.what}.\n\n{told.more}"
+    setter.__doc__ = f"Set `{name}` of :func:`pyvista_vdi.generate`: {told.what}.\n\n{told.more}"
     getter.__doc__ = f"Return {told.what}."
     return setter, getter
 

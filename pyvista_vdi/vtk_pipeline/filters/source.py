@@ -30,7 +30,7 @@ from pyvista_vdi.model.options import (
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI, screen_metadata
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.dial import warn_missed
+from pyvista_vdi.quality.targets import generate_to_target, warn_missed
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     UPDATE_TIME_STEP,
     announce,
@@ -308,8 +308,6 @@ class VDISource(SourceSettings):
             return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
         if request.target is None:
             return generate_vdi(asked)
-        from pyvista_vdi.quality.probe import generate_to_target
-
         return generate_to_target(asked, request.target)
 
     def _make_request(

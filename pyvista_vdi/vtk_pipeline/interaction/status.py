@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.costs import RenderMode
-from pyvista_vdi.quality.dial import describe
+from pyvista_vdi.quality.targets import describe
 from pyvista_vdi.vtk_pipeline.vtk import vtkCornerAnnotation, weakly
 
 _log = logging.getLogger(__name__)
@@ -151,7 +151,8 @@ class CornerTexts:
 
     def write(self, renderer: Any, status: Callable[[], VDIStatus]) -> None:
         """Show the status in the frame that this renderer is drawing."""
-        self._texts = [text for text in self._texts if text[0]() is not None]
+        if self._texts:
+            self._texts = [text for text in self._texts if text[0]() is not None]
         for text, where, corner in self._texts:
             if where() is not renderer:
                 continue

@@ -1,7 +1,7 @@
 """A render window that shows VDIs: its frames, and what tells how good they are to be.
 
 The only place besides the driver that has a clock. What is chosen by the times of frames is in
-:mod:`pyvista_vdi.quality.pace`.
+:mod:`pyvista_vdi.quality.rate`.
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ class Window:
     def drivers(self) -> list[Any]:
         """Those of all VDIs in this window."""
         shown = [each.driver for volumes in self._shown for each in volumes()]
-        return list(dict.fromkeys(driver for driver in shown if driver is not None))
+        return [each for each in dict.fromkeys(shown) if each is not None]
 
     def listen(self, interactor: Any) -> None:
         """Make VDIs movable by the interactor styles that move actors.
@@ -340,9 +340,10 @@ class Window:
 
     def knows(self, camera: Any) -> bool:
         """Whether something was drawn with this camera before; from now on it was."""
+        for known in self._known:
+            if known() is camera:
+                return True
         there = [known for known in self._known if known() is not None]
-        if any(known() is camera for known in there):
-            return True
         self._known = [*there[1 - _KNOWN_CAMERAS :], weakly(camera)]
         return False
 

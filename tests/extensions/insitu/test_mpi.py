@@ -20,7 +20,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.extensions.insitu import InSitu
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.quality.probe import turned
+from pyvista_vdi.quality.targets import turned
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "insitu.py"
 PROGRAM = Path(__file__).parents[2] / "support" / "mpi_program.py"

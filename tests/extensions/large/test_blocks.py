@@ -22,7 +22,7 @@ from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import CRITERIA, Deferral
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.volume import Grid
-from pyvista_vdi.quality.probe import turned
+from pyvista_vdi.quality.targets import turned
 
 CUTS = [(16, 16, 16), (47, 9, 50), (20, 41, 13)]
 

@@ -194,16 +194,6 @@ def test_what_needs_colours_is_refused_by_name(alone, tmp_path):
     assert set(series._repr_mimebundle_()) == {"text/plain"}
 
 
-@pytest.mark.parametrize("wrong", [{"version": 2}, {"version": 1, "value_range": [1, 0]}])
-def test_what_is_said_of_values_is_checked(wrong, alone, tmp_path, monkeypatch):
-    series = pvdi.VDISeries(alone)
-    with monkeypatch.context() as patched:
-        patched.setattr(pvdi.DeferredVDI, "about", wrong)
-        path = series.save(tmp_path / "run.vdis")
-    with pytest.raises(VDIFileError, match="damaged|upgrade"):
-        pvdi.read(path)[0]
-
-
 def test_verbs_write_show_and_convert_it(saved, alone, tmp_path, capsys):
     for k, volume in enumerate(volumes()):
         np.save(tmp_path / f"step_{k}.npy", volume.array)

@@ -213,7 +213,7 @@ def test_progress_is_that_of_the_whole_series(volumes, camera, default_runtime):
         ({"times": (0, 1, 1, 2)}, "ascend"),
         ({"times": (0, 1, 2)}, "4 steps and 3 times"),
         ({"times": (0, 1, 2, float("inf"))}, "finite"),
-        ({"volumes": []}, "no step"),
+        ({"volumes": []}, "at least one"),
         ({"volumes": 3}, "iterable"),
         ({"volumes": lambda i: i}, "pass times"),
     ],

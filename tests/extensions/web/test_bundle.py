@@ -5,7 +5,7 @@ from importlib import resources
 
 import pytest
 
-from pyvista_vdi.extensions.web.bundle import OF_SERIES, OF_VALUES, SPAWN, bundled, viewer_script
+from pyvista_vdi.extensions.web.bundle import SPAWN, bundled, viewer_script
 
 MODULES = {
     "a.js": 'import { b, B } from "./b.js";\nimport {\n  waysToSpawn,\n} from "./spawn.js";\n'
@@ -45,18 +45,10 @@ def test_modules_that_cannot_be_bundled_are_refused(text):
 
 def test_every_module_of_the_viewer_can_be_bundled():
     folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
-    sources = {
-        entry.name: entry.read_text(encoding="utf-8")
-        for entry in folder.iterdir()
-        if entry.name.endswith(".js")
-    }
-    assert sources.keys() >= {*OF_SERIES, *OF_VALUES}
+    modules = [entry for entry in folder.iterdir() if entry.name.endswith(".js")]
+    sources = {entry.name: entry.read_text(encoding="utf-8") for entry in modules}
     for name in sources.keys() - {SPAWN}:
         bundled(sources, [name])
-
-
-def test_what_plays_series_and_edits_values_is_left_out_of_pages_without_them():
-    assert "transferEditor = null" in viewer_script()
-    assert "transferEditor = null" not in viewer_script(values=True)
-    assert "class Player" not in viewer_script()
-    assert "class Player" in viewer_script(series=True)
+    # With its controls and its editor, as text
+    assert len(viewer_script()) <= 150_000
+    assert len(viewer_script("scene.js", "remote.js")) <= 175_000

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from browsers import HELPERS, array_of
 from PIL import Image
-from web_client import soft_ball
+from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
@@ -72,7 +72,7 @@ SET, SET_PLOTTER = 2, 6  # that set one
 @pytest.fixture(scope="module")
 def vdi():
     camera = pvdi.Camera((3, 2, 5), (0, 0, 0), (0, 1, 0))
-    return pvdi.generate(soft_ball(), camera, SIZE, cmap="viridis", opacity=[0, 0.1, 0.4, 0.9])
+    return pvdi.generate(soft_volume(), camera, SIZE, cmap="viridis", opacity=[0, 0.1, 0.4, 0.9])
 
 
 @pytest.fixture

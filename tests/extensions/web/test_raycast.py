@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import strategies
 from browsers import COUNTING, array_of, file_of, in_base64
-from fewer_lists import lists_crossed, subsampled_lists
 from oracle import explain
 from real_data import require_data
 

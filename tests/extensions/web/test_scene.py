@@ -13,7 +13,6 @@ from skimage.metrics import structural_similarity
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning
-from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.scene import scene_of
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
@@ -343,8 +342,3 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
         "its place in other views than the first (CubeAxesActor)",
     ):
         assert what in words
-
-
-def test_the_viewer_is_small():
-    assert len(viewer_script(values=True).encode()) <= 150_000
-    assert len(viewer_script(scene=True, series=True, remote=True, values=True).encode()) <= 190_000

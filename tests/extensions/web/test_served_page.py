@@ -6,7 +6,7 @@ import urllib.request
 import numpy as np
 import pytest
 from browsers import assert_axe_finds_nothing, picture
-from web_client import soft_ball
+from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.extensions import web
@@ -19,7 +19,7 @@ def checkered(ball):
     return pvdi.Volume(values, ball.spacing, ball.origin)
 
 
-BALL = checkered(soft_ball(16))
+BALL = checkered(soft_volume(16))
 LOOK = {"clim": (0, 255), "opacity": "linear", "cmap": "bone"}
 SIZE = (240, 180)
 #: The viewer is not as high as the pictures that are compared, so that pixels and lists do not

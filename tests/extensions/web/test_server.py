@@ -2,26 +2,26 @@
 
 import asyncio
 import contextlib
-import inspect
+import io
 import json
 import math
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
-import time
 import urllib.request
 from pathlib import Path
 
 import aiohttp
 import numpy as np
 import pytest
+from aiohttp.test_utils import TestClient, TestServer
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from slow_line import SlowLine
-from web_client import PATIENCE, WebClient, soft_ball
+from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
@@ -29,118 +29,148 @@ from pyvista_vdi.extensions import web
 from pyvista_vdi.extensions.web import messages
 from pyvista_vdi.extensions.web.server import Server
 from pyvista_vdi.extensions.web.source import Source
+from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
 
+#: Seconds for whatever must happen: far more than it takes, also beside other tests.
+PATIENCE = 120
 SIZE = (160, 120)
-HIGH, LOW = soft_ball(), soft_ball(scale=0.5)
+HIGH, LOW = soft_volume(), soft_volume(scale=0.5)
 CAMERA = filling_camera(HIGH.bounds, SIZE)
 LOOK = {"clim": (0, 255), "opacity": "linear", "cmap": "bone"}
 #: What a server makes of a view.
 MADE = {"precision": "8-byte", "max_supersegments": 8}
+#: Bytes that the system holds of what a server has sent; with its own choice, megabytes, a client
+#: that takes nothing would have been sent everything.
+HELD = 1 << 14
 
 
-def serve(volumes, **how):
-    return web.serve(volumes, port=0, wait=False, announce=None, **how)
+def source_of(*volumes, **look):
+    options = GenerationOptions(max_supersegments=8, precision="8-byte")
+    return Source(volumes, Classification.composited(look, "serve"), options, lists=1280 * 720)
 
 
 @pytest.fixture(scope="module")
-def server(default_runtime):
-    with serve([HIGH, LOW], **LOOK) as serving:
-        yield serving
+def source(default_runtime):
+    return source_of(HIGH, LOW, **LOOK)
 
 
-@pytest.fixture
-def own_server(default_runtime):
-    """Return ``make(**options)``: a server with other limits."""
-    with contextlib.ExitStack() as stack:
+class Client:
+    """A connection to a server, that is no browser."""
 
-        def make(**options):
-            looks = Classification.composited(LOOK, "serve")
-            source = Source([HIGH], looks, GenerationOptions(precision="8-byte"), lists=10**6)
-            return stack.enter_context(Server(source, port=0, **options).start())
+    def __init__(self, socket):
+        self.socket, self.said = socket, []
 
-        yield make
+    async def say(self, kind, **entries):
+        await self.socket.send_json({"type": kind, **entries})
 
+    async def look_from(self, camera, size=SIZE):
+        names = ("position", "focal_point", "view_up", "view_angle")
+        await self.say("view", camera={name: getattr(camera, name) for name in names}, size=size)
 
-def by_clients(story):
-    """Make a test of what one or two clients of the server say and are told."""
-    number = len(inspect.signature(story).parameters)
+    async def hear(self, kind):
+        """Return the next message of a kind."""
+        while True:
+            message = await self.socket.receive(PATIENCE)
+            if message.type is aiohttp.WSMsgType.TEXT:
+                self.said.append(json.loads(message.data))
+                if self.said[-1]["type"] == kind:
+                    return self.said[-1]
+            else:  # of a VDI that nobody asks for
+                assert message.type is aiohttp.WSMsgType.BINARY, message
 
-    def test(server, tmp_path):
-        async def told():
-            async with contextlib.AsyncExitStack() as stack:
-                clients = [WebClient(server, tmp_path) for _ in range(number)]
-                await story(*[await stack.enter_async_context(client) for client in clients])
+    async def vdi(self):
+        """Return the next VDI, as it is read from its file."""
+        size, file = (await self.hear("vdi"))["bytes"], b""
+        while len(file) < size:
+            file += await self.socket.receive_bytes(timeout=PATIENCE)
+        return reader.read("a.vdi", stream=io.BytesIO(file))
 
-        asyncio.run(told())
+    async def idle(self):
+        """Wait until the server has done something for this client, and has nothing more to do."""
+        while (await self.hear("status"))["doing"] is None:
+            pass
+        while (await self.hear("status"))["doing"] is not None:
+            pass
 
-    test.__name__, test.__doc__ = story.__name__, story.__doc__
-    return test
+    async def end(self):
+        """Return the code by which the server ends the connection."""
+        while not self.socket.closed:
+            await self.socket.receive(PATIENCE)
+        return self.socket.close_code
 
-
-def by_a_client(server, folder, story, **how):
-    """Return what a client of a server of its own is told."""
-
-    async def told():
-        async with WebClient(server, folder, **how) as client:
-            return await story(client)
-
-    return asyncio.run(asyncio.wait_for(told(), PATIENCE))
-
-
-def hello_of(server, folder, **how):
-    async def hello(client):
-        return client.hello
-
-    return by_a_client(server, folder, hello, **how)
-
-
-def ssim(vdi, volume, **look):
-    truth = pvdi.render_volume(volume, CAMERA, SIZE, **{**LOOK, **look})
-    return pvdi.compare_images(pvdi.render(vdi, CAMERA, SIZE), truth).ssim
+    @property
+    def vdis(self):
+        return sum(message["type"] == "vdi" for message in self.said)
 
 
-def vdis(said):
-    return [message for message in said if message["type"] == "vdi"]
+def told(story, source, *, clients=1, **options):
+    """Return what a story tells of a server, of what opens it more connections, and of clients."""
+    server = Server(source, token="t", **options)
+
+    def bound(host, port, family):
+        made = socket.socket(family)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, HELD)
+        made.bind((host, port))
+        return made
+
+    async def run():
+        tested = TestServer(server.application(), socket_factory=bound)
+        many = aiohttp.TCPConnector(limit=0)
+        async with TestClient(tested, connector=many) as http:
+
+            async def connect(**how):
+                client = Client(await http.ws_connect("/socket?token=t", max_msg_size=0, **how))
+                client.hello = await client.hear("hello")
+                return client
+
+            server.ask = http.get
+            return await story(server, connect, *[await connect() for _ in range(clients)])
+
+    try:
+        return asyncio.run(asyncio.wait_for(run(), PATIENCE))
+    finally:
+        server.close()
 
 
-@by_clients
-async def test_a_view_gets_a_vdi_of_its_own(client):
-    await client.look_from(CAMERA, SIZE)
-    vdi = await client.vdi()
-    assert ssim(vdi, HIGH) > 0.99
-    assert vdi.precision == "8-byte"
-    assert vdi.metadata == {}
-    await client.look_from(CAMERA.azimuth(40), SIZE)
-    assert (await client.vdi()).camera.position == CAMERA.azimuth(40).position
+def by_clients(number, **options):
+    """Make a test of what clients of a server say and are told."""
+
+    def made(story):
+        def test(source):
+            told(lambda *given: story(*given[2:]), source, clients=number, **options)
+
+        test.__name__, test.__doc__ = story.__name__, story.__doc__
+        return test
+
+    return made
 
 
-@by_clients
-async def test_only_lists_in_view_are_sent(client):
+@by_clients(1)
+async def test_a_view_gets_a_vdi_of_its_own_with_the_lists_in_view(client):
     near = CAMERA.replace(view_angle=8, focal_point=(0.5, 0, 0.2))
-    await client.look_from(near, SIZE)
+    await client.look_from(near)
     vdi = await client.vdi()
-    await client.message("status")
-    await client.look_from(CAMERA.replace(focal_point=(9, 0, 0)), SIZE)
-    await client.idle()
-    assert vdi.window_size == SIZE
     whole = pvdi.generate(HIGH, near, SIZE, **MADE, **LOOK)
     assert np.array_equal(pvdi.render(vdi, near, SIZE), pvdi.render(whole, near, SIZE))
-    assert client.messages[-1] == {"type": "status", "doing": None}
-    assert len(vdis(client.messages)) == 1  # nothing is in view: nothing was sent
+    assert (vdi.precision, vdi.metadata, vdi.window_size) == ("8-byte", {}, SIZE)
+    await client.hear("status")
+    await client.look_from(CAMERA.replace(focal_point=(9, 0, 0)))
+    await client.idle()
+    assert client.said[-1] == {"type": "status", "doing": None}
+    assert client.vdis == 1  # nothing is in view: nothing was sent
 
 
-@by_clients
+@by_clients(1)
 async def test_transfer_function_and_time_are_changed_by_messages(client):
     assert client.hello["steps"] == 2
     assert client.hello["look"] == {"cmap": "bone", "opacity": "linear"}
-    await client.look_from(CAMERA, SIZE)
+    await client.look_from(CAMERA)
     await client.vdi()
     look = {"cmap": "hot", "opacity": [0, 0.2, 1], "clim": [0, 200]}
-    wishes = (("look", look, HIGH), ("time", {"step": 1}, LOW))
-    for kind, wish, volume in wishes:
+    for kind, wish, volume in (("look", look, HIGH), ("time", {"step": 1}, LOW)):
         await client.say(kind, **wish)
         vdi = await client.vdi()
         whole = pvdi.generate(volume, CAMERA, SIZE, **MADE, **look)
@@ -148,72 +178,79 @@ async def test_transfer_function_and_time_are_changed_by_messages(client):
         assert pvdi.compare_images(*pictures).ssim > 0.999  # the same rays but for rounding
 
 
-@by_clients
+@by_clients(1)
 async def test_of_wishes_that_follow_each_other_fast_the_last_one_counts(client):
     last = CAMERA.azimuth(200)
     for angle in range(0, 200, 2):
-        await client.look_from(CAMERA.azimuth(angle), SIZE)
+        await client.look_from(CAMERA.azimuth(angle))
         await client.say("look", clim=[0, 200 + angle % 7])
-    await client.look_from(last, SIZE)
+    await client.look_from(last)
     while (await client.vdi()).camera.position != last.position:
         pass
-    assert len(vdis(client.messages)) < 100  # what is out of date is not made, nor kept to be sent
+    assert client.vdis < 100  # what is out of date is not made, nor kept to be sent
 
 
-@by_clients
-async def test_errors_of_the_engine_are_said_to_the_client(client):
-    """After what is done, also where a status waits since before: a page shows the last."""
+class Failing:
+    """A source that fails at first, and then takes its time."""
 
-    def fails(*_):
-        raise pvdi.DeviceMemoryError("too little")
+    def __init__(self, source):
+        self.offer, self._source = source.offer, source
+        self.asked, self.given_up = threading.Event(), threading.Event()
+        self.fails = True
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Source, "make", fails)
-        await client.look_from(CAMERA, SIZE)
-        assert (await client.message("error"))["message"] == "too little"
-    assert client.messages[-2] == {"type": "status", "doing": None}
-    await client.look_from(CAMERA.azimuth(1), SIZE)
-    await client.vdi()
+    def make(self, wish, cancelled):
+        if self.fails:
+            self.fails = False
+            raise pvdi.DeviceMemoryError("too little")
+        self.asked.set()
+        while not cancelled():
+            self.given_up.wait(0.01)
+        self.given_up.set()
+        return self._source.make(wish, cancelled)
 
 
-@by_clients
+def test_errors_are_said_and_what_is_made_for_who_has_left_is_given_up(source):
+    """An error is said after what is done: a page shows the last."""
+    failing = Failing(source)
+
+    async def story(server, _connect, client):
+        await client.look_from(CAMERA)
+        assert (await client.hear("error"))["message"] == "too little"
+        assert client.said[-2] == {"type": "status", "doing": None}
+        await client.look_from(CAMERA.azimuth(1))
+        assert await asyncio.to_thread(failing.asked.wait, PATIENCE)
+        await client.socket.close()
+        assert await asyncio.to_thread(failing.given_up.wait, PATIENCE)
+        while server.clients:
+            await asyncio.sleep(0.01)
+
+    told(story, failing)
+
+
+@by_clients(2)
 async def test_a_busy_client_does_not_keep_another_waiting(busy, quiet):
-    await busy.look_from(CAMERA, SIZE)
-    await quiet.look_from(CAMERA, SIZE)
-    waiting = asyncio.ensure_future(quiet.vdi())
-    sent = 0
+    await busy.look_from(CAMERA)
+    await quiet.look_from(CAMERA)
+    waiting, sent = asyncio.ensure_future(quiet.vdi()), 0
     while not waiting.done():
         await busy.say("look", clim=[0, 200 + sent % 2])
-        await busy.file()
+        await busy.vdi()
         sent += 1
     assert sent <= 4  # two threads take clients in turn
 
 
-@pytest.mark.slow
-def test_a_slow_client_is_sent_fewer_vdis_and_no_queue(server, tmp_path):
-    async def story():
-        line = SlowLine(server.port, rate=1e6, latency=0.05)
-        async with line, WebClient(server, tmp_path, port=line.port) as client:
-            await client.look_from(CAMERA, (480, 360))
-            await client.message("vdi")
-            for angle in range(1, 30):  # while the first is on its way
-                await client.look_from(CAMERA.azimuth(angle), (480, 360))
-            while (await client.vdi()).camera.position != CAMERA.azimuth(29).position:
-                pass
-            return len(vdis(client.messages))
-
-    # The first, the one that was made when the first had been sent, and the last
-    assert asyncio.run(asyncio.wait_for(story(), PATIENCE)) <= 3
-
-
-async def status_of(server, path, query, headers):
-    url = f"http://127.0.0.1:{server.port}{path}"
-    params = {"token": server.token} if query is None else query
-    async with (
-        aiohttp.ClientSession() as session,
-        session.get(url, params=params, headers=headers) as response,
-    ):
-        return response.status
+@by_clients(1)
+async def test_a_slow_client_is_sent_fewer_vdis_and_no_queue(client):
+    """The first, the one that was made when the first had been sent, and the last."""
+    size = (480, 360)
+    await client.look_from(CAMERA, size)
+    await client.hear("vdi")
+    for angle in range(1, 20):  # while the first is on its way
+        await client.look_from(CAMERA.azimuth(angle), size)
+        await asyncio.sleep(0.02)
+    while (await client.vdi()).camera.position != CAMERA.azimuth(19).position:
+        pass
+    assert client.vdis <= 3
 
 
 QUERIES = [{}, {"token": ""}, {"token": "x"}, {"token": "ü"}]
@@ -226,31 +263,38 @@ NO_SOCKETS = [{}, {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSock
 ORIGINS = ["http://evil.example", "null", "http://127.0.0.1:1", "http://["]
 
 
-@pytest.mark.parametrize(
-    ("path", "query", "headers", "statuses"),
-    [
+def test_who_is_let_in(source):
+    """Who knows the token, by a name of ours, from no page of others; and to no file."""
+    asked = [
         *((path, query, {}, {403}) for path in ("/", "/socket", "/nothing") for query in QUERIES),
         *((path, None, {}, {404}) for path in FILES),
         *(("/", None, {"Host": host}, {400, 403}) for host in HOSTS),
         *(("/nothing", None, {"Host": host}, {404}) for host in OUR_HOSTS),
         *(("/socket", None, {"Origin": origin}, {403}) for origin in ORIGINS),
         *(("/socket", None, headers, {426}) for headers in NO_SOCKETS),
-    ],
-)
-def test_who_is_let_in(path, query, headers, statuses, default_runtime, own_server):
-    """Who knows the token, by a name of ours, from no page of others; and to no file."""
-    server = own_server(hosts=["MyBox"])
-    assert asyncio.run(status_of(server, path, query, headers)) in statuses
+    ]
+
+    async def story(server, _connect):
+        for path, query, headers, statuses in asked:
+            params = {"token": "t"} if query is None else query
+            async with server.ask(path, params=params, headers=headers) as response:
+                assert response.status in statuses, (path, query, headers)
+
+    told(story, source, clients=0, hosts=["MyBox"])
 
 
-def test_any_text_is_a_token_but_none_and_our_page_can_connect(own_server, tmp_path):
-    server = own_server(token="a+b c&d=é#")
-    with urllib.request.urlopen(server.url) as response:
-        assert response.status == 200
-    headers = {"Origin": f"http://127.0.0.1:{server.port}"}
-    assert hello_of(server, tmp_path, headers=headers)["protocol"] == 2
+def test_any_text_is_a_token_but_none_and_our_page_can_connect(source):
+    with Server(source, port=0, token="a+b c&d=é#").start() as server:
+        headers = {"Origin": f"http://127.0.0.1:{server.port}"}
+        with urllib.request.urlopen(urllib.request.Request(server.url, headers=headers)) as page:
+            assert page.status == 200
+        why = rf"port {server.port} .* is in use: choose another"
+        with pytest.raises(InvalidArgumentError, match=why):
+            Server(source, port=server.port).start()
+    with pytest.raises(InvalidArgumentError, match=r"cannot listen at 203\.0\.113\.1"):
+        Server(source, host="203.0.113.1", port=0).start()
     with pytest.raises(InvalidArgumentError, match="token is empty"):
-        own_server(token="")
+        Server(source, token="")
 
 
 EYE = {"position": [0, -5, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1]}
@@ -281,19 +325,18 @@ BAD = [
 ]
 
 
-def test_a_bad_message_ends_its_client_and_nothing_else(server, tmp_path):
-    async def story(good):
+def test_a_bad_message_ends_its_client_and_nothing_else(source):
+    async def story(_server, connect, good):
         codes = []
         for text in [*BAD, b"binary", "x" * 100_000]:
-            async with WebClient(server, tmp_path) as bad:
-                socket = bad.socket
-                await (socket.send_bytes if isinstance(text, bytes) else socket.send_str)(text)
-                codes.append(await bad.end())
-        await good.look_from(CAMERA, SIZE)
+            bad = await connect()
+            await (bad.socket.send_bytes if isinstance(text, bytes) else bad.socket.send_str)(text)
+            codes.append(await bad.end())
+        await good.look_from(CAMERA)
         await good.vdi()
         return codes
 
-    *codes, huge = by_a_client(server, tmp_path, story)
+    *codes, huge = told(story, source)
     assert codes == [1008] * (len(BAD) + 1)
     assert huge == 1009
 
@@ -330,127 +373,90 @@ EXTREMES = [
 ]
 
 
-@by_clients
+@by_clients(2)
 async def test_extreme_views_harm_nobody(client, other):
     for eye in EXTREMES:
         await client.say("view", camera={**EYE, **eye}, size=[12, 8192])
         await client.idle()
-    await other.look_from(CAMERA, SIZE)
+    await other.look_from(CAMERA)
     assert (await other.vdi()).n_supersegments > 0
 
 
-@pytest.mark.slow
-def test_a_client_that_stops_reading_is_dropped(own_server, tmp_path):
-    server = own_server(heartbeat=0.5)
-
-    async def story():
-        # All but: a chunk of a VDI would take it half a minute
-        line = SlowLine(server.port, rate=2000, latency=0)
-        async with line, WebClient(server, tmp_path, port=line.port) as deaf:
-            await deaf.look_from(CAMERA, (640, 480))
-            while server.clients:
-                await asyncio.sleep(0.01)
-        async with WebClient(server, tmp_path) as client:
-            await client.look_from(CAMERA, SIZE)
-            return await client.vdi()
-
-    assert asyncio.run(asyncio.wait_for(story(), PATIENCE)).n_supersegments > 0
-
-
-def test_what_is_made_for_a_client_that_has_left_is_given_up(own_server, tmp_path, monkeypatch):
-    server, make = own_server(), Source.make
-    making, ended = threading.Event(), []
-
-    def slowly(source, wish, cancelled):
-        making.set()
-        while not cancelled():
-            time.sleep(0.01)
-        ended.append(wish)
-        return make(source, wish, cancelled)
-
-    async def leave(client):
-        await client.look_from(CAMERA, SIZE)
-        assert await asyncio.to_thread(making.wait, PATIENCE)
-
-    async def given_up():
-        while server.clients or not ended:
+def test_a_client_that_takes_nothing_is_dropped(source):
+    async def story(server, connect, deaf):
+        await deaf.look_from(CAMERA, (480, 360))
+        while server.clients:
             await asyncio.sleep(0.01)
+        client = await connect()
+        await client.look_from(CAMERA)
+        return await client.vdi()
 
-    monkeypatch.setattr(Source, "make", slowly)
-    by_a_client(server, tmp_path, leave)
-    asyncio.run(asyncio.wait_for(given_up(), PATIENCE))
-
-
-@pytest.mark.slow
-def test_two_hundred_clients_at_once(own_server, tmp_path):
-    server = own_server(max_clients=200)
-
-    async def story():
-        async with contextlib.AsyncExitStack() as stack:
-            clients = [WebClient(server, tmp_path) for _ in range(200)]
-            for client in clients:
-                await stack.enter_async_context(client)
-            with pytest.raises(aiohttp.WSServerHandshakeError, match="503"):
-                await WebClient(server, tmp_path).__aenter__()
-            await asyncio.gather(
-                *(c.look_from(CAMERA.azimuth(k), (32, 24)) for k, c in enumerate(clients))
-            )
-            return await asyncio.gather(*(c.file() for c in clients))
-
-    assert all(head["bytes"] == len(file) for head, file in asyncio.run(story()))
+    assert told(story, source, heartbeat=0.3).n_supersegments > 0
 
 
-def test_where_nobody_can_listen_is_a_sentence(server):
-    for host, port, why in (
-        ("127.0.0.1", server.port, rf"port {server.port} .* is in use: choose an"),
-        ("203.0.113.1", 0, r"cannot listen at 203\.0\.113\.1"),
-    ):
-        with pytest.raises(InvalidArgumentError, match=why):
-            web.serve(HIGH, host=host, port=port, wait=False, **LOOK)
+def test_of_256_clients_some_are_killed_and_the_others_lose_nothing(source):
+    """The next one is told that there is no place, until there is."""
+
+    async def story(server, connect, *clients):
+        with pytest.raises(aiohttp.WSServerHandshakeError, match="503"):
+            await connect()
+        killed, others = clients[:-8], clients[-8:]
+        for k, client in enumerate(others):
+            await client.look_from(CAMERA.azimuth(k), (32, 24))
+        for client in killed:
+            await client.look_from(CAMERA, (640, 480))
+            client.socket.get_extra_info("socket").shutdown(socket.SHUT_RDWR)
+        views = [
+            (await client.vdi()).camera.azimuth(-k).position for k, client in enumerate(others)
+        ]
+        np.testing.assert_allclose(views, [CAMERA.position] * 8, atol=1e-12)
+        while len(server.clients) > len(others):
+            await asyncio.sleep(0.01)
+        await connect()
+
+    told(story, source, clients=256)
 
 
-def test_closing_tells_the_clients(own_server, tmp_path):
-    server = own_server()
+def test_closing_tells_the_clients(source):
+    with Server(source, port=0).start() as server:
 
-    async def story(client):
-        await client.look_from(CAMERA, (640, 480))
-        closing = asyncio.get_running_loop().run_in_executor(None, server.close)
-        code = await client.end()
-        await closing
-        return code
+        async def story():
+            async with aiohttp.ClientSession() as session:
+                url = server.url.replace("/?", "/socket?")
+                client = Client(await session.ws_connect(url, max_msg_size=0))
+                await client.look_from(CAMERA, (640, 480))
+                await client.hear("status")
+                closing = asyncio.ensure_future(asyncio.to_thread(server.close))
+                code = await client.end()
+                await closing
+                return code
 
-    assert by_a_client(server, tmp_path, story) == 1001
+        assert asyncio.run(asyncio.wait_for(story(), PATIENCE)) == 1001
 
 
-def test_a_fixed_look_offers_no_other(default_runtime, tmp_path):
-    async def story(client):
-        await client.say("look", cmap="bone")
-        return client.hello, await client.end()
-
+def test_a_fixed_look_offers_no_other_and_a_range_is_the_one_in_effect(default_runtime):
     table = pvdi.TransferFunction([(0, 0, 0.2), (1, 0.5, 0)], [0, 0.5], (0, 255))
-    with serve(HIGH, transfer_function=table) as server:
-        hello, code = by_a_client(server, tmp_path, story)
-    assert hello["cmaps"] == hello["opacities"] == []
-    assert code == 1008
+    offer = source_of(HIGH, transfer_function=table).offer
+    assert offer["cmaps"] == offer["opacities"] == []
+    with pytest.raises(messages.BadMessageError, match="the look is fixed"):
+        messages.wish_after('{"type": "look", "cmap": "bone"}', messages.Wish(), offer)
+    assert source_of(HIGH, cmap="bone").offer["range"] == list(HIGH.finite_range())
+    assert source_of(HIGH, cmap="bone", clim=(10, 90)).offer["range"] == [10, 90]
 
 
-@pytest.mark.parametrize(("look", "shown"), [({}, None), ({"clim": (10, 90)}, [10, 90])])
-def test_pages_show_the_range_that_is_in_effect(look, shown, default_runtime, tmp_path):
-    with serve(HIGH, cmap="bone", **look) as server:
-        found = hello_of(server, tmp_path)["range"]
-    assert found == (list(HIGH.finite_range()) if shown is None else shown)
-
-
-def test_steps_are_any_object_with_a_length_and_items(default_runtime, tmp_path):
+def test_steps_are_any_object_with_a_length_and_items(default_runtime):
     class Steps:
         def __len__(self):
-            return 2
+            return 3
 
         def __getitem__(self, step):
-            return [HIGH, LOW][step]
+            return HIGH
 
-    with serve(Steps(), **LOOK) as server:
-        assert hello_of(server, tmp_path)["steps"] == 2
+    said = []
+    with web.serve(Steps(), port=0, wait=False, announce=said.append, **LOOK) as server:
+        assert said == [f"Serving at {server.url} (Ctrl-C ends it)"]
+        with urllib.request.urlopen(server.url) as page:
+            assert b"<vdi-viewer" in page.read()
 
 
 def test_the_command_serves_until_ctrl_c(tmp_path, default_runtime):

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from browsers import picture
-from web_client import soft_ball
+from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -16,7 +16,7 @@ trame_app = pytest.importorskip("trame.app")
 layouts = pytest.importorskip("trame.ui.html")
 VDIView = pytest.importorskip("pyvista_vdi.extensions.web.trame").VDIView
 
-BALL = soft_ball()
+BALL = soft_volume()
 SIZE = (240, 180)
 CAMERA = filling_camera(BALL.bounds, SIZE)
 LOOK = {"clim": (0, 255), "opacity": "linear"}

@@ -1,82 +1,70 @@
-"""The properties that the plugin's filters and readers have in common, in ParaView's XML."""
+"""The properties of the plugin's filters, readers and writer, in ParaView's XML."""
 
 from __future__ import annotations
 
-from pyvista_vdi.model.options import MAX_SUPERSEGMENTS, Deferral, GenerationOptions, declared
+import math
+import re
+
+from pyvista_vdi.model.checks import Number
+from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
 
 #: Value of the property View that means the camera properties.
 CAMERA = 1
 
-#: Camera properties of our filters and of ParaView's render views alike: kind, default, domain.
-CAMERA_PROPERTIES = {
-    "CameraPosition": ("Double", "0 0 1", ""),
-    "CameraFocalPoint": ("Double", "0 0 0", ""),
-    "CameraViewUp": ("Double", "0 1 0", ""),
-    "CameraViewAngle": ("Double", "30", ""),
-    "CameraParallelProjection": ("Int", "0", '<BooleanDomain name="bool" />'),
-    "CameraParallelScale": ("Double", "1", ""),
-}
-
-_WITH_CAMERA = """<Hints><PropertyWidgetDecorator type="GenericDecorator" mode="visibility"
-                         property="View" value="1" /></Hints>"""
-
-_CAMERA_XML = "".join(
-    f"""
-<{kind}VectorProperty name="{name}" command="Set{name}" number_of_elements="{len(default.split())}"
-                      default_values="{default}">{domain}{_WITH_CAMERA}</{kind}VectorProperty>"""
-    for name, (kind, default, domain) in CAMERA_PROPERTIES.items()
-)
-
-#: What decides a view: our two filters have it in common. {default} is what View = 0 means, {size}
-#: the default window.
-VIEW_XML = f"""
-<IntVectorProperty name="WindowSize" command="SetSize" number_of_elements="2"
-                   default_values="{{size}}">
-  <IntRangeDomain name="range" min="{{least}} {{least}}" />
-  <Documentation>Width and height in pixels. {{note}}</Documentation>
-</IntVectorProperty>
-<IntVectorProperty name="View" command="SetView" number_of_elements="1" default_values="0">
-  <EnumerationDomain name="enum">
-    <Entry value="0" text="{{default}}" /><Entry value="{CAMERA}" text="Camera" />
-  </EnumerationDomain>
-  <Documentation>Where the eye is before it is turned.</Documentation>
-</IntVectorProperty>
-{_CAMERA_XML}
-<DoubleVectorProperty name="Azimuth" command="SetAzimuth" number_of_elements="1"
-                      default_values="0">
-  <DoubleRangeDomain name="range" min="-180" max="180" />
-  <Documentation>Turns the view about its up direction through the focal point,
-  degrees.</Documentation>
-</DoubleVectorProperty>
-<DoubleVectorProperty name="Elevation" command="SetElevation" number_of_elements="1"
-                      default_values="0">
-  <DoubleRangeDomain name="range" min="-90" max="90" />
-  <Documentation>Lifts the view after turning it, degrees.</Documentation>
-</DoubleVectorProperty>
-<Property name="TakeActiveView" label="Take the active view" command="TakeActiveView"
-          panel_widget="command_button">
-  <Documentation>Copy the active render view's camera and size into these properties. Client and
-  server must be one process.</Documentation>
-</Property>
-"""
-
-DEVICE_XML = """
-<StringVectorProperty name="Device" command="SetDeviceName" number_of_elements="1"
-                      default_values="" panel_visibility="advanced">
-  <Documentation>OpenCL device; empty: the best one. `pyvista-vdi devices` lists
-  them.</Documentation>
-</StringVectorProperty>
-"""
-
-_REFLECTION_XML = "".join(
-    f"""
-<DoubleVectorProperty name="{name}" command="Set{name}" number_of_elements="1"
-                      default_values="{default}" panel_visibility="advanced" />"""
-    for name, default in (("Ambient", 0), ("Diffuse", 1), ("Specular", 0), ("SpecularPower", 1))
-)
-
-#: What is declared of the options of ``generate``.
 _DECLARED = declared(GenerationOptions, Deferral)
+
+
+def properties(lines: str) -> str:
+    """Return the XML of properties that are written a line each, with two spaces between columns.
+
+    These are a name, the kind and the defaults of its values, a domain, and the documentation. A
+    name may have a setter of another name behind ``:``; behind ``@`` another property, which must
+    be 1 for this one to be seen; and ``!`` at its end, if it is an advanced one. A domain is
+    ``bool``, numbers ``0..1``, numbered texts ``(a|b)``, or texts ``[a|b]``; ``-`` is none. Lines
+    of XML stay as they are.
+    """
+    rows = lines.strip().splitlines()
+    return "\n".join(
+        row if row.startswith("<") else _property(*re.split(" {2,}", row, maxsplit=3))
+        for row in rows
+    )
+
+
+def _property(name: str, values: str, domain: str, text: str = "") -> str:
+    panel = ' panel_visibility="advanced"' if name.endswith("!") else ""
+    name, _, seen = name.removesuffix("!").partition("@")
+    name, _, command = name.partition(":")
+    kind, _, defaults = values.partition(" ")
+    count, texts = len(defaults.split()) or 1, domain[1:-1].split("|")
+    low, _, high = domain.partition("..")
+    inside = {"bool": '<BooleanDomain name="bool" />', "-": ""}.get(domain)
+    if domain.startswith("("):
+        entries = (f'<Entry value="{i}" text="{each}" />' for i, each in enumerate(texts))
+        inside = f'<EnumerationDomain name="enum">{"".join(entries)}</EnumerationDomain>'
+    elif domain.startswith("["):
+        listed = "".join(f'<String value="{each}" />' for each in texts)
+        inside = f'<StringListDomain name="list">{listed}</StringListDomain>'
+    elif inside is None:
+        ends = f'min="{" ".join([low] * count)}"' + (f' max="{high}"' if high else "")
+        inside = f'<{kind}RangeDomain name="range" {ends} />'
+    inside += f"<Documentation>{text}</Documentation>" if text else ""
+    inside += _visible_where(seen) if seen else ""
+    return (
+        f'<{kind}VectorProperty name="{name}" command="{command or f"Set{name}"}" '
+        f'number_of_elements="{count}" default_values="{defaults}"{panel}>{inside}'
+        f"</{kind}VectorProperty>"
+    )
+
+
+def _visible_where(name: str) -> str:
+    decorator = f'type="GenericDecorator" mode="visibility" property="{name}" value="1"'
+    return f"<Hints><PropertyWidgetDecorator {decorator} /></Hints>"
+
+
+def _button(name: str, label: str, text: str) -> str:
+    told = f'name="{name}" label="{label}" command="{name}" panel_widget="command_button"'
+    text += " Client and server must be one process."
+    return f"<Property {told}><Documentation>{text}</Documentation></Property>"
 
 
 def _sentence(option: str, more: str = "") -> str:
@@ -84,112 +72,107 @@ def _sentence(option: str, more: str = "") -> str:
     return f"{what[0].upper()}{what[1:]}{more}."
 
 
-def _number(option: str, name: str, bounds: str, more: str = "") -> str:
-    """Return the property of an option that is a number; 0 stands for ``None``."""
-    default = _DECLARED[option].default
+def _number(option: str, more: str = "") -> str:
+    """Return the columns of an option that is a number; 0 stands for ``None``."""
+    default, check = _DECLARED[option].default, _DECLARED[option].check
+    ends = "0.."
+    if isinstance(check, Number) and math.isfinite(check.high):
+        ends = f"{check.low:g}..{check.high:g}"
     kind = "Int" if isinstance(default, int) else "Double"
-    panel = "default" if option == "max_supersegments" else "advanced"
-    return f"""
-<{kind}VectorProperty name="{name}" command="Set{_COMMANDS.get(name, name)}" number_of_elements="1"
-                      default_values="{default or 0:g}" panel_visibility="{panel}">
-  <{kind}RangeDomain name="range" {bounds} />
-  <Documentation>{_sentence(option, more)}</Documentation>
-</{kind}VectorProperty>"""
+    return f"{kind} {default or 0:g}  {ends}  {_sentence(option, more)}"
 
 
-#: Setters that take 0 for the default.
-_COMMANDS = {"SampleDistance": "Step"}
+#: Camera properties of our filters and of ParaView's render views alike.
+_CAMERA = """
+CameraPosition@View            Double 0 0 1  -
+CameraFocalPoint@View          Double 0 0 0  -
+CameraViewUp@View              Double 0 1 0  -
+CameraViewAngle@View           Double 30     -
+CameraParallelProjection@View  Int 0         bool
+CameraParallelScale@View       Double 1      -
+"""
+CAMERA_PROPERTIES = re.findall("Camera[A-Z][a-zA-Z]+", _CAMERA)
+
+
+def view_xml(default: str, size: str, least: int, note: str = "") -> str:
+    """Return the properties of a view and of the device, which two filters have.
+
+    ``default``: the view where no camera is given; ``size``: the default window, and the ``least``.
+    """
+    active = "Copy the active render view's camera and size into these properties."
+    return properties(f"""
+WindowSize:SetSize  Int {size}  {least}..  Width and height in pixels. {note}
+View       Int 0     ({default}|Camera)  Where the eye is before it is turned.
+{_CAMERA.strip()}
+Azimuth    Double 0  -180..180  Turns the view about its up direction through the focal point, \
+degrees.
+Elevation  Double 0  -90..90    Lifts the view after turning it, degrees.
+{_button("TakeActiveView", "Take the active view", active)}
+Device:SetDeviceName!  String  -  OpenCL device; empty: the best one. `pyvista-vdi devices` lists \
+them.
+""")
+
 
 #: Where opacities hold.
-UNIT_DISTANCE_XML = """
-<DoubleVectorProperty name="ScalarOpacityUnitDistance" command="SetUnitDistance"
-                      number_of_elements="1" default_values="0">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>Length over which the opacity function's opacities are reached, in the volume's
-  units. 0: the diagonal over the mean number of points along an edge, or, of a VDI that keeps
-  values, of its volume's.</Documentation>
-</DoubleVectorProperty>
-"""
+UNIT_DISTANCE_XML = properties(
+    "ScalarOpacityUnitDistance:SetUnitDistance  Double 0  0..  Length over which the opacity "
+    "function's opacities are reached, in the volume's units. 0: the diagonal over the mean number "
+    "of points along an edge, or, of a VDI that keeps values, of its volume's."
+)
 
-#: What a volume, or values that are kept, are classified by; {default} says by which otherwise.
-FUNCTIONS_XML = f"""
-<ProxyProperty name="ColorFunction" command="SetColorFunction">
-  <ProxyGroupDomain name="groups"><Group name="lookup_tables" /></ProxyGroupDomain>
-  <Documentation>Colours of scalars; by default {{default}}.</Documentation>
-</ProxyProperty>
-<ProxyProperty name="OpacityFunction" command="SetOpacityFunction">
-  <ProxyGroupDomain name="groups"><Group name="piecewise_functions" /></ProxyGroupDomain>
-  <Documentation>Opacities of scalars; by default {{default}}.</Documentation>
-</ProxyProperty>
-{UNIT_DISTANCE_XML}"""
 
-_WHERE_DEFERRED = _WITH_CAMERA.replace("View", "Classification")
+def functions_xml(default: str) -> str:
+    """Return what a volume, or values, are classified by; ``default`` says by what otherwise."""
+    found = ""
+    for name, what, group in (
+        ("ColorFunction", "Colours", "lookup_tables"),
+        ("OpacityFunction", "Opacities", "piecewise_functions"),
+    ):
+        domain = f'<ProxyGroupDomain name="groups"><Group name="{group}" /></ProxyGroupDomain>'
+        text = f"<Documentation>{what} of scalars; by default {default}.</Documentation>"
+        told = f'name="{name}" command="Set{name}"'
+        found += f"<ProxyProperty {told}>{domain}{text}</ProxyProperty>"
+    return found + UNIT_DISTANCE_XML
 
-SOURCE_XML = f"""
-<StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5"
-                      element_types="0 0 0 0 2" animateable="0">
-  <ArrayListDomain name="array_list" attribute_type="Scalars">
-    <RequiredProperties><Property name="Input" function="Input" /></RequiredProperties>
-  </ArrayListDomain>
-  <Documentation>The array that is classified.</Documentation>
-</StringVectorProperty>
-{FUNCTIONS_XML.format(default="ramps over the scalars' range")}
-<Property name="TakeTransferFunctions" label="Take the array's colours and opacities"
-          command="TakeTransferFunctions" panel_widget="command_button">
-  <Documentation>Use the transfer functions that ParaView has for this array, and follow their
-  changes. Client and server must be one process.</Documentation>
-</Property>
-<IntVectorProperty name="InterpolationType" command="SetInterpolation" number_of_elements="1"
-                   default_values="1">
-  <EnumerationDomain name="enum">
-    <Entry value="0" text="Nearest" /><Entry value="1" text="Linear" />
-  </EnumerationDomain>
-</IntVectorProperty>
-<IntVectorProperty name="Shade" command="SetShade" number_of_elements="1" default_values="0">
-  <BooleanDomain name="bool" />
-  <Documentation>Light the volume by one headlight at the generating view.</Documentation>
-</IntVectorProperty>
-{_REFLECTION_XML}
-<IntVectorProperty name="AmbientOcclusion" command="SetOcclusion" number_of_elements="1"
-                   default_values="0">
-  <BooleanDomain name="bool" />
-  <Documentation>{_sentence("ambient_occlusion")}</Documentation>
-</IntVectorProperty>
-<DoubleVectorProperty name="AmbientOcclusionRadius" command="SetOcclusionRadius"
-                      number_of_elements="1" default_values="0" panel_visibility="advanced">
-  <DoubleRangeDomain name="range" min="0" />
-  <Documentation>How far around it that is looked for, in the volume's units. 0: the default
-  radius.</Documentation>
-</DoubleVectorProperty>
-<IntVectorProperty name="Classification" command="SetClassification" number_of_elements="1"
-                   default_values="0">
-  <EnumerationDomain name="enum">
-    <Entry value="0" text="baked" /><Entry value="1" text="deferred" />
-  </EnumerationDomain>
-  <Documentation>{_sentence("classification")}</Documentation>
-</IntVectorProperty>
-<DoubleVectorProperty name="ValueRange" command="SetValueRange" number_of_elements="2"
-                      default_values="0 0">
-  <Documentation>{_sentence("value_range", ". 0 0: all")}</Documentation>{_WHERE_DEFERRED}
-</DoubleVectorProperty>
-<DoubleVectorProperty name="Importance" command="AddImportance" clean_command="ClearImportance"
-                      repeat_command="1" repeatable="1" number_of_elements="0"
-                      number_of_elements_per_command="2" panel_visibility="advanced">
-  <Documentation>{_sentence("importance", ": pairs of a scalar and a weight")}</Documentation>
-  {_WHERE_DEFERRED}
-</DoubleVectorProperty>
-{_number("max_supersegments", "MaxSupersegments", f'min="1" max="{MAX_SUPERSEGMENTS}"')}
-{_number("sample_distance", "SampleDistance", 'min="0"', ". 0: half the smallest spacing")}
-{_number("tolerance", "Tolerance", 'min="0"')}
-{_number("view_cone", "ViewCone", 'min="0" max="90"')}
-<StringVectorProperty name="Coverage" command="SetCoverage" number_of_elements="1"
-                      default_values="view">
-  <StringListDomain name="list"><String value="view" /><String value="bounds" /></StringListDomain>
-  <Documentation>view: the VDI covers the window. bounds: the whole volume, whatever part of it the
-  window shows.</Documentation>
-</StringVectorProperty>
-"""
 
+_ARRAYS = (
+    '<StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5" '
+    'element_types="0 0 0 0 2" animateable="0">'
+    '<ArrayListDomain name="array_list" attribute_type="Scalars"><RequiredProperties>'
+    '<Property name="Input" function="Input" /></RequiredProperties></ArrayListDomain>'
+    "<Documentation>The array that is classified.</Documentation></StringVectorProperty>"
+)
+_IMPORTANCE = (
+    '<DoubleVectorProperty name="Importance" command="AddImportance" repeatable="1" '
+    'clean_command="ClearImportance" repeat_command="1" number_of_elements="0" '
+    'number_of_elements_per_command="2" panel_visibility="advanced"><Documentation>'
+    f"{_sentence('importance', ': pairs of a scalar and a weight')}</Documentation>"
+    f"{_visible_where('Classification')}</DoubleVectorProperty>"
+)
+_FOLLOW = "Use the transfer functions that ParaView has for this array, and follow their changes."
+SOURCE_XML = properties(f"""
+{_ARRAYS}
+{functions_xml("ramps over the scalars' range")}
+{_button("TakeTransferFunctions", "Take the array's colours and opacities", _FOLLOW)}
+InterpolationType:SetInterpolation  Int 1  (Nearest|Linear)
+Shade           Int 0     bool  Light the volume by one headlight at the generating view.
+Ambient!        Double 0  -
+Diffuse!        Double 1  -
+Specular!       Double 0  -
+SpecularPower!  Double 1  -
+AmbientOcclusion:SetOcclusion  Int 0  bool  {_sentence("ambient_occlusion")}
+AmbientOcclusionRadius:SetOcclusionRadius!  Double 0  0..  How far around it that is looked for, \
+in the volume's units. 0: the default radius.
+Classification             Int 0       (baked|deferred)  {_sentence("classification")}
+ValueRange@Classification  Double 0 0  -                 {_sentence("value_range", ". 0 0: all")}
+{_IMPORTANCE}
+MaxSupersegments         {_number("max_supersegments")}
+SampleDistance:SetStep!  {_number("sample_distance", ". 0: the default")}
+Tolerance!               {_number("tolerance")}
+ViewCone!                {_number("view_cone")}
+Coverage  String view  [view|bounds]  view: the VDI covers the window. bounds: the whole volume, \
+whatever part of it the window shows.
+""")
 
 #: The times that an algorithm announces, for ParaView's animation.
 TIMES_XML = """

@@ -38,12 +38,12 @@ from pyvista_vdi.extensions.paraview.parts.functions import (
     sets,
 )
 from pyvista_vdi.extensions.paraview.parts.properties import (
-    DEVICE_XML,
-    FUNCTIONS_XML,
     SOURCE_XML,
     TIMES_XML,
     UNIT_DISTANCE_XML,
-    VIEW_XML,
+    functions_xml,
+    properties,
+    view_xml,
 )
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
@@ -76,11 +76,7 @@ def _of_looks(setter: str) -> Any:
 
 @smproxy.filter(name="VDISource", label="VDI Source", support_reload=False)
 @smhint.xml('<ShowInMenu category="VDI" />')
-@smproperty.xml(
-    SOURCE_XML
-    + VIEW_XML.format(default="The volume fills the window", size="1280 720", least=1, note="")
-    + DEVICE_XML
-)
+@smproperty.xml(SOURCE_XML + view_xml("The volume fills the window", "1280 720", 1))
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
 class VDISource(Looking, Functions, vtk_pipeline.VDISource):
@@ -200,11 +196,8 @@ def name_of(vdi: DeferredVDI) -> str:
 @smproxy.filter(name="VDIToImage", label="VDI To Image", support_reload=False)
 @smhint.xml('<ShowInMenu category="VDI" /><RepresentationType view="RenderView" type="Slice" />')
 @smproperty.xml(
-    VIEW_XML.format(
-        default="The VDI's own", size="0 0", least=0, note="0: that of the VDI's pictures."
-    )
-    + FUNCTIONS_XML.format(default="those that ParaView has for the array")
-    + DEVICE_XML
+    view_xml("The VDI's own", "0 0", 0, "0: that of the VDI's pictures.")
+    + functions_xml("those that ParaView has for the array")
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)
@@ -451,25 +444,13 @@ class VDISeriesReader(vtk_pipeline.VDIReader):
 @smproperty.xml(
     """<StringVectorProperty name="FileName" command="SetFileName" number_of_elements="1"
                              panel_visibility="never"><FileListDomain name="files" />
-       </StringVectorProperty>
-       <StringVectorProperty name="Precision" command="SetPrecisionName" number_of_elements="1"
-                             default_values="usual">
-         <StringListDomain name="list">
-           <String value="usual" /><String value="exact" />
-           <String value="8-byte" />
-         </StringListDomain>
-         <Documentation>What a supersegment takes. usual: 8 bytes in a .vdis; exact, 24 bytes, in a
-         .vdi. An .exr has float32.</Documentation>
-       </StringVectorProperty>
-       <StringVectorProperty name="Compression" command="SetCompressionName" number_of_elements="1"
-                             default_values="usual" panel_visibility="advanced">
-         <StringListDomain name="list">
-           <String value="usual" /><String value="lz4" /><String value="zstd" />
-           <String value="deflate" /><String value="none" />
-         </StringListDomain>
-         <Documentation>usual: zstd of .vdis, lz4 of .vdi (zstd is smaller); an .exr has no
-         other.</Documentation>
        </StringVectorProperty>"""
+    + properties("""
+Precision:SetPrecisionName       String usual  [usual|exact|8-byte]  What a supersegment takes. \
+usual: 8 bytes in a .vdis; exact, 24 bytes, in a .vdi. An .exr has float32.
+Compression:SetCompressionName!  String usual  [usual|lz4|zstd|deflate|none]  usual: zstd of \
+.vdis, lz4 of .vdi (zstd is smaller); an .exr has no other.
+""")
 )
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkImageData"], composite_data_supported=False)

@@ -1,4 +1,4 @@
-"""One dial: what is chosen at its borders, what is predicted, and what is said of it."""
+"""Targets: what is chosen at their borders, what is predicted, and what is said of it."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from drawing import generate_vdi, raycast_volume, render_vdi, request
-from real_data import require_data
+from drawing import raycast_volume, render_vdi, request
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import Camera, TransferFunction, Volume
+from pyvista_vdi import TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
+from pyvista_vdi.generation import generate
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.metrics import compare_images, list_edges, list_places
-from pyvista_vdi.model.options import QUALITIES, GenerationOptions, QualityTarget
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.options import QUALITIES, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
-from pyvista_vdi.quality import probe
-from pyvista_vdi.quality.dial import (
-    DENSE,
+from pyvista_vdi.quality import targets
+from pyvista_vdi.quality.targets import (
     LADDER,
-    MAX_LIST_EDGES,
+    PRESETS,
     Measurement,
     Prediction,
     chosen,
     describe,
+    measure,
     predictions,
+    turned,
+    viewport_planes,
 )
-from pyvista_vdi.quality.probe import Probe, lists_met, turned, viewport_planes
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
 WINDOW = (160, 120)
@@ -43,10 +44,6 @@ ANGLE = QualityTarget().target_angle
 #: Predicted less true SSIM of small pictures of the shipped volumes: what is seen below is within
 #: 0.013, and 0.006 too hopeful.
 CLOSE, HOPEFUL = 0.02, 0.015
-
-#: A part of a VDI against the whole: rays are formed about another centre. A few pixels' rays
-#: change lists at their borders, which shows in the worst pixel, not in the mean.
-MEAN_OF_PARTS = 1e-4
 
 
 def ball(points=24):
@@ -67,13 +64,6 @@ TRANSFER = TransferFunction(
 VIEW = filling_camera(VOLUME.bounds, WINDOW)
 
 
-@pytest.fixture(autouse=True)
-def _nothing_remembered():
-    probe.forget()
-    yield
-    probe.forget()
-
-
 def generated(runtime=None, volume=VOLUME, camera=VIEW, window=WINDOW, **arguments):
     return pvdi.generate(
         volume, camera, window, transfer_function=TRANSFER, device=runtime, **arguments
@@ -84,7 +74,7 @@ def ladder(ssims, sizes=None, rates=None):
     sizes = range(1, len(ssims) + 1) if sizes is None else sizes
     rates = range(len(ssims), 0, -1) if rates is None else rates
     return [
-        Prediction(setting, (10, 10), ssim, nbytes, fps)
+        Prediction(setting, ssim, nbytes, fps)
         for setting, ssim, nbytes, fps in zip(LADDER, ssims, sizes, rates, strict=False)
     ]
 
@@ -99,17 +89,14 @@ RUNGS = ladder((0.90, 0.93, 0.96, 0.98), sizes=(100, 200, 400, 800), rates=(80, 
         ({"target_ssim": 0.90}, 0),
         ({"target_ssim": math.nextafter(0.90, 1)}, 1),
         ({"target_ssim": 0.98}, 3),
-        ({"quality": "fast"}, 1),
-        ({"quality": "balanced"}, 2),
-        ({"quality": "high"}, 3),
-        ({"target_fps": 40}, 1),
-        ({"target_fps": 40.001}, 0),
-        ({"target_fps": 1}, 3),
+        ({"full_fps": 40}, 1),
+        ({"full_fps": 40.001}, 0),
+        ({"full_fps": 1}, 3),
         ({"max_bytes": 1e9}, 3),
         ({"max_bytes": 400 / 0.95 + 1}, 2),  # some are left free because sizes are predicted
         ({"max_bytes": 400 / 0.95 - 1}, 1),
-        ({"max_bytes": 250, "target_fps": 20}, 1),  # either limit holds
-        ({"max_bytes": 900, "target_fps": 70}, 0),
+        ({"max_bytes": 250, "full_fps": 20}, 1),  # either limit holds
+        ({"max_bytes": 900, "full_fps": 70}, 0),
         ({"quality": "fast", "max_bytes": 1e9}, 1),  # a limit is no wish for more
     ],
 )
@@ -120,46 +107,17 @@ def test_the_cheapest_rung_that_reaches_the_goal_within_the_limits(asked, rung):
 
 
 @pytest.mark.parametrize(
-    ("asked", "rung"),
-    [
-        ({"quality": "high"}, 2),  # which the first would reach by SSIM
-        ({"quality": "balanced"}, 2),
-        ({"target_ssim": 0.96}, 2),
-        ({"quality": "fast"}, 0),
-        ({"target_ssim": math.nextafter(0.96, 0)}, 0),
-        ({"max_bytes": 250}, 1),
-    ],
-)
-def test_goals_hold_squares_below_their_bound(asked, rung):
-    edges = (3.0, math.nextafter(MAX_LIST_EDGES, 2), MAX_LIST_EDGES, 0.0)
-    rungs = [
-        replace(one, ssim=0.99, list_edges=edge) for one, edge in zip(RUNGS, edges, strict=True)
-    ]
-    choice = chosen(QualityTarget(**asked), rungs, WINDOW)
-    assert choice.prediction is rungs[rung]
-    assert choice.missed == ()
-    # A limit goes before it, and the squares are told
-    if rung == 2:
-        choice = chosen(QualityTarget(**asked, max_bytes=120), rungs, WINDOW)
-        assert choice.prediction is rungs[0]
-        assert len(choice.missed) == 1
-        assert re.search(r"without squares: 10 x 10 lists, .* max_bytes=120", choice.missed[0])
-        assert "edges of 3 times" in choice.missed[0]
-        assert choice.to_dict()["predicted"]["list_edges"] == 3
-
-
-@pytest.mark.parametrize(
     ("asked", "rung", "said"),
     [
         (
             {"target_ssim": 0.99},
             3,
-            r"target_ssim asks for an SSIM of 0.99 .* 0.980 .* ask for less",
+            r"target_ssim=0.99 is not reached .* 0.980 .* ask for less",
         ),
         ({"quality": "high", "max_bytes": 500}, 2, r"quality='high' .* 0.960 .* max_bytes=500"),
-        ({"quality": "high", "target_fps": 30}, 1, r"0.930 .* target_fps=30"),
+        ({"quality": "high", "full_fps": 30}, 1, r"0.930 .* full_fps=30"),
         ({"max_bytes": 50}, 0, r"max_bytes=50 cannot be kept: .* 100 bytes; allow more"),
-        ({"target_fps": 100}, 0, r"100 full frames per second cannot .* 160 x 120 pixels 80 are"),
+        ({"full_fps": 100}, 0, r"100 full frames per second cannot .* 160 x 120 pixels 80 are"),
     ],
 )
 def test_what_cannot_be_reached_is_said_with_the_nearest(asked, rung, said):
@@ -167,7 +125,7 @@ def test_what_cannot_be_reached_is_said_with_the_nearest(asked, rung, said):
     assert choice.prediction is RUNGS[rung]
     assert len(choice.missed) == 1
     assert re.search(said, choice.missed[0])
-    assert "target missed" in describe({"dial": choice.to_dict()})
+    assert "target missed" in describe({"dial": choice.to_dict(QualityTarget(**asked), WINDOW)})
 
 
 def test_asking_for_more_never_gives_less():
@@ -176,7 +134,7 @@ def test_asking_for_more_never_gives_less():
     asked = [
         [{"target_ssim": goal} for goal in goals],
         [{"max_bytes": limit} for limit in limits],
-        [{"target_fps": rate} for rate in limits[::-1]],
+        [{"full_fps": rate} for rate in limits[::-1]],
         [{"target_ssim": 0.97, "max_bytes": limit} for limit in limits],
     ]
     for _ in range(20):
@@ -218,19 +176,21 @@ def test_rungs_are_in_order_and_in_range_whatever_was_measured(losses):
         ({"target_ssim": 1.0}, "target_ssim must be an SSIM between 0 and 1; got 1.0"),
         ({"target_ssim": True}, "target_ssim must be"),
         ({"target_ssim": math.nan}, "target_ssim must be"),
-        ({"target_fps": 0}, "target_fps must be frames per second above 0; got 0"),
-        ({"target_fps": math.inf}, "target_fps must be"),
+        ({"full_fps": 0}, "full_fps must be frames per second above 0; got 0"),
+        ({"full_fps": math.inf}, "full_fps must be"),
         ({"max_bytes": -1}, "max_bytes must be a number of bytes above 0; got -1"),
         ({"max_bytes": "many"}, "max_bytes must be"),
-        ({"quality": "fast", "target_angle": 180}, "target_angle must be an angle between"),
         ({"quality": "fast", "target_ssim": 0.9}, "both say how good pictures are to be"),
         ({"quality": "reference", "max_bytes": 10}, "'reference' is what is made without a dial"),
-        ({"quality": "reference", "target_fps": 10}, "'reference' is what is made without a dial"),
+        ({"quality": "reference", "full_fps": 10}, "'reference' is what is made without a dial"),
         ({"quality": "fast", "max_supersegments": 7}, "'fast' chooses .* max_supersegments=7"),
-        ({"max_bytes": 9, "tolerance": 0.1}, "max_bytes=9 chooses .* tolerance=0.1"),
+        (
+            {"max_bytes": 9, "settings": pvdi.Settings(tolerance=0.1)},
+            "max_bytes=9 chooses .* tolerance=0.1",
+        ),
         ({"target_ssim": 0.9, "precision": "8-byte"}, "=0.9 chooses .* precision='8-byte'"),
         ({"precision": "float16"}, "precision must be .exact. or .8-byte."),
-        ({"quality": "fast", "window": (160, 10)}, "160 x 10 pixels has no SSIM"),
+        ({"target_ssim": 0.9, "window": (160, 10)}, "160 x 10 pixels has no SSIM"),
     ],
 )
 def test_what_contradicts_or_is_out_of_range_is_refused(default_runtime, asked, said):
@@ -269,7 +229,7 @@ def test_what_was_measured_is_predicted_as_it_was():
 
 
 def measured(runtime, volume, camera, window, table=TRANSFER):
-    return Probe(request(volume, camera, window, table, device=runtime), ANGLE).measure()
+    return measure(request(volume, camera, window, table, device=runtime), ANGLE)
 
 
 @pytest.fixture(scope="module")
@@ -288,8 +248,8 @@ def shipped(default_runtime):
             picture = raycast_volume(volume, view, window, table)
             found = measured(default_runtime, volume, camera, window, table)
             for rung in predictions(found, window)[::4]:
-                options = rung.setting.applied_to(GenerationOptions())
-                vdi = generate_vdi(volume, camera, rung.window_size, table, options)
+                asked = rung.setting.applied_to(request(volume, camera, window, table))
+                vdi = generate.generate_vdi(asked)
                 ssim = compare_images(render_vdi(vdi, view, window), picture).ssim
                 rows.append((rung, ssim, prepared_vdi(default_runtime, vdi).list_bytes))
     return rows
@@ -302,42 +262,6 @@ def test_predictions_are_near_the_truth(shipped):
     # The margin of max_bytes; seen: 2 %
     ratios = np.array([rung.nbytes / true for rung, _, true in shipped])
     assert np.abs(ratios - 1).max() <= 0.05, ratios.round(3)
-
-
-def test_no_squares_are_seen_in_a_smooth_field(default_runtime):
-    """Where SSIM is content with a quarter of a list per pixel, whose squares anybody sees."""
-    volume, window = ball(48), (240, 180)
-    camera = filling_camera(volume.bounds, window)
-    picture = raycast_volume(volume, camera, window, TRANSFER)
-    rungs = predictions(measured(default_runtime, volume, camera, window), window)
-    assert rungs[0].ssim > QUALITIES["high"]
-    for rung in (rungs[0], rungs[1], rungs[2]):
-        vdi = generated(default_runtime, volume, camera, rung.window_size)
-        seen = render_vdi(vdi, camera, window, device=default_runtime)
-        places = list_places(camera, window, rung.window_size)
-        true = list_edges(seen, picture, *places).ratio
-        assert (true > MAX_LIST_EDGES) == (rung.setting.lists < 0.5)
-        # Nine tiles' steps against all, which differ as the field's slope does
-        assert rung.list_edges == pytest.approx(true, rel=0.25)
-    assert chosen(QualityTarget("high"), rungs, window).prediction is rungs[2]
-    assert {rung.list_edges for rung in rungs if rung.setting.lists >= 1} == {0.0}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", pvdi.examples.WHOLE)
-@pytest.mark.filterwarnings("ignore::pyvista_vdi.errors.VDIWarning")  # an SSIM out of reach
-def test_high_quality_shows_no_squares_of_any_volume(default_runtime, name):
-    """The true figure of what the dial makes; all looks: benchmarks/accuracy.py."""
-    volume, window = require_data(name), (416, 442)
-    camera = filling_camera(volume.bounds, window)
-    looks = {**TRANSFER_FUNCTIONS["soft"], "device": default_runtime}
-    vdi = pvdi.generate(volume, camera, window, quality="high", **looks)
-    picture = pvdi.render_volume(volume, camera, window, **looks)
-    seen = pvdi.render(vdi, camera, device=default_runtime)
-    places = list_places(camera, window, vdi.window_size)
-    edges = 0.0 if vdi.window_size >= window else list_edges(seen, picture, *places).ratio
-    # Predictions of half a list are within 9 % of the truth in nine of ten cases
-    assert edges <= MAX_LIST_EDGES
 
 
 def test_the_target_view_turns_about_the_volume_wherever_the_camera_looks():
@@ -354,121 +278,37 @@ def test_the_target_view_turns_about_the_volume_wherever_the_camera_looks():
         assert np.linalg.norm(after[:3]) == pytest.approx(np.linalg.norm(centre[:3]))
 
 
-@pytest.mark.parametrize("parallel", [False, True])
-def test_a_tile_by_the_lists_it_meets_is_the_tile_by_all(default_runtime, parallel):
-    camera = VIEW.replace(parallel_projection=parallel, parallel_scale=12.0)
-    view = turned(camera, VOLUME.bounds, 30)
-    whole = generate_vdi(VOLUME, camera, WINDOW, TRANSFER, device=default_runtime)
-    for corner in ((60, 44), (40, 30), (90, 70)):
-        lens = view.tile(WINDOW, corner, (24, 20))
-        first, size = lists_met(lens, (24, 20), VOLUME.bounds, camera, WINDOW)
-        assert math.prod(size) < 0.6 * math.prod(WINDOW)
-        part = generate_vdi(
-            VOLUME, camera.tile(WINDOW, first, size), size, TRANSFER, device=default_runtime
-        )
-        by_part, by_all = (
-            render_vdi(vdi, lens, (24, 20), device=default_runtime) for vdi in (part, whole)
-        )
-        assert by_all.max() > 0.1
-        assert np.abs(by_part - by_all).mean() < MEAN_OF_PARTS
-
-
-def test_no_lists_are_met_beside_the_volume_and_all_where_the_eye_is_inside():
-    away = VIEW.tile(WINDOW, (-500, 0), (24, 24))
-    assert lists_met(away, (24, 24), VOLUME.bounds, VIEW, WINDOW) is None
-    inside = Camera((11, 11, 11), (11, 20, 11), (0, 0, 1))
-    lens = VIEW.tile(WINDOW, (70, 50), (24, 24))
-    assert lists_met(lens, (24, 24), VOLUME.bounds, inside, WINDOW) == ((0, 0), WINDOW)
-
-
-def test_parts_predict_what_the_whole_predicts(default_runtime, monkeypatch):
-    window, sizes = (800, 600), []  # the parts for nine tiles cost less than the whole
-    real = probe.generate_vdi
-
-    def noted(asked):
-        if asked.options.max_supersegments == DENSE.max_supersegments:
-            sizes.append(asked.window_size)
-        return real(asked)
-
-    monkeypatch.setattr(probe, "generate_vdi", noted)
-    by_parts = measured(default_runtime, VOLUME, VIEW, window)
-    dense = DENSE.window_size(window)
-    assert dense not in sizes
-    assert len(sizes) > probe.TILES
-    whole = lambda lens, size, bounds, camera, lists: ((0, 0), lists)  # noqa: E731
-    monkeypatch.setattr(probe, "lists_met", whole)  # all lists are needed for each tile
-    sizes.clear()
-    by_whole = measured(default_runtime, VOLUME, VIEW, window)
-    assert sizes.count(dense) == 1
-    # The same lists but for roundings of rays at lists' borders
-    for name in ("rough", "sparse", "dense"):
-        assert getattr(by_parts, name) == pytest.approx(getattr(by_whole, name), abs=1e-4)
-
-
-def choose(runtime, volume=VOLUME, camera=VIEW, angle=ANGLE, **options):
-    target = QualityTarget("balanced", target_angle=angle)
-    asked = request(volume, camera, WINDOW, TRANSFER, device=runtime, **options)
-    return probe.choose(asked, target)
-
-
-def test_a_scene_is_measured_once(default_runtime, monkeypatch):
-    count = []
-    real = Probe.measure
-    monkeypatch.setattr(Probe, "measure", lambda found: count.append(1) or real(found))
-    first = generated(default_runtime, quality="balanced")
-    again = generated(default_runtime, volume=ball(), quality="balanced")  # equal, another object
-    assert again.equals(first)
-    assert again.metadata["dial"] == first.metadata["dial"]
-    generated(default_runtime, quality="high", max_bytes=1e7)  # the same measurement answers
-    choose(default_runtime)
-    assert len(count) == 1
-    for change in (
-        {"camera": VIEW.azimuth(1)},
-        {"angle": 20},
-        {"sample_distance": 0.4},
-        {"volume": ball(25)},
-    ):
-        choose(default_runtime, **change)
-    assert len(count) == 5
-
-
-def test_the_last_scenes_are_remembered(default_runtime, monkeypatch):
-    seen = []
-    monkeypatch.setattr(Probe, "measure", lambda found: seen.append(1) or a_measurement())
-
-    def is_known(turn):
-        before = len(seen)
-        choose(default_runtime, camera=VIEW.azimuth(turn))
-        return len(seen) == before
-
-    assert not any(is_known(turn) for turn in range(32))
-    assert is_known(0)  # and so is the last that was used
-    assert not is_known(32)
-    assert [is_known(turn) for turn in (32, 0, 2, 1)] == [True, True, True, False]
-
-
-def test_a_bar_moves_while_it_measures_and_while_it_generates(default_runtime):
-    seen = []
-    generated(default_runtime, quality="fast", progress=seen.append)
-    assert seen == sorted(seen)
-    assert sum(0 < fraction < 0.5 for fraction in seen) >= 2
-    assert 0.5 in seen
-    assert seen[-1] == 1.0
-    # And it can be cancelled
-    probe.forget()
-    seen.clear()
-    progress = lambda fraction: seen.append(fraction) or len(seen) < 3  # noqa: E731
-    with pytest.raises(Cancelled, match="choosing the settings"):
-        generated(default_runtime, quality="fast", progress=progress)
-    assert seen == [0.0, 0.125, 0.25]
-
-
 def test_a_volume_out_of_view_is_made_as_cheaply_as_can_be(default_runtime):
     aside = VIEW.replace(focal_point=np.add(VIEW.position, (0, -1, 0)))
     with pytest.warns(pvdi.VDIWarning, match="the camera sees nothing"):
-        vdi = generated(default_runtime, camera=aside, quality="high")
-    assert vdi.window_size == LADDER[0].window_size(WINDOW)
+        vdi = generated(default_runtime, camera=aside, target_ssim=0.98)
+    assert vdi.window_size == LADDER[2].window_size(WINDOW)
     assert vdi.metadata["dial"]["predicted"]["ssim"] == 1
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_name_is_looked_up_and_nothing_is_measured(default_runtime, monkeypatch, name):
+    monkeypatch.setattr(targets, "measure", None)
+    vdi, (rung, ssim) = generated(default_runtime, quality=name), PRESETS[name]
+    assert vdi.window_size == LADDER[rung].window_size(WINDOW)
+    assert vdi.metadata["max_supersegments"] == LADDER[rung].max_supersegments
+    assert vdi.metadata["dial"]["predicted"] == {"ssim": ssim}
+    assert f"predicted SSIM {ssim:.3f} at 30" in describe(vdi.metadata)
+
+
+def test_goals_from_which_on_squares_would_be_seen_have_half_a_list_per_pixel():
+    rungs = [replace(rung, ssim=0.99) for rung in RUNGS]
+    assert chosen(QualityTarget(target_ssim=0.96), rungs, WINDOW).rung == 2
+    assert chosen(QualityTarget(target_ssim=0.95), rungs, WINDOW).rung == 0
+    assert chosen(QualityTarget(max_bytes=250), rungs, WINDOW).rung == 1
+
+
+def test_measuring_can_be_cancelled(default_runtime):
+    seen = []
+    progress = lambda fraction: seen.append(fraction) or len(seen) < 3  # noqa: E731
+    with pytest.raises(Cancelled, match="choosing the settings"):
+        generated(default_runtime, target_ssim=0.9, progress=progress)
+    assert seen == [0.0] * 3
 
 
 def test_sides_of_a_viewport_keep_what_it_covers():
@@ -554,8 +394,8 @@ def test_max_bytes_is_kept_where_few_lists_tell_little(seed, default_runtime):
         return prepared_vdi(default_runtime, vdi).list_bytes
 
     for rung in (LADDER[0], LADDER[2], LADDER[4], LADDER[8]):
-        size, options = rung.window_size(window), rung.applied_to(GenerationOptions())
-        limit = int(0.99 * bytes_of(generate_vdi(volume, camera, size, TRANSFER, options)))
+        asked = rung.applied_to(request(volume, camera, window, TRANSFER))
+        limit = int(0.99 * bytes_of(generate.generate_vdi(asked)))
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             vdi = generated(default_runtime, volume, camera, window, max_bytes=limit)
