@@ -417,6 +417,7 @@ def test_broken_files_are_a_sentence_and_nothing_else(data, open_page):
         assert words[name] in answer["alert"]
 
 
+@pytest.mark.slow
 def test_another_address_is_looked_at_where_it_lies(data, open_page):
     """What it gives in the same place is seen from the same view."""
     far = soft_ball(16)
