@@ -86,12 +86,12 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
       });
       return made;
     }));
-  const editor = transferEditor?.(viewer, button); // in pages that keep values; others have colours
+  const editor = transferEditor(viewer, button);
   const ofColors = [factor("brightness", "Brightness"), factor("opacity", "Opacity")];
   const keys = Object.entries(KEYS).flatMap(([key, does]) =>
     [htmlElement("dt", {}, key), htmlElement("dd", {}, does)]);
   const panel = htmlElement("div", { className: "panel", tabIndex: 0, role: "group", label: "Settings" },
-    htmlElement("div", { className: "views" }, ...choices), ...(editor ? [editor.element] : []),
+    htmlElement("div", { className: "views" }, ...choices), editor.element,
     ...ofColors, ..."xyz".split("").map(cut),
     button("As it was made", () => (viewer.look = AS_MADE), "As it was made"),
     htmlElement("dl", {}, ...keys));
@@ -111,7 +111,7 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
     if (!settings.open) return;
     const { bounds, look, values } = viewer;
     takes.forEach((take) => take(look));
-    editor?.show();
+    editor.show();
     ofColors.forEach((each) => (each.hidden = Boolean(values)));
     choices.forEach((each) => (each.disabled = !bounds));
   };
@@ -121,7 +121,7 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
       if (panel.contains(target)) opener.focus();
       settings.open = false;
     } else if (target === canvas && canFill && event.key.toLowerCase() === "f") goFull();
-    else if (!editor?.key(event, target)) { // buttons and sliders do it by themselves
+    else if (!editor.key(event, target)) { // buttons and sliders do it by themselves
       return frame.contains(target) && ([" ", "Enter"].includes(event.key) ||
         (["range", "select-one"].includes(target.type) && OF_SLIDER.test(event.key)));
     }

@@ -466,7 +466,7 @@ export class VDIViewer extends HTMLElement {
     }
     if (this.#source && this.#loading.signal.aborted) this.load(this.#source).catch(() => {});
     this.#player?.resume();
-    this.#controls = playerControls?.(this.#parts.controls, this);
+    this.#controls = playerControls(this.#parts.controls, this);
     this.#controls?.show();
     this.#bar = viewerControls(this.#parts, this, (text) => this.#hint(text), signal);
     this.#listen(signal);

@@ -21,7 +21,7 @@ export async function load(source, { onLevel, onSeries, onProgress = () => {},
   let pieces = null;
   try {
     const { reading } = await withWorker(signal, async (ask) => {
-      const folder = onSeries && Series && seriesFolder(source);
+      const folder = onSeries && seriesFolder(source);
       if (folder) {
         series(await Series.ofFolder(folder.name, async (file) =>
           new Uint8Array(await (await fetched(new URL(file, folder.url))).arrayBuffer())));
@@ -33,7 +33,7 @@ export async function load(source, { onLevel, onSeries, onProgress = () => {},
       for (let next; head.whole.length < BEGIN || head.broken; head.push(next.value)) {
         if ((next = await pieces.next()).done) break;
       }
-      if (onSeries && beginsAsSeries?.(head.whole)) {
+      if (onSeries && beginsAsSeries(head.whole)) {
         return { reading: Series.ofPieces(head.whole, pieces, series) }; // without this worker
       }
       const hear = ({ prepared }) => level(prepared);
