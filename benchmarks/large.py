@@ -12,9 +12,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import dask.array as da
+import zarr
+from distributed import Client, LocalCluster
 from shared import Case, Results, benches, execute, load, marked, parser_of, table
 
 import pyvista_vdi as pvdi
@@ -75,8 +79,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def in_blocks(bench: Any, n: int) -> dict[str, Any]:
     """Return how near the picture of blocks is to that of one piece, by angle."""
-    import dask.array as da
-
     whole, of = bench.generate(), bench.volume
     chunks = tuple(-(-p // k) for p, k in zip(of.array.shape, CUTS[n], strict=True))
     volume = pvdi.Volume(da.from_array(of.array, chunks), of.spacing, of.origin, of.direction)
@@ -91,8 +93,6 @@ def in_blocks(bench: Any, n: int) -> dict[str, Any]:
 
 def stored(path: Path, name: str) -> pvdi.Volume:
     """Return a volume that is made, in a store of chunks, written where it is not there yet."""
-    import zarr
-
     if not path.exists():
         made = load(name).array
         zarr.create_array(store=str(path), data=made, chunks=(CHUNK,) * 3)
@@ -101,7 +101,6 @@ def stored(path: Path, name: str) -> pvdi.Volume:
 
 def on_cluster(options: Any) -> dict[str, Any]:
     """Return seconds on one worker and on two, in turns, and the peaks of their memory."""
-    from distributed import Client, LocalCluster
 
     def peak() -> tuple[int, int]:
         return os.getpid(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
@@ -113,26 +112,22 @@ def on_cluster(options: Any) -> dict[str, Any]:
         function = Classification.composited(LOOKS, "a benchmark").transfer_function_of(volume)
         given = {"threads_per_worker": 1, "memory_limit": WORKER_BYTES, "dashboard_address": ":0"}
         request = GenerationRequest(volume, function, camera, options.size)
-        with (
-            LocalCluster(n_workers=1, **given) as lone,
-            LocalCluster(n_workers=2, **given) as pair,
-            Client(lone) as by_one,
-            Client(pair) as by_two,
-        ):
+        clients: dict[str, Client] = {}
+        with ExitStack() as stack:
             cores = sorted(os.sched_getaffinity(0))
-            for client in (by_one, by_two):
+            for n in (1, 2):
+                cluster = stack.enter_context(LocalCluster(n_workers=n, **given))
+                clients[str(n)] = client = stack.enter_context(Client(cluster))
                 for k, at in enumerate(client.nthreads()):
-                    core = {cores[k % len(cores)]}
-                    client.run(lambda core=core: os.sched_setaffinity(0, core), workers=[at])
-            before = by_two.run(peak)
-            seconds: dict[str, list[float]] = {"1": [], "2": []}
+                    client.run(os.sched_setaffinity, 0, {cores[k % len(cores)]}, workers=[at])
+            before, seconds = client.run(peak), {n: [] for n in clients}
             for turn in range(options.repeats + 1):
-                for name, client in (("1", by_one), ("2", by_two)):
+                for n, client in clients.items():
                     start = time.perf_counter()
                     vdi = generate_in_blocks(request, client)
                     if turn:  # the first one compiles
-                        seconds[name].append(time.perf_counter() - start)
-            after = by_two.run(peak)
+                        seconds[n].append(time.perf_counter() - start)
+            after = client.run(peak)
         return {
             "points": volume.array.size,
             "supersegments": vdi.n_supersegments,

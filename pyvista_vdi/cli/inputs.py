@@ -23,7 +23,7 @@ from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
-from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import QualityTarget, declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -126,7 +126,7 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
         volume = volumes.read_volume(options.file, array=array, time=options.time_index, **chosen)
     if volume.chunked and not in_chunks:
         remedy = "take a coarser level by --level, or make a VDI of it (pyvista-vdi generate)"
-        require_free_memory(volume.array.nbytes, f"the volume in {options.file}", remedy)
+        require_host_memory(volume.array.nbytes, f"the volume in {options.file}", remedy, free=True)
         volume = volume.load()
     return volume  # type: ignore[no-any-return]
 

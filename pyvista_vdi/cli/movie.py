@@ -67,7 +67,6 @@ def _write(options: argparse.Namespace, views: Callable[[Camera, int | None], li
     kinds: Any = {".gif": gif, ".mp4": film, ".webm": film | {"codec": "libvpx-vp9"}}
     target = check_writable(with_suffix(Path(options.output), (*kinds,), "a moving picture"))
     steps, how = None, {"device": options.device}
-    shown: Any
     draw: Any = render_volume if inputs.is_volume(options) else render
     if draw is render:
         shown: Any = read(options.file)

@@ -25,20 +25,21 @@ from pyvista_vdi.cli.inputs import (
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.io import checked_png_target, to_bytes, write_png
+from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
+from pyvista_vdi.model.whole_file import as_path, with_suffix
 from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.screen import why_no_window
 
 
 def render(options: argparse.Namespace) -> int:
     """Render a VDI from a new view and write the picture."""
-    target = checked_png_target(options.output)
+    target = check_writable(with_suffix(as_path(options.output), (".png",), "a picture"))
     if not any(holds(file) == "series" for file in options.files):
         refuse(options, ("time",), "series, .vdis")
     vdis, share = [], 0.5 / len(options.files)
@@ -66,7 +67,9 @@ def render(options: argparse.Namespace) -> int:
 def view(options: argparse.Namespace) -> int:
     """Open a plotter on a VDI, or write what it shows."""
     off_screen = options.screenshot is not None
-    target = checked_png_target(options.screenshot) if off_screen else None
+    target = options.screenshot
+    if off_screen:
+        target = check_writable(with_suffix(as_path(target), (".png",), "a picture"))
     if options.file is None or holds(options.file) != "series":
         refuse(options, ("play", "rate", "time"), "series, .vdis")
     if is_volume(options):

@@ -135,8 +135,7 @@ def _named(device: Any, origin: str) -> Runtime:
         info
         for info in infos
         if getattr(device, "int_ptr", None) == devices.handles[info.index].int_ptr
-        or (getattr(device, "full_name", None) == info.full_name
-        and device.index == info.index)
+        or (getattr(device, "full_name", None) == info.full_name and device.index == info.index)
     ]
     if isinstance(device, str):
         same = [devices.select(infos, device, origin)]

@@ -317,9 +317,14 @@ class Memory(Turns):
         """Return memory for kernels to write what an array is to hold, see :meth:`download`.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array, or its beginning, copies nothing. What is in it is not read. Leave it alone
-        until the download.
+        that very array, or its beginning, copies nothing. The array is C-contiguous and writable
+        (InvalidArgumentError else); what is in it is not read. Leave it alone until the download.
         """
+        if not (array.flags.c_contiguous and array.flags.writeable):
+            raise InvalidArgumentError(
+                f"the array for {name!r} must be C-contiguous and writable; its strides are "
+                f"{array.strides}, writeable={array.flags.writeable}"
+            )
         access, host = self.cl.mem_flags.READ_WRITE, None
         if self.in_place(array):
             access, host = access | self.cl.mem_flags.USE_HOST_PTR, array

@@ -11,7 +11,7 @@ from pyvista_vdi.io.files import (
     suffixes,
     write,
 )
-from pyvista_vdi.io.png import checked_png_target, to_bytes, write_png
+from pyvista_vdi.io.png import to_bytes, write_png
 from pyvista_vdi.io.vdi_file.layout import FORMAT_VERSION, SUFFIX
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.whole_file import check_writable, whole_file
@@ -22,7 +22,6 @@ __all__ = [
     "FileInfo",
     "check_writable",
     "check_write_options",
-    "checked_png_target",
     "checked_target",
     "is_vdi_file",
     "read",

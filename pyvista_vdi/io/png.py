@@ -11,16 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.metrics import over_background
-from pyvista_vdi.model.whole_file import as_path, check_writable, whole_file, with_suffix
+from pyvista_vdi.model.whole_file import as_path, whole_file, with_suffix
 
 
 def to_bytes(image: ArrayLike, background: Sequence[float] | None = None) -> NDArray[np.uint8]:
     """Return a rendered image in eight bits per channel.
 
     ``image`` (float, shape (H, W, 4)): premultiplied RGBA, top row first. ``background``: RGB, 0 to
-    1, to blend it over. Returns: uint8 (H, W, 4), straight (not premultiplied) RGBA as PNG wants
-    it, rounded; or, over a background, uint8 (H, W, 3). Raises InvalidArgumentError if the
-    background is not a colour, or the image no image.
+    1, to blend it over. Returns: uint8 (H, W, 4), straight RGBA, rounded; or, over a background,
+    uint8 (H, W, 3). Raises InvalidArgumentError if one is no colour or no image.
     """
     pixels = np.asarray(image)
     if background is not None:
@@ -36,11 +35,9 @@ def to_bytes(image: ArrayLike, background: Sequence[float] | None = None) -> NDA
 
 
 def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
-    """Write an image as PNG; the file appears whole or not at all.
+    """Write uint8 RGB, or straight RGBA, (H, W, 3 or 4), top row first; return the file, ``.png``.
 
-    ``pixels``: uint8 (H, W, 3) RGB or (H, W, 4) straight RGBA, top row first. ``path``: the target;
-    its name ends in ``.png``. Returns: The file. Raises VDIFileError if the target cannot be
-    written.
+    Raises VDIFileError if it cannot be written; it appears whole or not at all.
     """
     from PIL import Image
 
@@ -48,8 +45,3 @@ def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
     with whole_file(target) as stream:
         Image.fromarray(pixels).save(stream, format="png")
     return target
-
-
-def checked_png_target(path: str | os.PathLike[str]) -> Path:
-    """Raise VDIFileError now if a picture could not be written there later."""
-    return check_writable(with_suffix(as_path(path), (".png",), "a picture"))

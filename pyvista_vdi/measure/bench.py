@@ -19,7 +19,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
-from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -143,10 +143,11 @@ class Bench:
 
         prop = volume_property or property_of(volume, table)
         # Without a GPU its mapper makes a texture on the host, and what this is filled from
-        require_free_memory(
+        require_host_memory(
             2 * volume.array.nbytes,
             f"the volume {volume.name!r} in VTK's GPU mapper as well, beside ours,",
             "take a smaller one, or a machine with more memory",
+            free=True,
         )
         for name in MAPPERS:
             self.vtk[name] = VTKMapper(volume, prop, window_size, name)

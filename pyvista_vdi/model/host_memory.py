@@ -83,28 +83,14 @@ class GrowingArray:
         return self.part(0, n)
 
 
-def physical_memory() -> int:
-    """Return the host's memory, bytes."""
-    return int(psutil.virtual_memory().total)
+def require_host_memory(nbytes: int, what: str, remedy: str, *, free: bool = False) -> None:
+    """Raise DeviceMemoryError where the host has less memory in all, or less that is ``free``.
 
-
-def require_free_memory(nbytes: int, what: str, remedy: str) -> None:
-    """Refuse (DeviceMemoryError) what the host cannot hold beside what is running; see below."""
-    require_host_memory(nbytes, what, remedy)
-    if nbytes > (free := psutil.virtual_memory().available):
-        raise DeviceMemoryError(
-            f"{what} needs {nbytes / 2**30:.2f} GiB on the host, of which {free / 2**30:.2f} GiB "
-            f"are free: close other programs, or {remedy}"
-        )
-
-
-def require_host_memory(nbytes: int, what: str, remedy: str) -> None:
-    """Refuse so many bytes (DeviceMemoryError) where the host has less memory in all.
-
-    ``what`` needs them, and how large it is; ``remedy`` is what the caller can do.
+    ``what`` needs ``nbytes``, and how large it is; ``remedy`` is what the caller can do.
     """
-    if nbytes > (available := physical_memory()):
-        raise DeviceMemoryError(
-            f"{what} needs {nbytes / 2**30:.2f} GiB on the host, which has "
-            f"{available / 2**30:.2f} GiB: {remedy}"
-        )
+    needs, memory = f"{what} needs {nbytes / 2**30:.2f} GiB on the host", psutil.virtual_memory()
+    if nbytes > memory.total:
+        raise DeviceMemoryError(f"{needs}, which has {memory.total / 2**30:.2f} GiB: {remedy}")
+    if free and nbytes > memory.available:
+        left = f"{memory.available / 2**30:.2f} GiB are free"
+        raise DeviceMemoryError(f"{needs}, of which {left}: close other programs, or {remedy}")

@@ -44,10 +44,7 @@ def writable_cache(name: str, author: str | None = None) -> Path:
 
     Raises OSError if files cannot be made in it.
     """
-    try:
-        folder = Path(platformdirs.user_cache_dir(name, author or False))
-    except RuntimeError as error:
-        folder = Path(str(error))
+    folder = Path(platformdirs.user_cache_dir(name, author or False))
     if not folder.is_absolute():  # there is no home, and the system does not know the user
         raise OSError(f"there is no home for {folder}")
     folder.mkdir(parents=True, exist_ok=True)

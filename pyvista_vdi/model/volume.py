@@ -15,7 +15,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.model.checks import as_floats, as_vector
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
-from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.packed_values import packing_of
 
 
@@ -279,7 +279,7 @@ class Volume(Geometry):
             return self
         found = self.in_view(*cameras, window_size=window_size)
         what = f"the volume {found.name}"
-        require_free_memory(found.array.nbytes, what, "open a coarser level (level=...)")
+        require_host_memory(found.array.nbytes, what, "open a coarser level (level=...)", free=True)
         return found.load()
 
     @property

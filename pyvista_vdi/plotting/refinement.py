@@ -8,7 +8,7 @@ from typing import Any
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.io.stores import StoredVolume
-from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.convert import to_image_data
 from pyvista_vdi.plotting.volumes import held
@@ -28,7 +28,9 @@ _FIRST = 10.0
 def load(volume: StoredVolume) -> Volume:
     """Read a level of a store and log which; DeviceMemoryError if the host lacks the memory."""
     remedy = "open a coarser level by pyvista_vdi.open_volume(path, level=...), or generate a VDI"
-    require_free_memory(volume.array.nbytes, f"the volume in {volume.store.path}", remedy)
+    require_host_memory(
+        volume.array.nbytes, f"the volume in {volume.store.path}", remedy, free=True
+    )
     _log.info("%s: %s", volume.store.path, volume.describe())
     return volume.load()
 

@@ -17,7 +17,7 @@ from pyvista_vdi.errors import (
     VDIError,
     warn_external,
 )
-from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, ask_for_all, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     BLANKED,
@@ -302,7 +302,7 @@ def _numbers(grid: Any, resample: str | Sequence[int] | None) -> NDArray[Any] | 
             "resample=(nx, ny, nz)"
         )
     need = count * 8 * (2 + len(grid.array_names))
-    require_free_memory(need, f"the grid of {count} points", "resample to fewer")
+    require_host_memory(need, f"the grid of {count} points", "resample to fewer", free=True)
     return numbers
 
 

@@ -6,6 +6,7 @@ import functools
 import gc
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -216,6 +217,12 @@ def limited(runtime, monkeypatch, *, buffer=2**40, total=2**40):
     monkeypatch.setattr(runtime, "info", info)
 
 
+def has_memory(total, monkeypatch):
+    """Let the host have so many bytes."""
+    found = SimpleNamespace(total=total, available=total)
+    monkeypatch.setattr("psutil.virtual_memory", lambda: found)
+
+
 def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
     volume = Volume(np.ones((64, 64, 64), np.float32), name="density")
     limited(runtime, monkeypatch, buffer=2**14)  # a brick of 17 x 17 x 17 points needs 19 KiB
@@ -264,7 +271,7 @@ def test_a_window_beyond_memory_is_refused_before_anything_is_drawn(
     with pytest.raises(DeviceMemoryError, match=message):
         draw(window_size=(65536, 65536))
     # Four rows of lists at the very least are made at a time
-    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: 2**60)
+    has_memory(2**60, monkeypatch)
     with pytest.raises(DeviceMemoryError, match="'recorded runs' needs .* GiB"):
         make(window_size=(65536, 65536), max_supersegments=4096)
     gc.collect()
@@ -347,6 +354,6 @@ def test_giving_up_leaves_nothing_allocated(runtime, sliced, at, error):
     ],
 )
 def test_a_vdi_that_the_host_cannot_hold_is_refused(make, monkeypatch, memory, window, message):
-    monkeypatch.setattr("pyvista_vdi.model.host_memory.physical_memory", lambda: memory)
+    has_memory(memory, monkeypatch)
     with pytest.raises(DeviceMemoryError, match=message):
         make(window_size=window)

@@ -162,6 +162,12 @@ def test_a_target_gets_what_kernels_write(runtime, aligned):
         elsewhere = np.empty_like(array)
         np.testing.assert_array_equal(runtime.download(buffer, elsewhere), np.full((40, 50), 0.5))
     assert runtime.allocated == before
+    for bad in (array[:, ::2], array.T):
+        with pytest.raises(InvalidArgumentError, match="'values' must be C-contiguous"):
+            runtime.target(bad, "values")
+    array.flags.writeable = False
+    with pytest.raises(InvalidArgumentError, match="writeable=False"):
+        runtime.target(array, "values")
 
 
 def test_write_fill_and_download_into(runtime):

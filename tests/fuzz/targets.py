@@ -24,9 +24,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import psutil
 from fuzz.choices import JUNK, NUMBERS, Choices
 from strategies import random_vdi
 
@@ -39,7 +41,6 @@ from pyvista_vdi.extensions.sets import files as set_files
 from pyvista_vdi.extensions.web import messages
 from pyvista_vdi.extensions.web.page import DATA_TYPE
 from pyvista_vdi.extensions.web.page import page as page_of
-from pyvista_vdi.model import host_memory
 
 #: Bytes that a byte of a file may become (docs/robustness.md): a block of 128 KiB from 4 bytes is
 #: Zstandard's best, and an array is held twice while it is decoded, a third time as the VDI's.
@@ -86,16 +87,17 @@ def base_vdi(index: int = 0) -> VDI:
 @contextlib.contextmanager
 def limited(device_bytes: int = DEVICE_BYTES) -> Iterator[None]:
     """Pretend that device and host are small, so that absurd sizes are refused, not tried."""
-    runtime, memory = get_runtime(), host_memory.physical_memory
+    runtime, memory = get_runtime(), psutil.virtual_memory
     info = runtime.info
     runtime.info = replace(
         info, max_allocation=device_bytes, global_memory=runtime.allocated + 4 * device_bytes
     )
-    host_memory.physical_memory = lambda: 4 * device_bytes
+    small = SimpleNamespace(total=4 * device_bytes, available=4 * device_bytes)
+    psutil.virtual_memory = lambda: small
     try:
         yield
     finally:
-        runtime.info, host_memory.physical_memory = info, memory
+        runtime.info, psutil.virtual_memory = info, memory
 
 
 def _steps_of(path: Path) -> Iterator[VDI]:

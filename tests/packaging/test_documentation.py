@@ -256,4 +256,4 @@ def test_properties_on_the_page_of_paraview_are_the_plugin_s():
     named += re.findall(r"(?:VDIWriter|SaveData|VDISource)\([^)]*?\b([A-Z]\w+)=", text)
     assert len(named) > 15
     for name in named:
-        assert re.search(rf'["\']{name}["\']', plugin), name
+        assert re.search(rf"\b{name}\b", plugin), name

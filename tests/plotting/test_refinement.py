@@ -116,10 +116,10 @@ def test_a_level_that_cannot_be_read_leaves_the_picture_and_is_said_once(store, 
 def test_what_memory_cannot_hold_is_not_read(store, plotter, monkeypatch):
     actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
 
-    def refuse(nbytes, what, remedy):
+    def refuse(nbytes, what, remedy, free):
         raise pvdi.DeviceMemoryError(f"{what} needs {nbytes} bytes: {remedy}")
 
-    monkeypatch.setattr(refinement, "require_free_memory", refuse)
+    monkeypatch.setattr(refinement, "require_host_memory", refuse)
     look_from(plotter, 40)
     with pytest.warns(pvdi.VDIWarning, match="level 0 of .* bytes"):
         picture(plotter)

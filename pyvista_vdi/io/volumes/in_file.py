@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
-from pyvista_vdi.model.host_memory import require_free_memory
+from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.volume import Volume
 
 #: What to do with what is not read.
@@ -160,7 +160,9 @@ def volume_of(
     if found.volume is not None:
         return found.volume()
     points = np.prod([count[axis] for axis in kept], dtype=object)
-    require_free_memory(points * found.dtype.itemsize, f"the volume in {file}", "take less")
+    require_host_memory(
+        points * found.dtype.itemsize, f"the volume in {file}", "take less", free=True
+    )
     values = found.array[tuple(slice(None) if a in kept else at.get(a, 0) for a in axes)]
     if isinstance(values, np.memmap):  # a file that shrinks under a map kills the process
         values = np.array(values)
