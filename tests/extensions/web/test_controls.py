@@ -348,7 +348,7 @@ def test_pictures_of_values_are_those_of_render(kept, from_disk):
 @pytest.mark.slow
 def test_exact_values_are_shown_and_a_file_without_a_look_has_a_ramp(kept, open_page, tmp_path):
     page = open_page(SIZE)
-    page.load(kept.save(tmp_path / "kept.vdi").read_bytes())
+    page.load(kept.save(tmp_path / "kept.vdi", compression="deflate").read_bytes())
     assert points_of(page) == [0, 0, 1, 1]
     assert page.evaluate("viewer.values.range") == list(RANGE)
     lengths = page.evaluate("[...viewer.values.histogram]")

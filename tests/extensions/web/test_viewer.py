@@ -529,10 +529,11 @@ def test_memory_stays_flat_over_frames_and_swaps(vdi, data, open_page):
           }};
         }}"""
     )
-    page.evaluate("use(100, 5)")
+    page.evaluate("use(500, 20)")
     session = page.page.context.new_cdp_session(page.page)
 
     def used():
+        page.evaluate("heard.length = 0")  # of this page, not of the viewer
         session.send("HeapProfiler.collectGarbage")
         heap = session.send("Runtime.getHeapUsage")["usedSize"]
         return page.evaluate("JSON.stringify(alive)"), heap
