@@ -110,7 +110,7 @@ def test_axe_finds_nothing(scheme, server, open_page):
     page = open_page(url=server.url, viewport=viewport, color_scheme=scheme)
     wait(page, "remote.received.vdis === 1")
     assert_axe_finds_nothing(page)
-    page.page.get_by_role("button", name="Brightness, opacity and clipping").click()
+    page.page.get_by_label("Settings", exact=True).first.click()
     assert_axe_finds_nothing(page)
 
 
