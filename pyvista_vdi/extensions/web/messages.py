@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 from pyvista_vdi.errors import VDIError
@@ -42,31 +43,23 @@ class Wish:
 def wish_after(text: str, wish: Wish, offer: Mapping[str, Any]) -> Wish:
     """Return what a client wants after a message; ``offer``: what hello lists."""
     try:
-        message = json.loads(text)
-        kind = message.pop("type")
-        if kind == "view":
-            return replace(wish, view=_view(**message))
-        if kind == "look":
-            return replace(wish, look=_look(offer, **message))
-        if kind == "time":
-            return replace(wish, step=_step(offer, **message))
-        raise BadMessageError(f"a message is of type view, look or time; got {kind!r:.40}")
-    # No JSON, no object, not the entries of its type, or no camera
-    except (AttributeError, KeyError, TypeError, ValueError, RecursionError, VDIError) as error:
+        match json.loads(text):
+            case {"type": "view", "camera": {**state}, "size": [_, _] as size, **rest} if not rest:
+                camera = camera_of(state)
+                lens = camera.parallel_scale if camera.parallel_projection else camera.view_angle
+                places = (camera.position, camera.focal_point, camera.view_up, camera.window_center)
+                _numbers("a camera", [*chain(*places), lens, 1 / lens])
+                width, height = _numbers("size", size, 1, MAX_PICTURE_EDGE, whole=True)
+                return replace(wish, view=View(camera, (width, height)))
+            case {"type": "look", **look}:
+                return replace(wish, look=_look(offer, **look))
+            case {"type": "time", "step": step, **rest} if not rest:
+                (step,) = _numbers("step", [step], 0, offer["steps"] - 1, whole=True)
+                return replace(wish, step=step)
+        raise BadMessageError(f"a view, a look or a time with its entries is one; got {text:.40}")
+    # No JSON, not the entries of its type, or no camera
+    except (KeyError, TypeError, ValueError, RecursionError, VDIError) as error:
         raise BadMessageError(f"the message is none of the protocol's: {error}") from None
-
-
-def _view(camera: Any, size: Any) -> View:
-    view = camera_of(camera)
-    lens = view.parallel_scale if view.parallel_projection else view.view_angle
-    places = (view.position, view.focal_point, view.view_up, view.window_center)
-    _numbers("a camera", [*sum(places, ()), lens, 1 / lens])
-    width, height = _numbers("size", size, 1, MAX_PICTURE_EDGE, whole=True)
-    return View(view, (width, height))
-
-
-def _step(offer: Mapping[str, Any], step: Any) -> int:
-    return _numbers("step", [step], 0, offer["steps"] - 1, whole=True)[0]  # type: ignore[no-any-return]
 
 
 def _look(

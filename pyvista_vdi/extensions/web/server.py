@@ -15,15 +15,17 @@ import logging
 import secrets
 import threading
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote, urlsplit
 
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
+from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, Wish, wish_after
-from pyvista_vdi.extensions.web.served_page import served_page
+from pyvista_vdi.extensions.web.page import html_page
 from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
@@ -31,6 +33,7 @@ from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, Volum
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web
+    from aiohttp.typedefs import Handler
 except ImportError as error:
     raise MissingDependencyError(
         'serving needs aiohttp, which is not installed: pip install "pyvista-vdi[web]"'
@@ -52,9 +55,34 @@ _HEADERS = {
     "X-Frame-Options": "SAMEORIGIN",
 }
 
-_log = logging.getLogger(__name__)
+#: What is said stands over the picture, as high as its text: the viewer's size, which is the view
+#: that is asked for, depends on none of it.
+_STYLE = """\
+body { display: flex; flex-direction: column; color: #d0d0d0; font: 14px sans-serif; }
+vdi-viewer { flex: 1; min-height: 0; }
+form { position: relative; display: flex; flex-wrap: wrap; gap: 4px 16px; padding: 6px 10px;
+  align-items: center; min-height: 1.5em; }
+label { display: flex; gap: 6px; align-items: center; }
+input[type="number"] { width: 6em; }
+@media (pointer: coarse) { input, select { min-height: 36px; } }
+input:invalid { outline: 2px solid #ff6060; }
+output { position: absolute; right: 0; bottom: 100%; max-width: 100%; box-sizing: border-box;
+  padding: 4px 10px; background: #000c; text-align: right; overflow-wrap: anywhere;
+  pointer-events: none; }
+output:empty { padding: 0; }
+"""
 
-_Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+_BODY = """\
+<vdi-viewer id="viewer" hash></vdi-viewer>
+<form><span id="controls" style="display: contents"></span><output id="status"></output></form>
+<script type="module" nonce="%s">
+%s
+const byId = (id) => document.getElementById(id);
+window.remote = connectPage(byId("viewer"), byId("controls"), byId("status"));
+</script>
+"""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(eq=False)
@@ -63,21 +91,10 @@ class _Client:
 
     socket: web.WebSocketResponse
     wish: Wish = field(default_factory=Wish)  # the last
-    wished: asyncio.Event = field(default_factory=asyncio.Event)  # that another wish has come
-    cancelled: threading.Event = field(default_factory=threading.Event)
-
-    async def say(self, kind: str, **entries: Any) -> None:
-        """Send a message."""
-        await self.socket.send_json({"type": kind, **entries})
-
-    async def end(self, code: int, reason: str) -> None:
-        """Close the connection with a goodbye."""
-        # The protocol has 123 bytes for a reason, none of them a part of a letter
-        message = reason.encode("ascii", "replace")[:120]
-        await self.socket.close(code=code, message=message, drain=False)
+    wished: asyncio.Event = field(default_factory=asyncio.Event)  # that another has come
 
 
-class Server:
+class Server(AbstractContextManager["Server"]):
     """Makes VDIs for the views of its clients; see :func:`serve`.
 
     Attributes
@@ -154,11 +171,9 @@ class Server:
 
     def wait(self) -> None:
         """Return when it has ended; Ctrl-C ends it."""
-        try:
+        with self, contextlib.suppress(KeyboardInterrupt):
             while self._loop is not None:
                 time.sleep(0.2)
-        finally:
-            self.close()
 
     def close(self) -> None:
         """End all connections and what is being made, and wait until that has happened."""
@@ -170,9 +185,6 @@ class Server:
             loop.close()
         self._threads.shutdown(cancel_futures=True)
 
-    def __enter__(self) -> Server:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -180,8 +192,9 @@ class Server:
         """Return what answers requests, for an event loop of the caller's."""
 
         async def end_clients(_: web.Application) -> None:
-            goodbye = (WSCloseCode.GOING_AWAY, "the server ends")
-            await asyncio.gather(*(client.end(*goodbye) for client in [*self.clients]))
+            goodbye: Any = {"code": WSCloseCode.GOING_AWAY, "message": b"the server ends"}
+            sockets = [client.socket for client in self.clients]
+            await asyncio.gather(*(socket.close(**goodbye, drain=False) for socket in sockets))
 
         app = web.Application(middlewares=[self._guard], client_max_size=MAX_MESSAGE)
         app.add_routes([web.get("/", self._page), web.get("/socket", self._socket)])
@@ -189,11 +202,17 @@ class Server:
         return app
 
     @web.middleware
-    async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Admit requests that know the token, from a page of ours, by a name of ours."""
+        try:
+            # A number is a name of ours: it cannot be made to point here
+            name = urlsplit(f"//{request.host}").hostname or ""
+            ours = name in self._hosts or bool(ipaddress.ip_address(name))
+        except ValueError:
+            ours = False
         origin = request.headers.get("Origin")
         given = request.query.get("token", "").encode()
-        if not self._is_ours(request.host):
+        if not ours:
             # A page of another site whose name was made to point here (DNS rebinding)
             why = "this server does not go by that name"
         elif origin is not None and origin.partition("://")[2] != request.host:
@@ -207,17 +226,16 @@ class Server:
             return await handler(request)
         return web.Response(status=403, text=f"{why}\n")
 
-    def _is_ours(self, host: str) -> bool:
-        """Whether a host is called by a name of ours, or by a number, which cannot point here."""
-        name = ""
-        with contextlib.suppress(ValueError):
-            name = urlsplit(f"//{host}").hostname or ""
-            ipaddress.ip_address(name)
-            return True
-        return name in self._hosts
-
     async def _page(self, request: web.Request) -> web.Response:
-        text = served_page(request.host)
+        """Send the viewer, its controls and the connection; only this script runs in the page."""
+        nonce, host = secrets.token_urlsafe(16), request.host
+        policy = (
+            f"default-src 'none'; script-src 'nonce-{nonce}' blob:; worker-src blob:; "
+            "style-src 'unsafe-inline'; img-src data: blob:; "
+            f"connect-src 'self' ws://{host} wss://{host}; base-uri 'none'; form-action 'none'"
+        )
+        body = _BODY % (nonce, viewer_script("remote.js", module=True))
+        text = html_page("A volume, to be turned", body, "#202020", policy, _STYLE)
         return web.Response(text=text, content_type="text/html", headers=_HEADERS)
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
@@ -236,27 +254,26 @@ class Server:
                 text="this address is a WebSocket's: open the server's page\n",
                 headers={"Upgrade": "websocket", "Sec-WebSocket-Version": "13"},
             )
+        await socket.prepare(request)
         client = _Client(socket)
         self.clients.add(client)
-        answering = None
+        answering = asyncio.ensure_future(self._answer(client))
         try:
-            await socket.prepare(request)
-            answering = asyncio.ensure_future(self._answer(client))
             async for message in socket:
                 if message.type is not WSMsgType.TEXT:
                     raise BadMessageError("messages are text")
                 wish = wish_after(message.data, client.wish, self._source.offer)
                 if wish != client.wish:
                     client.wish = wish
-                    client.cancelled.set()  # what is made of another wish
                     client.wished.set()
         except BadMessageError as error:
-            await client.end(WSCloseCode.POLICY_VIOLATION, str(error))
+            # The protocol has 123 bytes for a reason, none of them a part of a letter
+            why = str(error).encode("ascii", "replace")[:120]
+            await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=why, drain=False)
         finally:
             self.clients.discard(client)
-            client.cancelled.set()
-            if answering is not None:
-                answering.cancel()
+            client.wish = Wish()  # which gives up what is being made
+            answering.cancel()
             gone = not socket.closed or socket.close_code == WSCloseCode.ABNORMAL_CLOSURE
             if gone and request.transport is not None:
                 request.transport.abort()  # what it has not taken is not kept
@@ -264,34 +281,40 @@ class Server:
 
     async def _answer(self, client: _Client) -> None:
         """Make and send a VDI of the last wish, and of what is wished meanwhile the last again."""
+        socket = client.socket
         try:
-            await client.say("hello", protocol=PROTOCOL, **self._source.offer)
+            await socket.send_json({"type": "hello", "protocol": PROTOCOL, **self._source.offer})
             while await client.wished.wait():
                 client.wished.clear()
-                wish, client.cancelled = client.wish, threading.Event()
+                wish = client.wish
                 if wish.view is None:
                     continue
-                await client.say("status", doing="vdi")
+                await socket.send_json({"type": "status", "doing": "vdi"})
                 try:
                     lists, file = await asyncio.get_running_loop().run_in_executor(
-                        self._threads, self._source.make, wish, client.cancelled.is_set
+                        self._threads,
+                        self._source.make,
+                        wish,
+                        lambda wish=wish: client.wish is not wish,
                     )
                 except Cancelled:
                     continue
                 except VDIError as error:
-                    await client.say("status", doing=None)
-                    await client.say("error", message=str(error))
+                    await socket.send_json({"type": "status", "doing": None})
+                    await socket.send_json({"type": "error", "message": str(error)})
                     continue
                 if file:
-                    await client.say("vdi", bytes=len(file), lists=lists, step=wish.step)
+                    size = {"bytes": len(file), "lists": lists}
+                    await socket.send_json({"type": "vdi", **size, "step": wish.step})
                 for first in range(0, len(file), CHUNK):
-                    await client.socket.send_bytes(file[first : first + CHUNK])
-                await client.say("status", doing=None)
+                    await socket.send_bytes(file[first : first + CHUNK])
+                await socket.send_json({"type": "status", "doing": None})
         except ConnectionError:
             pass  # who is gone needs nothing more
         except Exception:
             _log.exception("a client was sent away")
-            await client.end(WSCloseCode.INTERNAL_ERROR, "the server has failed")
+            failed: Any = {"code": WSCloseCode.INTERNAL_ERROR, "message": b"the server has failed"}
+            await socket.close(**failed, drain=False)
 
 
 def serve(
@@ -377,8 +400,7 @@ def serve(
     if announce is not None:
         announce(f"Serving at {server.url} (Ctrl-C ends it)")
     if wait:
-        with contextlib.suppress(KeyboardInterrupt):
-            server.wait()
+        server.wait()
     return server
 
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import atexit
 import itertools
-import shutil
-import tempfile
+from base64 import b64encode
 from collections.abc import Callable, Mapping
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.errors import MissingDependencyError
@@ -17,7 +14,6 @@ from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.extensions.web.shown import bare_file
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.inputs import as_vdi
-from pyvista_vdi.model.view import View
 
 try:
     from trame_client.widgets.core import AbstractElement
@@ -61,16 +57,9 @@ _numbers = itertools.count(1)
 
 @cache
 def _module() -> dict[str, Any]:
-    """Return what trame serves: a folder with the viewer and the component as one script."""
-    folder = tempfile.mkdtemp(prefix="pyvista-vdi-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    (Path(folder) / "viewer.js").write_text(viewer_script() + _COMPONENT, encoding="utf-8")
-    served = "__pyvista_vdi"
-    return {
-        "serve": {served: folder},
-        "scripts": [f"{served}/viewer.js"],
-        "vue_use": ["pyvistaVDI"],
-    }
+    """Return what trame's pages load: the viewer and the component, one script in its own URL."""
+    script = b64encode((viewer_script() + _COMPONENT).encode()).decode()
+    return {"scripts": [f"data:text/javascript;base64,{script}"], "vue_use": ["pyvistaVDI"]}
 
 
 class VDIView(AbstractElement):
@@ -89,6 +78,11 @@ class VDIView(AbstractElement):
     **kwargs
         Of trame's elements: ``style``, ``classes`` and others.
 
+    Attributes
+    ----------
+    size : (int, int) or None
+        Width and height of the page's picture, pixels; ``None`` before that is known.
+
     Raises
     ------
     MissingDependencyError
@@ -106,7 +100,7 @@ class VDIView(AbstractElement):
     ) -> None:
         key = f"pyvista_vdi_{next(_numbers)}"
         self._file_key, self._camera_key = f"{key}_file", f"{key}_camera"
-        self._view: View | None = None
+        self._camera: Camera | None = None
         self._on_camera = on_camera
         super().__init__(
             "vdi-view",
@@ -120,6 +114,7 @@ class VDIView(AbstractElement):
         # Not "camera", which would be no attribute of this class any more
         self._attr_names += ["file", "eye", "background"]
         self._event_names += ["turned"]
+        self.size: tuple[int, int] | None = None
         if vdi is not None:
             self.update(vdi)
         if camera is not None:
@@ -133,23 +128,16 @@ class VDIView(AbstractElement):
     @property
     def camera(self) -> Camera | None:
         """Where the page sees the VDI from; ``None`` before that is known. It can be set."""
-        return None if self._view is None else self._view.camera
+        return self._camera
 
     @camera.setter
     def camera(self, camera: Any) -> None:
-        camera = Camera.from_any(camera)
-        size = (1, 1) if self._view is None else self._view.size
-        self._view = View(camera, size)
+        self._camera = Camera.from_any(camera)
         with self.server.state as state:
-            state[self._camera_key] = viewer_camera(camera, size)
-
-    @property
-    def size(self) -> tuple[int, int] | None:
-        """Width and height of the page's picture, pixels; ``None`` before that is known."""
-        return None if self._view is None else self._view.size
+            state[self._camera_key] = viewer_camera(self._camera, self.size or (1, 1))
 
     def _turned(self, event: Mapping[str, Any]) -> None:
         width, height = event["size"]
-        self._view = View(camera_of(event["camera"]), (int(width), int(height)))
+        self.size, self._camera = (int(width), int(height)), camera_of(event["camera"])
         if self._on_camera is not None:
             self._on_camera(self)
