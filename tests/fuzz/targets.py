@@ -38,7 +38,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
 from pyvista_vdi.extensions.series import files as series_files
 from pyvista_vdi.extensions.sets import files as set_files
-from pyvista_vdi.extensions.web import messages
+from pyvista_vdi.extensions.web import source as served
 from pyvista_vdi.extensions.web.page import DATA_TYPE
 from pyvista_vdi.extensions.web.page import page as page_of
 
@@ -788,7 +788,7 @@ _OFFERS = (
 def served_messages(data: bytes) -> None:
     """What a client may say to a server: taken, and then within bounds, or refused by name."""
     choices = Choices(data)
-    offer, wish = choices.pick(_OFFERS), messages.Wish()
+    offer, wish = choices.pick(_OFFERS), served.Wish()
     for _ in range(choices.integer(1, 6)):
         said = choices.pick(_SAID)
         for _ in range(choices.integer(0, 3)):
@@ -796,19 +796,19 @@ def served_messages(data: bytes) -> None:
         text = json.dumps(said)
         if choices.chance(3):
             text = choices.patched(text.encode()).decode("utf-8", "replace")
-        with contextlib.suppress(messages.BadMessageError):
-            wish = messages.wish_after(text, wish, offer)
+        with contextlib.suppress(served.BadMessageError):
+            wish = served.wish_after(text, wish, offer)
         _check_wish(wish, offer)
 
 
-def _check_wish(wish: messages.Wish, offer: Mapping[str, Any]) -> None:
+def _check_wish(wish: served.Wish, offer: Mapping[str, Any]) -> None:
     assert type(wish.step) is int
     assert 0 <= wish.step < offer["steps"]
     look = dict(wish.look)
     assert look.get("cmap") in (None, *offer["cmaps"])
     if isinstance(opacity := look.get("opacity"), tuple):
         assert offer["cmaps"]
-        assert 2 <= len(opacity) <= messages.MAX_OPACITIES
+        assert 2 <= len(opacity) <= served.MAX_OPACITIES
         assert all(0 <= value <= 1 for value in opacity)
     else:
         assert opacity in (None, *offer["opacities"])
@@ -816,7 +816,7 @@ def _check_wish(wish: messages.Wish, offer: Mapping[str, Any]) -> None:
         assert -np.inf < clim[0] < clim[1] < np.inf
     hash(wish)  # what is made is looked up by it
     if wish.view is not None:
-        assert all(1 <= edge <= messages.MAX_PICTURE_EDGE for edge in wish.view.size)
+        assert all(1 <= edge <= served.MAX_PICTURE_EDGE for edge in wish.view.size)
 
 
 def public_functions(data: bytes) -> None:

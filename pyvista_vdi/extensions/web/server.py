@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
 import hmac
-import inspect
 import ipaddress
 import logging
 import secrets
@@ -17,16 +15,13 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote, urlsplit
 
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
 from pyvista_vdi.extensions.web.bundle import viewer_script
-from pyvista_vdi.extensions.web.messages import MAX_MESSAGE, BadMessageError, Wish, wish_after
 from pyvista_vdi.extensions.web.page import html_page
-from pyvista_vdi.extensions.web.source import Source
+from pyvista_vdi.extensions.web.source import BadMessageError, Source, Wish, wish_after
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
@@ -39,22 +34,8 @@ except ImportError as error:
         'serving needs aiohttp, which is not installed: pip install "pyvista-vdi[web]"'
     ) from error
 
-#: Version of what is said on the socket.
-PROTOCOL = 2
 #: Bytes of one message of a VDI: a slow line takes it long before a client counts as gone.
 CHUNK = 64 * 1024
-#: Seconds that a client has to answer a goodbye.
-_GOODBYE = 3.0
-#: Threads in which VDIs are made: while one packs and compresses, the device works for the other.
-_THREADS = 2
-#: Of the page, whose address has the token.
-_HEADERS = {
-    "Cache-Control": "no-store",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "SAMEORIGIN",
-}
-
 #: What is said stands over the picture, as high as its text: the viewer's size, which is the view
 #: that is asked for, depends on none of it.
 _STYLE = """\
@@ -82,19 +63,8 @@ window.remote = connectPage(byId("viewer"), byId("controls"), byId("status"));
 </script>
 """
 
-_log = logging.getLogger(__name__)
 
-
-@dataclass(eq=False)
-class _Client:
-    """One connection: what it wants, and what is being made for it."""
-
-    socket: web.WebSocketResponse
-    wish: Wish = field(default_factory=Wish)  # the last
-    wished: asyncio.Event = field(default_factory=asyncio.Event)  # that another has come
-
-
-class Server(AbstractContextManager["Server"]):
+class Server(contextlib.AbstractContextManager["Server"]):
     """Makes VDIs for the views of its clients; see :func:`serve`.
 
     Attributes
@@ -103,11 +73,11 @@ class Server(AbstractContextManager["Server"]):
         What a URL must carry.
     host, port : str, int
         Where it listens; the port that was found free, if 0 was asked for.
-
-    Notes
-    -----
-    ``heartbeat``: seconds between two signs of life that are asked of a client, which has half as
-    many to give one.
+    url : str
+        What a browser is to open, once it listens.
+    heartbeat : float
+        Seconds between two signs of life that are asked of a client, which has half as many to
+        give one.
     """
 
     def __init__(
@@ -128,18 +98,14 @@ class Server(AbstractContextManager["Server"]):
             )
         self.token = secrets.token_urlsafe(16) if token is None else token
         self.host, self.port = host, port
-        self.clients: set[_Client] = set()
-        self._source, self._max_clients, self._heartbeat = source, max_clients, heartbeat
+        self.clients: set[web.WebSocketResponse] = set()
+        self.heartbeat = heartbeat
+        self._source, self._max_clients = source, max_clients
         # As browsers write names, in small letters
         self._hosts = {name.lower() for name in ("localhost", host, *hosts) if name}
-        self._threads = ThreadPoolExecutor(_THREADS, "pyvista-vdi serve")
+        # While one packs and compresses a VDI, the device works for the other
+        self._threads = ThreadPoolExecutor(2, "pyvista-vdi serve")
         self._loop: asyncio.AbstractEventLoop | None = None  # while it listens
-
-    @property
-    def url(self) -> str:
-        """What a browser is to open."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"http://{host}:{self.port}/?token={quote(self.token, safe='')}"
 
     def start(self) -> Server:
         """Listen, in a thread of its own; return when it does.
@@ -158,10 +124,12 @@ class Server(AbstractContextManager["Server"]):
             asyncio.run_coroutine_threadsafe(self._listen(), self._loop).result()
         except (OSError, OverflowError) as error:
             self.close()
-            why = f"cannot listen at {self.host}, port {self.port}: {error}; choose another"
-            if getattr(error, "errno", None) == errno.EADDRINUSE:
-                why = f"port {self.port} of {self.host} is in use: choose another, or 0: a free one"
-            raise InvalidArgumentError(why) from error
+            raise InvalidArgumentError(
+                f"cannot listen at {self.host}, port {self.port}: {error}; "
+                "choose another, or 0: a free one"
+            ) from error
+        name = f"[{self.host}]" if ":" in self.host else self.host
+        self.url = f"http://{name}:{self.port}/?token={quote(self.token, safe='')}"
         return self
 
     async def _listen(self) -> None:
@@ -193,10 +161,10 @@ class Server(AbstractContextManager["Server"]):
 
         async def end_clients(_: web.Application) -> None:
             goodbye: Any = {"code": WSCloseCode.GOING_AWAY, "message": b"the server ends"}
-            sockets = [client.socket for client in self.clients]
-            await asyncio.gather(*(socket.close(**goodbye, drain=False) for socket in sockets))
+            ending = [socket.close(**goodbye, drain=False) for socket in self.clients]
+            await asyncio.gather(*ending)
 
-        app = web.Application(middlewares=[self._guard], client_max_size=MAX_MESSAGE)
+        app = web.Application(middlewares=[self._guard])
         app.add_routes([web.get("/", self._page), web.get("/socket", self._socket)])
         app.on_shutdown.append(end_clients)
         return app
@@ -236,16 +204,22 @@ class Server(AbstractContextManager["Server"]):
         )
         body = _BODY % (nonce, viewer_script("remote.js", module=True))
         text = html_page("A volume, to be turned", body, "#202020", policy, _STYLE)
-        return web.Response(text=text, content_type="text/html", headers=_HEADERS)
+        headers = {  # of a page whose address has the token
+            "Cache-Control": "no-store",
+            "Referrer-Policy": "no-referrer",
+            "X-Content-Type-Options": "nosniff",
+            "X-Frame-Options": "SAMEORIGIN",
+        }
+        return web.Response(text=text, content_type="text/html", headers=headers)
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         """Hear a client, and have what it asks for made and sent, until one of these ends."""
         if len(self.clients) >= self._max_clients:
             return web.Response(status=503, text="there are as many clients as this server takes")
         socket = web.WebSocketResponse(
-            timeout=_GOODBYE,
-            max_msg_size=MAX_MESSAGE,
-            heartbeat=self._heartbeat,
+            timeout=3.0,  # seconds that a client has to answer a goodbye
+            max_msg_size=16 * 1024,
+            heartbeat=self.heartbeat,
             compress=False,
         )
         if not socket.can_prepare(request):
@@ -255,47 +229,41 @@ class Server(AbstractContextManager["Server"]):
                 headers={"Upgrade": "websocket", "Sec-WebSocket-Version": "13"},
             )
         await socket.prepare(request)
-        client = _Client(socket)
-        self.clients.add(client)
-        answering = asyncio.ensure_future(self._answer(client))
+        self.clients.add(socket)
+        wish, wishes = Wish(), asyncio.Queue[Wish]()
+        answering = asyncio.ensure_future(self._answer(socket, wishes))
         try:
             async for message in socket:
                 if message.type is not WSMsgType.TEXT:
                     raise BadMessageError("messages are text")
-                wish = wish_after(message.data, client.wish, self._source.offer)
-                if wish != client.wish:
-                    client.wish = wish
-                    client.wished.set()
+                before, wish = wish, wish_after(message.data, wish, self._source.offer)
+                if wish != before and wish.view is not None:
+                    if not wishes.empty():
+                        wishes.get_nowait()  # the last one counts
+                    wishes.put_nowait(wish)
         except BadMessageError as error:
             # The protocol has 123 bytes for a reason, none of them a part of a letter
             why = str(error).encode("ascii", "replace")[:120]
             await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=why, drain=False)
         finally:
-            self.clients.discard(client)
-            client.wish = Wish()  # which gives up what is being made
+            self.clients.discard(socket)
+            wishes.put_nowait(wish)  # which gives up what is being made
             answering.cancel()
             gone = not socket.closed or socket.close_code == WSCloseCode.ABNORMAL_CLOSURE
             if gone and request.transport is not None:
                 request.transport.abort()  # what it has not taken is not kept
         return socket
 
-    async def _answer(self, client: _Client) -> None:
-        """Make and send a VDI of the last wish, and of what is wished meanwhile the last again."""
-        socket = client.socket
+    async def _answer(self, socket: web.WebSocketResponse, wishes: asyncio.Queue[Wish]) -> None:
+        """Make and send a VDI of each wish; another wish gives up what is being made."""
+        loop = asyncio.get_running_loop()
         try:
-            await socket.send_json({"type": "hello", "protocol": PROTOCOL, **self._source.offer})
-            while await client.wished.wait():
-                client.wished.clear()
-                wish = client.wish
-                if wish.view is None:
-                    continue
+            await socket.send_json({"type": "hello", "protocol": 2, **self._source.offer})
+            while wish := await wishes.get():
                 await socket.send_json({"type": "status", "doing": "vdi"})
                 try:
-                    lists, file = await asyncio.get_running_loop().run_in_executor(
-                        self._threads,
-                        self._source.make,
-                        wish,
-                        lambda wish=wish: client.wish is not wish,
+                    lists, file = await loop.run_in_executor(
+                        self._threads, self._source.make, wish, lambda: not wishes.empty()
                     )
                 except Cancelled:
                     continue
@@ -312,7 +280,7 @@ class Server(AbstractContextManager["Server"]):
         except ConnectionError:
             pass  # who is gone needs nothing more
         except Exception:
-            _log.exception("a client was sent away")
+            logging.getLogger(__name__).exception("a client was sent away")
             failed: Any = {"code": WSCloseCode.INTERNAL_ERROR, "message": b"the server has failed"}
             await socket.close(**failed, drain=False)
 
@@ -381,7 +349,7 @@ def serve(
     MissingDependencyError
         If aiohttp is not installed.
     """
-    looks = Classification.composited(classification, "serve", _NAMES)
+    looks = Classification.composited(classification, "serve", [*(serve.__kwdefaults__ or ())])
     options = GenerationOptions.checked(
         max_supersegments=max_supersegments,
         sample_distance=sample_distance,
@@ -402,6 +370,3 @@ def serve(
     if wait:
         server.wait()
     return server
-
-
-_NAMES = tuple(name for name in inspect.signature(serve).parameters if name != "classification")

@@ -1,23 +1,25 @@
 """What a server serves: a volume or time steps of one, of which it makes VDIs for views.
 
-Everything here may be called from several threads; none of it knows clients or sockets.
+Everything here may be called from several threads; none of it knows clients or sockets. What a
+client says is checked before anything is done about it. docs/web.md, "Served", has the protocol.
 """
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.util import find_spec
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions.web.camera import viewer_camera
-from pyvista_vdi.extensions.web.messages import Wish
+from pyvista_vdi.errors import InvalidArgumentError, VDIError
+from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.extensions.web.shown import bare_file
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.classification import Classification
@@ -25,6 +27,7 @@ from pyvista_vdi.model.coverage import SLACK, bounds_corners, projected
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.view import View
 from pyvista_vdi.volume.rays import checked_sample_distance
 
 #: The colour maps and opacity mappings that clients may choose.
@@ -36,6 +39,26 @@ _OPACITIES = (
     *("linear", "linear_r", "geom", "geom_r", "sigmoid", "sigmoid_3", "sigmoid_5"),
     *("sigmoid_7", "sigmoid_10", "sigmoid_15", "sigmoid_20", "foreground"),
 )
+#: Longest edge of a client's picture, pixels.
+MAX_PICTURE_EDGE = 8192
+#: Most opacities of a mapping that is given by numbers.
+MAX_OPACITIES = 64
+#: Numbers are no larger than this, and lenses no smaller than its inverse: forms of rays are
+#: products of a few of them.
+_LARGEST = 1e12
+
+
+class BadMessageError(ValueError):
+    """A message that is none of the protocol's."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a client wants to see: the last that it has said of everything."""
+
+    view: View | None = None  # its camera, and the size of its picture; ``None`` before it has said
+    look: tuple[tuple[str, Any], ...] = ()  # what it has changed of the transfer function
+    step: int = 0  # of the time steps
 
 
 class Source:
@@ -67,7 +90,7 @@ class Source:
         self._options, self._lists = options, lists
         # What is wrong with the look or the step is refused now, not to a client
         first, table = self._volume(0), self._transfer_function(0, ())
-        begun = {"cmap": looks.cmap, "opacity": looks.opacity}
+        begun: dict[str, Any] = {"cmap": looks.cmap, "opacity": looks.opacity}
         checked_sample_distance(first, options.sample_distance)
         free = find_spec("pyvista") is not None and not first.rgba and not looks.in_place
         self.offer: dict[str, Any] = {
@@ -101,14 +124,65 @@ class Source:
         # Take whole lists of it: pixels, or larger ones where these are too many
         share = min(1.0, math.sqrt(self._lists / max(1.0, np.prod(high - low))))
         grid = np.maximum(1, (window * share).astype(int))
-        first = np.floor(low / window * grid + SLACK).astype(int)
-        lists = np.ceil(high / window * grid - SLACK).astype(int) - first
-        if (lists <= 0).any():
+        low = np.floor(low / window * grid + SLACK).astype(int)
+        high = np.ceil(high / window * grid - SLACK).astype(int)
+        lists = (high - low).tolist()
+        if min(lists) <= 0:
             return (0, 0), b""
-        made = (int(lists[0]), int(lists[1]))
-        corner = (int(first[0]), int(grid[1] - first[1] - lists[1]))
-        view = camera.tile(grid, corner, made)
+        view = camera.tile(grid, (low[0], grid[1] - high[1]), lists)
         with self._runtime.background(cancelled):
-            request = GenerationRequest(volume, look, view, made, self._options, self._runtime)
+            request = GenerationRequest(volume, look, view, lists, self._options, self._runtime)
             vdi = generate_vdi(request)
-        return made, bare_file(vdi)
+        return vdi.window_size, bare_file(vdi)
+
+
+def wish_after(text: str, wish: Wish, offer: Mapping[str, Any]) -> Wish:
+    """Return what a client wants after a message; ``offer``: what hello lists."""
+    try:
+        match json.loads(text):
+            case {"type": "view", "camera": state, "size": [_, _] as size, **rest} if not rest:
+                camera = camera_of(state)
+                lens = camera.parallel_scale if camera.parallel_projection else camera.view_angle
+                places = (camera.position, camera.focal_point, camera.view_up, camera.window_center)
+                _numbers("a camera", [*chain(*places), lens, 1 / lens])
+                width, height = _numbers("size", size, 1, MAX_PICTURE_EDGE, whole=True)
+                return replace(wish, view=View(camera, (width, height)))
+            case {"type": "look", **look}:
+                return replace(wish, look=_look(offer, **look))  # type: ignore[arg-type]
+            case {"type": "time", "step": step, **rest} if not rest:
+                (step,) = _numbers("step", [step], 0, offer["steps"] - 1, whole=True)
+                return replace(wish, step=step)
+        raise BadMessageError(f"a view, a look or a time with its entries is one; got {text:.40}")
+    # No JSON, not the entries of its type, or no camera
+    except (KeyError, TypeError, ValueError, RecursionError, VDIError) as error:
+        raise BadMessageError(f"the message is none of the protocol's: {error}") from None
+
+
+def _look(
+    offer: Mapping[str, Any], cmap: Any = None, opacity: Any = None, clim: Any = None
+) -> tuple[tuple[str, Any], ...]:
+    if not offer["cmaps"]:
+        raise BadMessageError("the look is fixed")
+    if isinstance(opacity, list) and 2 <= len(opacity) <= MAX_OPACITIES:
+        opacity = _numbers("opacity", opacity, 0, 1)
+    elif opacity not in (None, *offer["opacities"]):
+        raise BadMessageError(
+            f"opacity is a name that hello lists, or 2 to {MAX_OPACITIES} numbers"
+        )
+    if cmap not in (None, *offer["cmaps"]):
+        raise BadMessageError("cmap is a name that hello lists")
+    if clim is not None:
+        low, high = clim = _numbers("clim", clim)
+        if not low < high:
+            raise BadMessageError("clim must be two numbers, the smaller first")
+    said = {"cmap": cmap, "opacity": opacity, "clim": clim}
+    return tuple((name, value) for name, value in said.items() if value is not None)
+
+
+def _numbers(
+    name: str, values: Any, low: float = -_LARGEST, high: float = _LARGEST, *, whole: bool = False
+) -> tuple[Any, ...]:
+    kinds = (int,) if whole else (int, float)  # neither booleans nor NaN
+    if not all(type(value) in kinds and low <= value <= high for value in values):
+        raise BadMessageError(f"{name} has numbers from {low:g} to {high:g}")
+    return tuple(values) if whole else tuple(map(float, values))

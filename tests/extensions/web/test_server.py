@@ -26,9 +26,8 @@ from plugin_scenes import soft_volume
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.extensions import web
-from pyvista_vdi.extensions.web import messages
 from pyvista_vdi.extensions.web.server import Server
-from pyvista_vdi.extensions.web.source import Source
+from pyvista_vdi.extensions.web.source import BadMessageError, Source, Wish, wish_after
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
@@ -288,7 +287,7 @@ def test_any_text_is_a_token_but_none_and_our_page_can_connect(source):
         headers = {"Origin": f"http://127.0.0.1:{server.port}"}
         with urllib.request.urlopen(urllib.request.Request(server.url, headers=headers)) as page:
             assert page.status == 200
-        why = rf"port {server.port} .* is in use: choose another"
+        why = rf"port {server.port}: .* in use; choose another"
         with pytest.raises(InvalidArgumentError, match=why):
             Server(source, port=server.port).start()
     with pytest.raises(InvalidArgumentError, match=r"cannot listen at 203\.0\.113\.1"):
@@ -359,9 +358,9 @@ _entries = st.fixed_dictionaries(
 @given(_entries | _json)
 def test_any_message_is_taken_or_refused(message):
     offer = {"steps": 2, "cmaps": ["bone"], "opacities": ["linear"]}
-    with contextlib.suppress(messages.BadMessageError):
-        wish = messages.wish_after(json.dumps(message), messages.Wish(), offer)
-        assert isinstance(wish, messages.Wish)
+    with contextlib.suppress(BadMessageError):
+        wish = wish_after(json.dumps(message), Wish(), offer)
+        assert isinstance(wish, Wish)
 
 
 EXTREMES = [
@@ -438,8 +437,8 @@ def test_a_fixed_look_offers_no_other_and_a_range_is_the_one_in_effect(default_r
     table = pvdi.TransferFunction([(0, 0, 0.2), (1, 0.5, 0)], [0, 0.5], (0, 255))
     offer = source_of(HIGH, transfer_function=table).offer
     assert offer["cmaps"] == offer["opacities"] == []
-    with pytest.raises(messages.BadMessageError, match="the look is fixed"):
-        messages.wish_after('{"type": "look", "cmap": "bone"}', messages.Wish(), offer)
+    with pytest.raises(BadMessageError, match="the look is fixed"):
+        wish_after('{"type": "look", "cmap": "bone"}', Wish(), offer)
     assert source_of(HIGH, cmap="bone").offer["range"] == list(HIGH.finite_range())
     assert source_of(HIGH, cmap="bone", clim=(10, 90)).offer["range"] == [10, 90]
 
