@@ -97,9 +97,8 @@ class Server(contextlib.AbstractContextManager["Server"]):
                 "give another text, or None for a random one"
             )
         self.token = secrets.token_urlsafe(16) if token is None else token
-        self.host, self.port = host, port
+        self.host, self.port, self.heartbeat = host, port, heartbeat
         self.clients: set[web.WebSocketResponse] = set()
-        self.heartbeat = heartbeat
         self._source, self._max_clients = source, max_clients
         # As browsers write names, in small letters
         self._hosts = {name.lower() for name in ("localhost", host, *hosts) if name}
@@ -186,10 +185,7 @@ class Server(contextlib.AbstractContextManager["Server"]):
         elif origin is not None and origin.partition("://")[2] != request.host:
             why = "pages of other sites are not let in"
         elif not hmac.compare_digest(given, self.token.encode()):
-            why = (
-                "this address is no longer valid, or never was: "
-                "open the one that the server printed when it was started"
-            )
+            why = "this address is no longer valid: open the one that the server printed last"
         else:
             return await handler(request)
         return web.Response(status=403, text=f"{why}\n")

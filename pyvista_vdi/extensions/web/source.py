@@ -166,11 +166,9 @@ def _look(
     if isinstance(opacity, list) and 2 <= len(opacity) <= MAX_OPACITIES:
         opacity = _numbers("opacity", opacity, 0, 1)
     elif opacity not in (None, *offer["opacities"]):
-        raise BadMessageError(
-            f"opacity is a name that hello lists, or 2 to {MAX_OPACITIES} numbers"
-        )
+        raise BadMessageError(f"opacity is a name of hello's, or 2 to {MAX_OPACITIES} numbers")
     if cmap not in (None, *offer["cmaps"]):
-        raise BadMessageError("cmap is a name that hello lists")
+        raise BadMessageError("cmap is a name of hello's")
     if clim is not None:
         low, high = clim = _numbers("clim", clim)
         if not low < high:

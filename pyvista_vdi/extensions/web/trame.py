@@ -30,8 +30,6 @@ window.pyvistaVDI = { install(app) { app.component("vdi-view", {
   render() { return Vue.h("vdi-viewer"); },
   mounted() {
     const viewer = this.$el;
-    const follow = (name, take) =>
-      this.$watch(name, (value) => { if (value) take(value); }, { immediate: true });
     let timer, told = "";
     viewer.addEventListener("camerachange", () => {
       clearTimeout(timer);
@@ -43,11 +41,11 @@ window.pyvistaVDI = { install(app) { app.component("vdi-view", {
         told = text;
       }, 100);
     });
-    follow("eye", (camera) => { viewer.camera = { ...camera }; });
-    follow("file", async (file) => {
+    this.$watch("eye", (eye) => { if (eye) viewer.camera = { ...eye }; }, { immediate: true });
+    this.$watch("file", async (file) => {
       const bytes = new Uint8Array(await new Response(file).arrayBuffer());
-      if (file === this.file) viewer.showBytes(bytes).catch(() => {});
-    });
+      if (file && file === this.file) viewer.showBytes(bytes).catch(() => {});
+    }, { immediate: true });
   },
 }); } };
 """
