@@ -28,7 +28,7 @@ actor.mapper.AddClippingPlane(cut)
 slice_ = volume.slice("x", origin=cut.GetOrigin()).threshold(20)
 plotter.add_mesh(slice_, cmap="bone", clim=(0, 133), lighting=False, show_scalar_bar=False)
 plotter.add_mesh(pv.Sphere(radius=18, center=(x + 20, y + 40, z)), color="tomato")
-plotter.add_mesh(volume.outline(), color="gray", line_width=2)
+plotter.add_mesh(volume.outline(), color="gray")
 plotter.add_text("A brain, cut open", position="upper_left", font_size=10)
 plotter.set_background("white", top="lightsteelblue")
 plotter.camera_position = [(560, 330, 240), (x, y, z), (0, 0, 1)]

@@ -2,7 +2,7 @@
 
 ``#include "folder/file.cl"`` takes a path relative to this folder and is expanded by
 :mod:`pyvista_vdi.device.programs`, once per file and with ``#line`` marks. The first lines of each
-file say what it is; ``docs/where_is_what.md`` leads from each step of the paper to its kernel.
+file say what it is; ``docs/dev/where_is_what.md`` leads from each step of the paper to its kernel.
 
 ``lib``
     Formulas that the others share, of one ray or of sixteen (``lib/lanes.cl``).

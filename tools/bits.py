@@ -140,9 +140,8 @@ def small(make: Any, volume: pvdi.Volume, function: Any = None, **options: Any) 
     camera = options.pop("camera", None) or outside(volume.bounds, 25.0)
     function = function or over(volume, interpolation="linear")
     size = options.pop("size", SMALL)
-    seldom = {name: options.pop(name) for name in pvdi.Settings.declared.keys() & options}
-    how = {"transfer_function": function, "settings": pvdi.Settings(**seldom), **options}
-    return make(volume, camera, size, **how)
+    seldom = pvdi.Settings(**{n: options.pop(n) for n in pvdi.Settings.declared.keys() & options})
+    return make(volume, camera, size, transfer_function=function, settings=seldom, **options)
 
 
 made, pictured = partial(small, pvdi.generate), partial(small, pvdi.render_volume)

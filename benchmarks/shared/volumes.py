@@ -111,9 +111,7 @@ def make(name: str, seed: int = 1) -> Volume:
     nx, ny, nz = (max(2, -(-n // int(factor or 1))) for n in full)
     largest = np.iinfo(dtype).max
     nbytes = nx * ny * nz * np.dtype(dtype).itemsize
-    require_host_memory(
-        nbytes + 2**30, f"making {name!r}", f"take a smaller one, as {kind}@4", free=True
-    )
+    require_host_memory(nbytes + 2**30, f"making {name!r}", f"make {kind}@4", free=True)
     # -1 to 1 along x, the same scale along the others
     axes = [np.float32((np.arange(n) - (n - 1) / 2) / ((nx - 1) / 2)) for n in (nx, ny, nz)]
     slab, array = prepare(*axes, np.random.default_rng(seed)), np.empty((nz, ny, nx), dtype)

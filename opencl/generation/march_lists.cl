@@ -1,4 +1,4 @@
-// Volume to records of runs, one march per ray (paper, section 2; docs/conventions.md, "Merging
+// Volume to records of runs, one march per ray (paper, section 2; docs/dev/conventions.md, "Merging
 // samples into a supersegment"), a ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
 // -D COMPENSATED: see lib/compositing.cl; the volume's: see volume/march.cl

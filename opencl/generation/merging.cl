@@ -2,7 +2,7 @@
 // criterion than the least error, this file changes.
 //
 // Colour is premultiplied by the run's own opacity and merged front to back, so that the view from
-// V_O stays exact (docs/conventions.md, "Merging samples into a supersegment").
+// V_O stays exact (docs/dev/conventions.md, "Merging samples into a supersegment").
 //
 // Merging is judged by the merge error, which is this package's own (docs/decisions/merging.md):
 // Ward's increase of the sum of squares, along the ray in reference lengths, of the feature

@@ -1,4 +1,4 @@
-// Scalar to colour and extinction (docs/conventions.md, "From a volume to the medium").
+// Scalar to colour and extinction (docs/dev/conventions.md, "From a volume to the medium").
 //
 // The table holds `entries` (R, G, B, opacity) at equidistant scalars; opacity is that of a slab of
 // one opacity unit distance. It is interpolated first and converted to optical depth then, as VTK

@@ -1,8 +1,8 @@
-// Front-to-back compositing by "over" (docs/conventions.md, "A supersegment is a homogeneous
+// Front-to-back compositing by "over" (docs/dev/conventions.md, "A supersegment is a homogeneous
 // medium").
 //
 // -D COMPENSATED  for rays that may meet so many media that their roundings add up to what one sees
-//                 (docs/numerics.md, "Accumulated rounding"):
+//                 (docs/dev/numerics.md, "Accumulated rounding"):
 //                     0  no (default)
 //                     1  opacity is summed up from 0, so that what is nearly transparent keeps its
 //                        digits

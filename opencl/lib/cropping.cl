@@ -1,4 +1,4 @@
-// Cropping: the parts of a ray in the regions that are kept (docs/conventions.md, "Cropping").
+// Cropping: the parts of a ray in the regions that are kept (docs/dev/conventions.md, "Cropping").
 //
 // Two planes across each axis of the model frame make 27 regions; bit i + 3 j + 9 k of `regions`
 // keeps the i-th along x, the j-th along y and the k-th along z, as in vtkVolumeMapper. The planes

@@ -1,5 +1,5 @@
 // V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight
-// (docs/conventions.md, "List coordinates").
+// (docs/dev/conventions.md, "List coordinates").
 //
 // u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth:
 //
@@ -13,7 +13,7 @@
 //
 // -D DOUBLE_FLOAT_RAYS=1, 2   lists hold so little of the depth that float32 has too few digits
 //     for all of it: z is relative to Z_deep, where a ray is deepest (2: least deep), 1 / Z_deep -
-//     1 / Z, or Z - Z_deep if PARALLEL. Faces are kept as offsets (docs/numerics.md).
+//     1 / Z, or Z - Z_deep if PARALLEL. Faces are kept as offsets (docs/dev/numerics.md).
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

@@ -7,12 +7,12 @@
 //
 // with t the view depth of the ray's own camera less a reference depth (world units). The host
 // forms all six in float64 about a reference depth near the data, so that float32 is enough here
-// however far away the eye or the origin is (docs/conventions.md, "Rays"). y = 0 is the bottom row.
+// however far the eye or the origin is (docs/dev/conventions.md, "Rays"). y = 0 is the bottom row.
 //
 // -D DOUBLE_FLOAT_RAYS   rays may enter the data so far from there that it is not enough for the
 // positions of samples: six more
 //                  floats of each form are what float32 has rounded off the first six
-//                  (docs/numerics.md)
+//                  (docs/dev/numerics.md)
 #include "lib/double_float.cl"
 #include "lib/directions.cl"
 #pragma OPENCL FP_CONTRACT OFF

@@ -3,7 +3,7 @@
 //
 // Every VDI is piecewise constant along a ray, so all of them together are: where several segments
 // cover a piece of the ray, their extinctions add and the colour is the mean by extinction
-// (docs/conventions.md, "Several VDIs"). Streams are walked together from boundary to boundary:
+// (docs/dev/conventions.md, "Several VDIs"). Streams are walked together from boundary to boundary:
 // each turn composites one piece, and comes to the next segment of those streams whose segment ends
 // there. The sums are formed in the order of the streams.
 //

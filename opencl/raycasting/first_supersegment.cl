@@ -1,5 +1,5 @@
 // The first supersegment that a ray meets in a list: Algorithm 1 of the paper, by its intent
-// (docs/conventions.md, "The paper's pseudocode, and its replacement", lists the errata). Where its
+// (docs/dev/conventions.md, "The paper's pseudocode, and its replacement", lists the errata). Its
 // lines are:
 //
 //   1, 2             begin_search: a ray's first list has the guess 0, whence close guesses and

@@ -10,7 +10,7 @@
 //
 // -D OFFSET_T=int, long   type of an offset into the supersegments
 // -D PACKED=0, 1          supersegments of 24 bytes, in two arrays; or of 8, in one
-//                         (docs/conventions.md, "Packed supersegments", has the bits)
+//                         (docs/dev/conventions.md, "Packed supersegments", has the bits)
 #include "lib/list_space.cl"
 #include "raycasting/frame.cl"
 #pragma OPENCL FP_CONTRACT OFF

@@ -2,7 +2,7 @@
 // rendering share.
 //
 // Samples lie at the midpoints of steps of equal model length along the ray, the last one shorter
-// (docs/conventions.md, "From a volume to the medium").
+// (docs/dev/conventions.md, "From a volume to the medium").
 // Every face is computed from its step's number, never accumulated.
 //
 // -D DOUBLE_FLOAT_RAYS  1: see lib/rays.cl; t counts from where the ray enters

@@ -1,5 +1,5 @@
 // The medium around a sample of a classified volume: colour and optical depth
-// (docs/conventions.md).
+// (docs/dev/conventions.md).
 //
 // -D BY_SCALAR  1: with NEAREST and voxels of integers, the table holds the medium of each scalar
 // from `low` on, of which no

@@ -1,5 +1,5 @@
 // Ambient occlusion at a sample, from the grid that volume/ambient_occlusion.cl fills
-// (docs/conventions.md).
+// (docs/dev/conventions.md).
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

@@ -1,6 +1,6 @@
 // Projections of a volume, the blend modes of volume rendering beside compositing: along a ray, the
 // greatest or the least scalar, classified; or the mean or the integral of opacity times scalar, as
-// a grey value (docs/conventions.md, "Blending").
+// a grey value (docs/dev/conventions.md, "Blending").
 // A ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
 // -D BLEND_MODE: which of them

@@ -1,4 +1,4 @@
-// Shading and gradient opacity, as VTK's GPU volume mapper computes them (docs/conventions.md,
+// Shading and gradient opacity, as VTK's GPU volume mapper computes them (docs/dev/conventions.md,
 // "Lighting").
 //
 // -D SHADED            0: samples are not lit; 1: they are; 2: by one headlight and nothing else,

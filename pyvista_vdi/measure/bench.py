@@ -143,12 +143,8 @@ class Bench:
 
         prop = volume_property or property_of(volume, table)
         # Without a GPU its mapper makes a texture on the host, and what this is filled from
-        require_host_memory(
-            2 * volume.array.nbytes,
-            f"the volume {volume.name!r} in VTK's GPU mapper as well, beside ours,",
-            "take a smaller one, or a machine with more memory",
-            free=True,
-        )
+        need, what = 2 * volume.array.nbytes, f"{volume.name!r} in VTK's GPU mapper as well"
+        require_host_memory(need, what, "take a smaller one, or no VTK (vtk=False)", free=True)
         for name in MAPPERS:
             self.vtk[name] = VTKMapper(volume, prop, window_size, name)
 

@@ -1,7 +1,7 @@
 """One volume rendered by VTK's mappers, our volume raycaster and a VDI, side by side.
 
 Pictures are compared at the accuracy step (half the smallest spacing unless given), frames are
-timed with steps of one voxel in every volume renderer (``docs/conventions.md``). The candidates
+timed with steps of one voxel in every volume renderer (``docs/dev/conventions.md``). The candidates
 take turns, after one frame each that is not counted, and the median is reported.
 """
 

@@ -1,7 +1,7 @@
 """Ambient occlusion: how much of the light from all around reaches a point of a volume.
 
 The paper's supersegments hold colours "potentially determined with global lighting techniques,
-such as ambient occlusion" (section 2). What is computed: docs/conventions.md, "Ambient occlusion".
+such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Ambient occlusion".
 """
 
 from __future__ import annotations

@@ -143,9 +143,6 @@ def takes(
         signature = _signature(function, records, shown, [*order])
         named = signature.parameters
         open_ended = any(each.kind is Parameter.VAR_KEYWORD for each in named.values())
-        first = [
-            each.name for each in named.values() if each.kind is Parameter.POSITIONAL_OR_KEYWORD
-        ]
         called_by = "add_vdi" if function.__name__ == "__call__" else function.__name__
 
         @wraps(function)
@@ -158,16 +155,13 @@ def takes(
                 signature.bind(*args, **given)
             except TypeError as error:
                 raise TypeError(f"{called_by}() {error}") from None
-            given |= zip(first, args, strict=False)
+            given |= zip(named, args, strict=False)
             made = records_of(given, called_by, *records.values(), flat=flat)
             return function(**given, **dict(zip(records, made, strict=True)))
 
-        told: Any = called
-        told.__signature__, told.__doc__, told.returns = (
-            signature,
-            _documented(function.__doc__ or "", shown.values()),
-            returns,
-        )
+        text = _documented(function.__doc__ or "", shown.values())
+        vars(called).update(__signature__=signature, returns=returns)
+        called.__doc__ = text
         return called
 
     return decorated
@@ -183,21 +177,15 @@ def _signature(
     own = inspect.signature(function)
     kept = {each.name: each for each in own.parameters.values() if each.name not in records}
     for name, told in options.items():
-        kept[name] = Parameter(
-            name, Parameter.KEYWORD_ONLY, default=told.default, annotation=told.kind
-        )
-    ahead = [each for each in kept.values() if each.kind is Parameter.POSITIONAL_OR_KEYWORD]
-    ahead += [
-        kept[name].replace(kind=Parameter.POSITIONAL_OR_KEYWORD)
-        for name in order
-        if name in kept and kept[name] not in ahead
-    ]
-    taken = {each.name for each in ahead}
-    behind = sorted(
-        (each for name, each in kept.items() if name not in taken),
-        key=lambda each: (each.kind, each.name not in options),  # stable
-    )
-    return own.replace(parameters=[*ahead, *behind])
+        kind = Parameter.POSITIONAL_OR_KEYWORD if name in order else Parameter.KEYWORD_ONLY
+        kept[name] = Parameter(name, kind, default=told.default, annotation=told.kind)
+
+    def place(each: Parameter) -> tuple[int, int, bool]:
+        """Return what parameters are sorted by, which is stable."""
+        listed = each.kind is Parameter.POSITIONAL_OR_KEYWORD and each.name in options
+        return each.kind, order.index(each.name) if listed else -1, each.name not in options
+
+    return own.replace(parameters=sorted(kept.values(), key=place))
 
 
 def records_of(

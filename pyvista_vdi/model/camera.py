@@ -1,4 +1,4 @@
-"""The camera and its coordinates: world, view and list (docs/conventions.md#list-coordinates)."""
+"""The camera: world, view and list coordinates (docs/dev/conventions.md#list-coordinates)."""
 
 from __future__ import annotations
 
@@ -375,7 +375,7 @@ class Camera:
         numpy.ndarray
             float64 (4, 4), K with ``K [X, Y, Z, 1] = [u d, v d, Z, d]``: ``(u, v)`` in [-1, 1]²
             is the viewport; ``d`` is Z in perspective and 1 in parallel projection
-            (docs/conventions.md#list-coordinates).
+            (docs/dev/conventions.md#list-coordinates).
         """
         half_width, half_height = self.half_extent(window_size)
         denominator = 3 if self.parallel_projection else 2

@@ -39,6 +39,8 @@ class ChunkedArray:
     it. ``lazy``: the array as Dask has it, if it does.
     """
 
+    ndim = 3
+
     def __init__(
         self,
         source: Any,
@@ -75,6 +77,8 @@ class ChunkedArray:
         z, y, x = (int(self._array.shape[k]) for k in kept)
         self.shape: tuple[int, int, int] = (z, y, x)
         self.dtype = np.dtype(dtype if dtype is not None else source.dtype)
+        self.size = math.prod(self.shape)
+        self.nbytes = self.size * self.dtype.itemsize
         self.chunks = self._chunks(kept)
         self.source = name or _described(source)
         self._checked = checked
@@ -101,21 +105,6 @@ class ChunkedArray:
             )
         z, y, x = (min(int(length), n) for length, n in zip(lengths, self.shape, strict=True))
         return z, y, x
-
-    @property
-    def ndim(self) -> int:
-        """3."""
-        return 3
-
-    @property
-    def size(self) -> int:
-        """Number of points."""
-        return math.prod(self.shape)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all points in memory."""
-        return self.size * self.dtype.itemsize
 
     def __len__(self) -> int:
         return self.shape[0]

@@ -1,4 +1,4 @@
-"""What a transfer function makes of a deferred VDI, in float64 (docs/conventions.md).
+"""What a transfer function makes of a deferred VDI, in float64 (docs/dev/conventions.md).
 
 On a device: ``lib/values.cl``.
 """
@@ -36,7 +36,7 @@ def classify(
     transfer_function: TransferFunction,
     media: Callable[[ValuesLook], Media] | None = None,
 ) -> VDI:
-    """Return the VDI that a transfer function makes of what is kept (docs/conventions.md).
+    """Return the VDI that a transfer function makes of what is kept (docs/dev/conventions.md).
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
     values of :func:`spread_of_values`. The VDI's arrays are made when they are asked for, by

@@ -1,8 +1,8 @@
 """Opacity over a length, compositing, split and merge of homogeneous segments, in float64 NumPy.
 
-The laws of docs/conventions.md#a-supersegment-is-a-homogeneous-medium and
-docs/conventions.md#merging-samples-into-a-supersegment. A *segment* is a homogeneous medium between
-two depths; what it absorbs is its optical depth tau, never its opacity, which rounds to 1.
+The laws of docs/dev/conventions.md#a-supersegment-is-a-homogeneous-medium and
+docs/dev/conventions.md#merging-samples-into-a-supersegment. A *segment* is a homogeneous medium
+between two depths; what it absorbs is its optical depth tau, never its opacity, which rounds to 1.
 Colours are straight RGB in segments and premultiplied in images.
 """
 

@@ -51,7 +51,7 @@ def covering_view(
 
     With t the tangents of the half angles and c the window centre, the pixel rectangle [x0, x1) of
     width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
-    in y, and with s for t in parallel projection (docs/conventions.md#list-coordinates).
+    in y, and with s for t in parallel projection (docs/dev/conventions.md#list-coordinates).
     """
     camera = Camera.from_any(camera)
     size = np.asarray(check_window_size(window_size), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What float32 holds, and from where on another arithmetic takes over (docs/numerics.md)."""
+"""What float32 holds, and from where on another arithmetic takes over (docs/dev/numerics.md)."""
 
 import numpy as np
 from numpy.typing import DTypeLike

@@ -1,7 +1,7 @@
 """Lights, and how a shaded volume reflects them: what VTK's GPU volume mapper computes.
 
 A sample's normal is the direction in which the scalar grows. What a VDI is lit by is baked into
-its colours when it is generated (docs/conventions.md, "Lighting").
+its colours when it is generated (docs/dev/conventions.md, "Lighting").
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The arrays of a VDI's supersegments, and the same in 8 bytes each, by integers alone.
 
-``docs/conventions.md`` ("Packed supersegments") has the bits and what they lose.
+``docs/dev/conventions.md`` ("Packed supersegments") has the bits and what they lose.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Rays as the kernels take them: affine forms of the pixel, made in float64 (docs/conventions.md).
+"""Rays as the kernels take them: affine forms of the pixel, in float64 (docs/dev/conventions.md).
 
 Along the ray of a pixel every quantity that the kernels need (a coordinate, the distance from a
 clipping plane, a homogeneous denominator) is affine in the pixel's position and in t, the view
@@ -104,7 +104,7 @@ def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
 
 
 def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
-    """Refuse a generating view whose lists float32 cannot express (docs/numerics.md).
+    """Refuse a generating view whose lists float32 cannot express (docs/dev/numerics.md).
 
     Lengths times reciprocal depths leave its range then.
     """

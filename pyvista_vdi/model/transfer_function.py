@@ -55,7 +55,7 @@ class TransferFunction:
     Notes
     -----
     The extinction at a scalar x is sigma(x) = -log1p(-a(x)) / U: opacity is interpolated first and
-    converted then, as VTK does (docs/conventions.md#from-a-volume-to-the-medium). Where a is 1
+    converted then, as VTK does (docs/dev/conventions.md#from-a-volume-to-the-medium). Where a is 1
     the medium is opaque whatever U is: every step then has an optical depth of at least
     :data:`OPAQUE_OPTICAL_DEPTH`.
 

@@ -1,4 +1,4 @@
-"""The Volumetric Depth Image: arrays and rules (docs/conventions.md#the-arrays-of-a-vdi)."""
+"""The Volumetric Depth Image: arrays and rules (docs/dev/conventions.md#the-arrays-of-a-vdi)."""
 
 from __future__ import annotations
 
@@ -265,7 +265,7 @@ class VDI(Lists):
 
         With 8 bytes each list that is not empty takes 16 more, so that lists of one supersegment
         save nothing. The arrays hold what the packed form gives back, so that whatever reads them
-        sees what is drawn. docs/conventions.md ("Packed supersegments") has the bounds.
+        sees what is drawn. docs/dev/conventions.md ("Packed supersegments") has the bounds.
 
         Parameters
         ----------

@@ -106,7 +106,7 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         return f"PlotterVDIActor({vdi!r}{hidden})"
 
     def SetProperty(self, prop: Any) -> None:  # noqa: N802
-        """Set the volume property, of which the VDI is made anew.
+        """Set the volume property, from which the VDI is regenerated.
 
         What is shared with a copy of this actor is not changed for the other.
 

@@ -1,8 +1,9 @@
 """What a frame shows, and what is made for it: decided by what is seen, without side effects.
 
 Whoever draws looks, asks :func:`plan`, and does what it says; nothing here knows VTK, a device, a
-clock or a thread. ``docs/window_events.md`` is the specification. Distances between views are those
-of :meth:`pyvista_vdi.model.view.View.distance`: about radians, for a volume that fills the picture.
+clock or a thread. ``docs/dev/window_events.md`` is the specification. Distances between views are
+those of :meth:`pyvista_vdi.model.view.View.distance`: about radians, where the volume fills the
+picture.
 """
 
 from __future__ import annotations

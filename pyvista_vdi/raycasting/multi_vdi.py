@@ -1,7 +1,7 @@
 """Several VDIs to one image, on a device: merged by depth along each ray.
 
 Each VDI's raycaster writes what a ray crosses into a pool, as segments between two view depths of
-the new view; then the rays' streams of segments are merged and composited (docs/conventions.md,
+the new view; then the rays' streams of segments are merged and composited (docs/dev/conventions.md,
 "Several VDIs"). Rays are taken in bands, so that the pool stays small. Where no two of the VDIs can
 be met, each is drawn as it would be by itself.
 """

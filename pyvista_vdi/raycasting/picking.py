@@ -1,7 +1,7 @@
 """What a ray meets first in a VDI: a single ray, walked on the host in float64.
 
-The same laws as the kernels' (docs/conventions.md): a ray is cut where it crosses from one list to
-the next, each piece is clipped by interval to the supersegments of its list, and what it crosses
+The same laws as the kernels' (docs/dev/conventions.md): a ray is cut where it crosses from one list
+to the next, each piece is clipped by interval to the supersegments of its list, and what it crosses
 of one absorbs in proportion to its length.
 """
 
@@ -275,7 +275,7 @@ def _media_along(
     piece, member, begins, drawn = piece[crossed], member[crossed], begins[crossed], drawn[crossed]
     enters = begins[np.arange(len(begins)), np.argmax(drawn > 0, axis=1)] if len(begins) else begins
 
-    # tau l / L (docs/conventions.md, "A supersegment is a homogeneous medium")
+    # tau l / L (docs/dev/conventions.md, "A supersegment is a homogeneous medium")
     length = multiplier * drawn.sum(axis=1) * np.linalg.norm(ray.direction)
     thickness = vdi.back[member].astype(np.float64) - vdi.front[member].astype(np.float64)
     across, up = column[piece] + 0.5 - wide / 2, row[piece] + 0.5 - high / 2

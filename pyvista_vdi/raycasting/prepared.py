@@ -37,7 +37,7 @@ from pyvista_vdi.volume.upload import release_voxels
 _SQUARES = 12
 
 #: By how much supersegments count beyond their faces: roundings of 2**-23 of the depths that the
-#: raycaster looks up. At most 17 add up (docs/conventions.md, "Occupancy grid").
+#: raycaster looks up. At most 17 add up (docs/dev/conventions.md, "Occupancy grid").
 _ROUNDINGS = 32
 
 #: Share of the cells within the volume's bounds above which skipping costs more than it saves.
@@ -88,7 +88,7 @@ class OccupancyGrid:
         self.slabs_per_depth = SLABS / (far - near) if far > near else 1.0
         # Find the size of what the raycaster rounds where it looks up a depth: its offset and, in
         # perspective, the depth coordinate times the change of view depth Z with it, Z**2 for
-        # -1 / Z, Z**2 / depth_origin for the long lens's (docs/conventions.md, "Occupancy grid")
+        # -1 / Z, Z**2 / depth_origin for a long lens (docs/dev/conventions.md, "Occupancy grid")
         looked_up = max(abs(near - origin), abs(far - origin))
         if prepared.shifted:
             coordinate = max(abs(near - origin) / near, abs(far - origin) / far)

@@ -182,7 +182,7 @@ def project_volume(
     blending: str,
     sampling: MediumOptions,
 ) -> NDArray[np.float32]:
-    """Render a volume by another blend mode than compositing: see ``docs/conventions.md``.
+    """Render a volume by another blend mode than compositing: see ``docs/dev/conventions.md``.
 
     Premultiplied RGBA, float32 (H, W, 4), top row first. Every step is sampled, and no ray ends
     early.

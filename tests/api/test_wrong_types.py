@@ -268,7 +268,7 @@ def messages():
 
 #: Words with an underscore, or before an equals sign, that are no names of Python's.
 OTHER_WORDS = {
-    *("element_size_um", "written_by"),  # of files
+    *("element_size_um", "written_by", "full_name"),  # of files, a device
     *("frame_", "step_"),  # names of files
     *("kingsnake", "kingsnake_1024x1024x795_uint8", "kingsnake_like"),  # volumes
     *("x_low", "x_high", "y_low", "y_high", "z_low", "z_high"),  # of six numbers

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import re
 
 import numpy as np
 import pytest
-from extension_marks import cases
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
@@ -65,73 +63,3 @@ def test_generate_says_the_level_and_why(image, tmp_path, capsys, default_runtim
     assert pvdi.read(target).metadata["volume"]["dimensions"] == [16, 12, 8]
     assert main(["generate", *files, "--level", "0"]) == 0
     assert "level 0 of 2 (32 x 24 x 16 points): asked for" in capsys.readouterr().err
-
-
-@pytest.mark.extension("large")
-def test_generate_on_a_cluster(image, tmp_path, default_runtime):
-    distributed = pytest.importorskip("distributed")
-    files = (str(image), "--size", "16x9", *LOOK)
-    here, there = tmp_path / "here.vdi", tmp_path / "there.vdi"
-    assert main(["generate", *files, "-o", str(here)]) == 0
-    with distributed.LocalCluster(
-        n_workers=1, processes=False, protocol="tcp://", dashboard_address=":0"
-    ) as cluster:
-        address = cluster.scheduler_address
-        assert main(["generate", *files, "-o", str(there), "--scheduler", address]) == 0
-    one, other = pvdi.read(here), pvdi.read(there)
-    np.testing.assert_array_equal(one.offsets, other.offsets)
-    np.testing.assert_array_equal(one.color, other.color)
-
-
-@pytest.mark.extension("series", "large")
-def test_other_verbs_read_it_whole(image, tmp_path, default_runtime):
-    target = tmp_path / "x.vdis"
-    command = ["series", str(image), str(image), "-o", str(target), "--size", "16x9", *LOOK]
-    assert main(command) == 0
-    assert len(pvdi.read(target)) == 2
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ("--example brain --level 0", "--level 0 is for files that hold several volumes"),
-        ("--example brain --time-index 0", "--time-index 0 is for files that hold several"),
-        ("--example brain --scheduler x", "--scheduler is for stores"),
-        ("none.ome.zarr", "none.ome.zarr cannot be read as zarr"),
-        ("x.zarr --level best", "auto, or a level's number"),
-        ("x.ome.zarr --spacing 1 1 1", "--spacing 1 1 1 is for one level of a store"),
-    ],
-)
-def test_mistakes_are_named(arguments, message, image, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["generate", *arguments.split(), "-o", "x.vdi", *LOOK]) in (1, 2)
-    assert message in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("store", "options", "message"),
-    [
-        ("x.ome.zarr", "--level 2", "level must be .* from 0, the finest, to 1, .*; got 2"),
-        ("x.ome.zarr", "--channel 2", "has 2 along channel, 0 to 1; got 2"),
-        ("x.ome.zarr", "--channel nobody", "no channel 'nobody': its channels are dapi, gfp"),
-        ("x.ome.zarr", "--time-index 1", "has 1 along time, 0 to 0; got 1"),
-        ("x.ome.zarr", "--time-index -1", "has 1 along time, 0 to 0; got -1"),
-        ("x.ome.zarr", "--scalars nothing", "no array 'nothing': its only one is"),
-        ("s.h5", "--channel 5", "has 1 along channel, 0 to 0; got 5"),
-        ("s.h5", "--channel nobody", "no channel 'nobody': its channels are not named"),
-        ("s.h5::/w", "", "has no array 'w' .*: open one of s.h5::v"),
-    ],
-)
-@pytest.mark.parametrize("verb", cases("info", "generate", "series"))
-def test_what_a_store_has_not_is_named(
-    verb, store, options, message, image, tmp_path, capsys, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    if store.startswith("s.h5"):
-        with pytest.importorskip("h5py").File("s.h5", "w") as file:
-            file["v"] = VALUES
-    before = sorted(tmp_path.rglob("*"))
-    more = () if verb == "info" else ("-o", f"x.vdi{'s' * (verb == 'series')}", *LOOK)
-    assert main([verb, store, *options.split(), *more]) == 1
-    assert re.search(f"^pyvista-vdi: error: .*{message}", capsys.readouterr().err)
-    assert sorted(tmp_path.rglob("*")) == before

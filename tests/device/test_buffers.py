@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import mmap
 import threading
 from dataclasses import replace
 
@@ -12,10 +11,8 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import devices, memory
-from pyvista_vdi.device.devices import bytes_text
+from pyvista_vdi.device import devices
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
-from pyvista_vdi.model import host_memory
 
 DTYPES = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "f4", "f8"]
 
@@ -44,83 +41,6 @@ def test_upload_and_download(runtime, aligned):
                 with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
                     change(buffer, back if change == runtime.write else 0)
         assert runtime.allocated == before
-
-
-@pytest.mark.parametrize("n", [1000, 2**20, 3 * 2**19 + 5])
-def test_lasting_arrays_are_as_others(runtime, n):
-    """4 KB, as everywhere; 4 MiB and 6 MiB and a little: 2 and 3 pages of 2 MiB, and a rest."""
-    array = ocl.aligned_empty((n,), np.float32, lasting=True)
-    assert (array.shape, array.dtype, array.flags.writeable) == ((n,), np.float32, True)
-    assert array.ctypes.data % 4096 == 0
-    before, values = runtime.allocated, np.arange(n, dtype=np.float32)
-    with runtime.result((n,), np.float32, "lists", lasting=True) as buffer:
-        assert runtime.allocated - before == 4 * n
-        runtime.write(buffer, values)
-        np.testing.assert_array_equal(runtime.download(buffer), values)
-    assert runtime.allocated == before
-    assert len(bytearray(array)) == 4 * n  # from its first byte to its last it is there
-
-
-def test_lasting_arrays_where_the_system_knows_no_huge_pages(monkeypatch):
-    class Refused(mmap.mmap):
-        def madvise(self, *_):
-            raise OSError(22, "Invalid argument")
-
-    monkeypatch.setattr(host_memory.mmap, "mmap", Refused)
-    array = ocl.aligned_empty(2**21, np.float32, lasting=True)
-    array[...] = 2
-    assert array.sum() == 2**22
-    monkeypatch.delattr(host_memory.mmap, "MADV_HUGEPAGE", raising=False)
-    assert ocl.aligned_empty(2**21, np.float32, lasting=True).ctypes.data % 4096 == 0
-
-
-def test_a_host_without_memory_for_an_array_says_so(runtime, monkeypatch):
-    def refused(*_, **__):
-        raise OSError(12, "Cannot allocate memory")
-
-    if not runtime.is_cpu:
-        pytest.skip("the device has memory of its own")
-    monkeypatch.setattr(host_memory.mmap, "mmap", refused)
-    before = runtime.allocated
-    with pytest.raises(DeviceMemoryError, match=r"no host memory .* 'lists' of 4\.00 MiB"):
-        runtime.result((2**20,), np.float32, "lists", lasting=True)
-    assert runtime.allocated == before
-
-
-@pytest.mark.parametrize("refused", [0, 1, 2])
-@pytest.mark.parametrize("item", [(), (3,)])
-def test_a_growing_array_keeps_what_was_written(monkeypatch, item, refused):
-    """Also where the system does not give room for the most, or for twice what is needed."""
-    most, total, taken = 10**6, 0, []
-    bytes_each = 4 * int(np.prod(item))
-
-    class Short:
-        """NumPy, of a system that is short of memory."""
-
-        def __getattr__(self, name):
-            return getattr(np, name)
-
-        def empty(self, n, dtype):
-            if n > (most, 2 * total, total)[refused] * bytes_each + 4096:
-                raise MemoryError
-            taken.append(n)
-            return np.empty(n, dtype)
-
-    array = ocl.GrowingArray(item)
-    array.reserve(0, most)
-    assert array.finished(0).shape == (0, *item)  # it may stay empty
-    monkeypatch.setattr(host_memory, "np", Short())
-    for n in (1000, 1, 0, 30000):
-        first, total = total, total + n
-        array.reserve(total, most)
-        part = array.part(first, total)
-        assert part.shape == (n, *item)
-        part[...] = np.arange(first, total).reshape(-1, *(1 for _ in item))
-    whole = array.finished(total)
-    assert len(taken) == (1, 2, 3)[refused]
-    assert whole.ctypes.data % 4096 == 0 or refused
-    np.testing.assert_array_equal(whole.reshape(total, -1).T[0], np.arange(total))
-    np.testing.assert_array_equal(whole.reshape(total, -1).T[-1], np.arange(total))
 
 
 @pytest.mark.parametrize("shape", [(3, 5), (1000, 7), (0, 4)])
@@ -213,15 +133,6 @@ def test_download_later(runtime, behind_frames):
         out.flags.writeable = False
         with pytest.raises(InvalidArgumentError, match="writeable=False"):
             runtime.download_later(buffer, out)
-
-
-def test_buffers_may_be_empty(runtime):
-    empty = np.empty((0, 4), np.float32)
-    with runtime.buffer((0, 4)) as a, runtime.upload(empty) as b:
-        assert a.nbytes == b.nbytes == 0
-        runtime.write(a, empty)
-        runtime.fill(a, 0)
-        assert runtime.download(a).shape == runtime.download(b).shape == (0, 4)
 
 
 def test_accounting_follows_release_and_garbage_collection(runtime):
@@ -324,75 +235,3 @@ def test_driver_errors_keep_their_cause_and_kind(runtime, monkeypatch, code, exp
             runtime.fill(buffer, 0)
     assert type(caught.value) is expected
     assert caught.value.__cause__ is driver_error
-
-
-def test_bytes_are_written_for_people():
-    assert bytes_text(12) == "12 bytes"
-    assert bytes_text(3 * 2**29) == "1.50 GiB (1610612736 bytes)"
-
-
-class TestPinnedArrays:
-    """Arrays in page-locked memory, here of ordinary memory that is counted."""
-
-    @pytest.fixture
-    def pool(self, monkeypatch):
-        monkeypatch.setattr(memory, "PINNED_BYTES", 1000)
-        self.there = []
-
-        def allocate(nbytes):
-            if nbytes == 13:
-                raise DeviceMemoryError("none")
-            self.there.append(nbytes)
-            return np.zeros(nbytes, np.uint8), lambda: self.there.remove(nbytes)
-
-        return memory.PinnedArrays(allocate)
-
-    def test_memory_that_nobody_has_is_given_out_again(self, pool):
-        first = pool.empty((10, 4), np.dtype("f4"))
-        first[:] = 7
-        part = first[2:3]
-        del first
-        assert pool.empty((40,), np.dtype("f4")).sum() == 0  # the part is still read
-        assert part.sum() == 28
-        assert self.there == [160, 160]
-        del part
-        gc.collect()
-        assert pool.empty((5, 8), np.dtype("f4")).shape == (5, 8)
-        assert self.there == [160, 160]
-
-    def test_it_is_bounded(self, pool):
-        kept = [pool.empty((100,), np.dtype("f4")) for _ in range(5)]
-        assert self.there == [400, 400]
-        assert len({array.ctypes.data for array in kept}) == 5
-        del kept
-        gc.collect()
-        another = pool.empty((200,), np.dtype("f4"))  # in place of what is free
-        assert self.there == [800]
-        assert another.size == 200
-
-    def test_where_there_is_none_memory_is_ordinary(self, pool):
-        assert pool.empty((13,), np.dtype("u1")).shape == (13,)
-        assert self.there == []
-
-
-def test_pictures_come_through_pinned_memory_on_a_gpu(runtime, monkeypatch):
-    """Bit by bit what was written, in arrays of their own; here on a device taken for one."""
-    monkeypatch.setattr(runtime, "is_cpu", False)
-    shape, pictures = (300, 400, 4), []
-    for value in range(3):
-        with runtime.result(shape, name="image") as image:
-            runtime.fill(image, np.float32(value))
-            pictures.append(runtime.download(image))
-    for value, picture in enumerate(pictures):
-        assert picture.shape == shape
-        assert picture.flags.writeable
-        assert (picture == value).all()
-    for height in range(100, 120):  # a window that is made larger keeps no memory of its sizes
-        runtime.result((height, 400, 4), name="image").release()
-    assert runtime._pool.held_blocks < 10
-    out = np.empty(shape, np.float32)
-    with runtime.result(shape, name="image") as image:
-        runtime.fill(image, np.float32(9))
-        assert runtime.download(image, out) is out
-        assert runtime.download(image, np.empty(5, np.float32)).tolist() == [9] * 5
-    assert (out == 9).all()

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from fresh_python import run_python
@@ -38,14 +34,6 @@ ALL = devices.with_selectors([POCL, INTEL, IGPU, NV_A, NV_B, FPGA])
 def test_preference_is_gpu_then_intel_cpu_then_other_cpu_then_accelerator():
     order = [info.name for info in sorted(ALL, key=devices.preference)]
     assert order == ["H200", "T4", "Iris", "Intel(R) Xeon(R)", POCL.name, "Emulator"]
-
-
-def test_default_leaves_out_what_failed_the_probe():
-    broken = [replace(i, usable=False, reason="x") if i.kind == "GPU" else i for i in ALL]
-    best = choice.default_device(broken)
-    assert best is not None
-    assert best.platform == "Intel(R) OpenCL"
-    assert choice.default_device([replace(i, usable=False) for i in ALL]) is None
 
 
 @pytest.mark.parametrize(
@@ -181,89 +169,6 @@ def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
         assert ("pocl-opencl-icd" in text) != installed
         assert text.count(f"OCL_ICD_VENDORS={str(tmp_path)!r} is set and obeyed") == 1
         assert ("unset it" in text) == installed
-
-
-@pytest.fixture
-def vendors(tmp_path, monkeypatch):
-    """A system folder with one driver, and a pip driver."""
-    system = tmp_path / "system"
-    system.mkdir()
-    (system / "pocl.icd").write_text("libpocl.so.2\n")
-    (system / "gone.icd").write_text(str(tmp_path / "gone.so"))
-    library = tmp_path / "libintelocl.so"
-    library.touch()
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setattr(icd, "SYSTEM_VENDORS", system)
-    monkeypatch.setattr(icd, "vendor_folders", lambda: [system])
-    monkeypatch.setattr(icd, "intel_library", lambda: library)
-    for name in icd.USER_VARIABLES:
-        monkeypatch.delenv(name, raising=False)
-    return system, library
-
-
-def test_pip_driver_is_shown_beside_the_system_ones(vendors):
-    _, library = vendors
-    with icd.drivers_visible() as discovery:
-        folder = Path(os.environ["OCL_ICD_VENDORS"])
-        assert folder.stat().st_mode & 0o777 == 0o700
-        shown = sorted(file.read_text().strip() for file in folder.glob("*.icd"))
-        assert shown == sorted(["libpocl.so.2", str(library)])
-        assert discovery.added == library
-    assert "OCL_ICD_VENDORS" not in os.environ
-    assert not folder.exists()
-    with pytest.raises(ZeroDivisionError), icd.drivers_visible():
-        raise ZeroDivisionError
-    assert "OCL_ICD_VENDORS" not in os.environ
-
-
-@pytest.mark.parametrize(
-    ("case", "note"),
-    [
-        ("user", "is set and obeyed"),
-        ("system", "the system's vendor files name Intel's CPU runtime already"),
-        ("absent", "no libintelocl.so from pip"),
-        ("windows", "the system's own loader"),
-    ],
-)
-def test_search_path_is_left_alone(vendors, monkeypatch, case, note):
-    system, library = vendors
-    if case == "user":
-        monkeypatch.setenv("OCL_ICD_VENDORS", "/somewhere")
-    elif case == "system":
-        (system / "intel.icd").write_text(str(library))
-    elif case == "absent":
-        monkeypatch.setattr(icd, "intel_library", lambda: None)
-    else:
-        monkeypatch.setattr(sys, "platform", "win32")
-    before = dict(os.environ)
-    with icd.drivers_visible() as discovery:
-        assert dict(os.environ) == before
-    assert discovery.added is None
-    assert note in discovery.note
-
-
-def test_programs_with_a_loader_of_their_own_see_every_driver(tmp_path):
-    """As in ParaView, whose libraries have asked their loader before Python runs.
-
-    The program's loader is a copy of pyopencl's under another name, and knows no driver.
-    """
-    spec = importlib.util.find_spec("pyopencl")
-    loaders = sorted((Path(spec.origin).parent / ".libs").glob("libOpenCL*"))
-    if not hasattr(os, "RTLD_DEEPBIND") or not loaders:
-        pytest.skip("this pyopencl brings no loader, or the C library binds in one order only")
-    own = loaders[0].name.encode()
-    copied = tmp_path / "libOpenCL.so"
-    copied.write_bytes(loaders[0].read_bytes().replace(own, own[::-1]))
-    listed = "import pyvista_vdi\nprint([d.full_name for d in pyvista_vdi.list_devices()])\n"
-    asked_before = (
-        "import ctypes, os\n"
-        f"os.environ['OCL_ICD_VENDORS'] = {str(tmp_path)!r}\n"
-        f"ctypes.CDLL({str(copied)!r}, ctypes.RTLD_GLOBAL).clGetPlatformIDs(0, None, None)\n"
-        "del os.environ['OCL_ICD_VENDORS']\n"
-    )
-    alone, beside = run_python(listed), run_python(asked_before + listed)
-    assert alone.returncode == beside.returncode == 0, alone.stderr + beside.stderr
-    assert beside.stdout == alone.stdout
 
 
 @pytest.mark.skipif(icd.intel_library() is None, reason="pip's driver is not installed")

@@ -41,21 +41,6 @@ def affine(monkeypatch):
     return KernelDeclaration("affine.cl", "affine", AFFINE)
 
 
-def test_only_what_changes_is_given_again(runtime, affine):
-    with runtime.upload(np.arange(8, dtype="f4")) as x, runtime.buffer(x.shape) as y:
-        by = AFFINE(n=8, weights=(1, 2, 3, 4), factor=2)
-        launch = runtime.bind(affine, {"T": "float"}, by=by, shift=(0, 3, 0, 0), room=4, y=y)
-        launch(8, 4, x=x)
-        np.testing.assert_array_equal(runtime.download(y), np.arange(8) * 2 + 7)
-        other = runtime.bind(affine, {"T": "float"}, by=by, shift=np.zeros(4, "u4"), room=4)
-        other(8, 4, x=x, y=y)
-        np.testing.assert_array_equal(runtime.download(y), np.arange(8) * 2 + 4)
-        launch((8,), (4,), x=None)
-        np.testing.assert_array_equal(runtime.download(y), [9] * 8)
-        launch(8, 4, by=AFFINE(n=1, weights=(0, 0, 0, 1), factor=0))
-        np.testing.assert_array_equal(runtime.download(y), [4] + [9] * 7)
-
-
 def test_wrong_arguments_are_refused_by_name(runtime, affine):
     with runtime.buffer((8,), name="eight") as y, runtime.buffer((8,), np.int32) as integers:
         launch = runtime.bind(affine, {"T": "float"}, x=None, y=y)

@@ -15,7 +15,7 @@ from runtimes import fresh_runtime
 
 from pyvista_vdi import device as ocl
 from pyvista_vdi.device import devices, programs
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError, KernelBuildError
+from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 
 
 @pytest.fixture
@@ -50,27 +50,6 @@ def test_includes_are_expanded_once_with_line_marks(texts):
     texts["itself.cl"] = '#include "b.cl"\nint a;'
     texts["b.cl"] = '#include "itself.cl"\nint b;'
     assert programs.expand("itself.cl").count("int a;") == 1
-
-
-@pytest.mark.parametrize(
-    ("path", "text", "message"),
-    [
-        ("a.cl", '\n#include "nowhere.cl"\n', r'a\.cl:2: #include "nowhere.cl": no such file'),
-        ("c.cl", '#ifdef X\n#include "d.cl"\n#endif\n', r"c\.cl:2: .* stands inside #if"),
-        ("z.cl", None, "no kernel file 'z.cl'"),
-    ],
-)
-def test_missing_and_conditional_includes_name_the_place(texts, path, text, message):
-    if text is not None:
-        texts[path] = text
-    with pytest.raises(KernelBuildError, match=message):
-        programs.expand(path)
-
-
-@pytest.mark.parametrize("path", ["../setup.py", "/etc/passwd", "", "common"])
-def test_resources_outside_the_package_are_not_read(path):
-    with pytest.raises(FileNotFoundError):
-        programs.read_resource(path)
 
 
 SCALE = """\
@@ -130,15 +109,6 @@ def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
     assert "unsafe" not in error.options
 
 
-def test_build_error_inside_an_include_names_the_include(runtime, texts):
-    texts["common/wrong.cl"] = "\nfloat wrong(void) { return missing_name; }\n"
-    texts["vdi/outer.cl"] = '// head\n#include "common/wrong.cl"\n__kernel void k() {}\n'
-    with pytest.raises(KernelBuildError, match=r"common/wrong\.cl:2"):
-        runtime.kernel("vdi/outer.cl", "k")
-    with pytest.raises(KernelBuildError, match="has no kernel 'nix'.*it has: probe"):
-        runtime.kernel("lib/probe.cl", "nix")
-
-
 def test_kernels_keep_to_what_every_compiler_takes():
     """OpenCL C has no macros of any number of arguments; NVIDIA's compiler refuses them."""
     folder = resources.files("pyvista_vdi.opencl")
@@ -175,31 +145,6 @@ def test_define_options():
             programs.define_options(defines)
 
 
-def test_float_defines_are_exact(runtime, scale_file):
-    add = np.float32(0.1)
-    with runtime.buffer((1,), np.float32) as x:
-        runtime.fill(x, 0)
-        runtime.bind(scaling(scale_file), {"ADD": add}, x=x, factor=1, n=1)(1, 1)
-        assert runtime.download(x)[0] == add
-
-
-def test_threads_may_launch_the_same_kernel(runtime, scale_file):
-    start = threading.Barrier(4)
-
-    def work(factor: int) -> None:
-        data = np.full(100, factor, np.float32)
-        with runtime.buffer(data.shape, data.dtype) as x:
-            launch = runtime.bind(scaling(scale_file), {"ADD": 0}, x=x, n=100)
-            start.wait()
-            for _ in range(200):
-                runtime.write(x, data)
-                launch(100, 1, factor=factor)
-                assert np.all(runtime.download(x) == factor * factor)
-
-    with ThreadPoolExecutor(4) as pool:
-        list(pool.map(work, (2, 3, 5, 7)))
-
-
 def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
     """Also signs of 0, arrays changed in place, buffers in the place of those that have gone."""
     kinds = {"x": "float*", "y": "float*", "v": "float4", "t": "local float*"}
@@ -222,29 +167,6 @@ def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
             runtime.fill(x, np.float32(value))
             launch(3, 1, x=x)
             assert np.all(runtime.download(x) == value * 2)
-
-
-def test_bad_launches_name_the_kernel(runtime, scale_file):
-    launch = runtime.bind(scaling(scale_file), {"ADD": 0}, factor=1, n=8)
-    with runtime.buffer((8,), name="eight") as x:
-        launch.set(x=x)
-        with pytest.raises(InvalidArgumentError, match=r"\(8,\) is no multiple of .*\(3,\)"):
-            launch(8, 3)
-        with pytest.raises(InvalidArgumentError, match="no multiple"):
-            launch((8, 1), 8)
-        with pytest.raises(DeviceError, match="failed while launching 'scale'.*2097152") as caught:
-            launch(2**21, 2**21)
-        assert caught.value.__cause__ is not None
-        launch(0, 1)  # nothing to do is no error
-    with pytest.raises(DeviceError, match="'eight' was used after its release"):
-        launch(8, 1)
-    with pytest.raises(DeviceError, match="'eight' was used after its release"):
-        launch.set(x=x)
-
-
-def test_padded():
-    assert ocl.padded((1280, 721), (16, 4)) == (1280, 724)
-    assert ocl.padded(0, 64) == (0,)
 
 
 def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file, monkeypatch):
@@ -330,12 +252,6 @@ def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
     kept.rmdir()
     monkeypatch.setenv("PYOPENCL_NO_CACHE", "1")
     assert [compiled(), compiled()] == [1, 1]
-
-
-def test_kernels_are_built_where_nothing_can_be_cached(runtime, new_kernel, monkeypatch):
-    # A folder cannot be made below a file
-    monkeypatch.setattr(programs, "user_cache", lambda: new_kernel / "folder")
-    assert runtime.kernel(new_kernel, "twice").argument_count == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="folders and variables of Linux")

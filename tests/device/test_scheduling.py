@@ -6,7 +6,6 @@ import contextlib
 import re
 import threading
 from importlib import resources
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -52,14 +51,6 @@ def wait(event):
     assert event.wait(PATIENCE)
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """Seconds that pass when a test says so: add to ``clock[0]``."""
-    now = [0.0]
-    monkeypatch.setattr(turns, "time", SimpleNamespace(perf_counter=lambda: now[0]))
-    return now
-
-
 def assert_free(each):
     """A frame and background work can both be begun, and each has an end."""
 
@@ -93,22 +84,6 @@ def test_background_work_waits_for_the_end_of_a_frame():
         order.append("frame")
     thread.value()
     assert order == ["frame", "work"]
-
-
-def test_a_workers_clock_stands_still_while_others_go_first(clock):
-    each = Turns()
-    clock[0] = 7.0
-    assert each.clock() == 7  # of no worker: that of the system
-    with each.background(never):
-        began = each.clock()
-        clock[0] += 1
-        assert each.clock() - began == 1
-        for _ in range(2):
-            with each.aside():
-                clock[0] += 10
-        assert each.clock() - began == 1
-        clock[0] += 2
-        assert each.clock() - began == 3
 
 
 def test_a_frame_waits_for_the_piece_in_progress_and_no_longer():
@@ -158,58 +133,6 @@ def test_frames_without_pause_leave_a_turn_each(monkeypatch):
     assert done.is_set(), "background work does not get on"
     thread.value()
     assert frames_before == list(range(1, 21))
-
-
-@pytest.mark.parametrize(
-    ("frames", "turn"),
-    [
-        ((), turns.FIRST_TURN),
-        ((1e-4,), turns.SHORTEST_TURN),
-        ((0.05,), 0.05 * turns.SHARE),
-        ((0.05, 3.0, 0.05, 0.0, 0.05), 0.05 * turns.SHARE),  # the median
-        ((0.0,) + (0.05,) * turns.RECENT_FRAMES, 0.05 * turns.SHARE),
-        ((10.0,) * 9 + (0.05,) * turns.RECENT_FRAMES, 0.05 * turns.SHARE),  # of the last
-        ((10.0,), turns.LONGEST_PIECE),
-    ],
-)
-def test_a_turn_is_a_share_of_a_recent_frame_within_limits(clock, frames, turn):
-    each = Turns()
-    assert each.give_way() == np.inf  # no background work
-    for frame in frames:
-        with each.foreground():
-            clock[0] += frame
-    with each.background(never):
-        assert each.give_way() == pytest.approx(turn)
-        if turn < turns.LONGEST_PIECE:
-            clock[0] += 0.75 * turn
-            assert each.give_way() == pytest.approx(0.25 * turn)
-            clock[0] += (0.26 - turns.LEAST_REMAINDER) * turn  # no useful piece fits: a new turn
-            assert each.give_way() == pytest.approx(turn)
-
-
-def test_pieces_follow_the_slowest_of_the_last():
-    worker = turns.Worker(never)
-    assert worker.piece("march", 0.01) is None
-    worker.took("march", 1000, 0.01)
-    worker.took("march", 1000, 0.001)
-    assert worker.piece("march", 0.01) == int(1000 * turns.CAUTION)
-    assert worker.piece("pack", 0.01) is None
-    assert worker.piece("march", 1e-9) == 1
-    for _ in range(turns.RECENT_PIECES):
-        worker.took("march", 1000, 0.001)
-    assert worker.piece("march", 0.01) == int(10000 * turns.CAUTION)
-
-
-def test_frames_of_two_threads_are_side_by_side():
-    each = Turns()
-    both = threading.Barrier(2, timeout=PATIENCE)
-
-    def frame():
-        with each.foreground():
-            both.wait()
-
-    for thread in [InThread(frame), InThread(frame)]:
-        thread.value()
 
 
 def test_workers_take_turns_with_each_other():
@@ -268,15 +191,6 @@ def test_cancelled_work_ends_while_a_frame_waits_for_it():
     with pytest.raises(Cancelled), each.background(lambda: True):
         each.give_way()
     assert_free(each)
-
-
-@pytest.mark.parametrize("error", [ValueError, Cancelled])
-def test_errors_leave_nothing_behind(error):
-    each = Turns()
-    for block in (each.foreground, lambda: each.background(never)):
-        with pytest.raises(error), block(), each.aside():
-            raise error
-        assert_free(each)
 
 
 def test_a_lock_is_handed_over_between_frame_and_work():

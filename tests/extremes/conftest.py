@@ -1,4 +1,4 @@
-"""The worst error of each test, kept and shown at the end: what docs/numerics.md reports."""
+"""The worst error of each test, kept and shown at the end: what docs/dev/numerics.md reports."""
 
 from __future__ import annotations
 

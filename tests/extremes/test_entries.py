@@ -24,12 +24,10 @@ from oracle import assert_explained
 from reference.raycast import pixel_ray
 
 from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume
-from pyvista_vdi.model import float32_limits as numerics
 from pyvista_vdi.model.cropping import PRESETS
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.rays import GridRays
 
 pytestmark = pytest.mark.extremes
 
@@ -39,14 +37,6 @@ SHINY = Shading(0.2, 0.6, 0.5, 30.0)
 def is_far(runtime, volume, camera, window=WINDOW):
     medium = DeviceVolume(runtime, volume, transfer())
     return medium.rays.forms(camera, window).double_float
-
-
-@pytest.mark.parametrize(
-    ("reach", "points"), [(256, 9), (256, 64), (1600, 400), (2048, 600), (2048, 5000)]
-)
-def test_the_border(reach, points):
-    assert not numerics.enters_far_away(reach, points)
-    assert numerics.enters_far_away(reach + 1, points)
 
 
 @pytest.mark.every(3)
@@ -62,16 +52,6 @@ def test_the_bound_holds_on_both_sides_of_the_border(runtime, worst, thinness, f
     exact = reference.volume_image(volume, camera, WINDOW, function)
     assert (exact[..., 3] > 1e-3).sum() > 3
     assert_within(worst, "volume", image, exact)
-
-
-@pytest.mark.parametrize("dimensions", [(500, 500, 500), (500, 400, 100), (512, 512, 30)], ids=str)
-def test_what_is_not_very_thin_is_computed_in_float32_alone(runtime, dimensions):
-    """Whatever the view: as large as it fits into the window, near, or wide."""
-    volume = Volume(np.broadcast_to(np.uint8(3), dimensions[::-1]))
-    for azimuth in range(0, 91, 15):
-        for options in ({}, {"distance": 1.3}, {"parallel": True}):
-            camera = view(volume, azimuth, 35, **options)
-            assert not GridRays(volume, 1.0, 1.0).forms(camera, (640, 480)).double_float
 
 
 def test_needles(runtime, worst):
@@ -167,18 +147,6 @@ def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, paral
     image = render_vdi(vdi, vdi.camera, (4, 3), device=runtime)
     assert_within(worst, "VDI at V_O", image, reference.render(vdi, vdi.camera, (4, 3)))
     check_views(runtime, worst, vdi, [EYE.azimuth(a) for a in (25, 90, 180)], least_drawn=0)
-
-
-@pytest.mark.parametrize(("thickness", "far"), [(1.1 * 2.0**-22, True), (0.9 * 2.0**-22, False)])
-def test_what_depths_cannot_tell_is_left_to_float32(thickness, far):
-    """Two units of depth, and a slab of a unit in the last place of them."""
-    assert numerics.lists_are_far(2.0, thickness, 2.0) is far
-
-
-def test_lists_far_away_but_not_thin_are_computed_in_float32_alone(runtime):
-    volume = field_volume()
-    vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
-    assert "DOUBLE_FLOAT_RAYS" not in PreparedVDI(runtime, vdi).switches
 
 
 @pytest.mark.every(5)

@@ -10,10 +10,8 @@ from extreme_scenes import (
     WINDOW,
     assert_within,
     check_views,
-    field_volume,
     slabs_vdi,
     transfer,
-    turned,
     view,
 )
 
@@ -155,12 +153,3 @@ def test_8192_by_4320_lists(runtime, worst):
         assert drawn[:, 3].max() > 0
         worst("8192 x 4320 turned", np.maximum(low - drawn, drawn - high).max())
         assert ((drawn >= low - 2e-5) & (drawn <= high + 2e-5)).all()
-
-
-def test_a_generated_vdi_in_every_list_state(runtime, worst):
-    """Seen from everywhere, a VDI whose lists go from empty to full."""
-    volume = field_volume()
-    vdi = generate_vdi(
-        volume, view(volume), WINDOW, transfer(opacity=0.9), max_supersegments=3, device=runtime
-    )
-    check_views(runtime, worst, vdi, turned(view(volume), volume))

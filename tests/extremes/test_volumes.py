@@ -10,18 +10,14 @@ import reference
 from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     BOUND,
-    FIELD,
     WINDOW,
     assert_within,
     check_views,
-    field_volume,
     transfer,
     view,
 )
 
 from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume
-from pyvista_vdi.device import Launch
-from pyvista_vdi.volume import upload
 
 pytestmark = pytest.mark.extremes
 
@@ -96,44 +92,3 @@ def test_what_one_allocation_does_not_hold_goes_brick_by_brick(runtime, monkeypa
     assert volume.array.nbytes > 2**21
     assert np.array_equal(raycast_volume(same, camera, WINDOW, function, device=runtime), image)
     assert generate_vdi(same, camera, WINDOW, function, device=runtime).equals(vdi)
-
-
-@pytest.mark.slow
-def test_more_than_2_31_voxels_that_the_host_never_holds(runtime, worst, monkeypatch, tmp_path):
-    """From a file, mostly a hole, of which bricks alone are in memory."""
-    start, planes = 1017, 1025
-    array = np.memmap(tmp_path / "voxels", np.uint8, "w+", shape=(planes, 1024, 2048))
-    array[-3:, 400:600, 1400:1600] = 200
-    # The same corner alone, with the planes before it left out
-    volume, part = Volume(array), Volume(np.array(array[start:]), origin=(0, 0, start))
-    assert array.size > 2**31
-    function = transfer(0, 200, unit_distance=2.0)
-    centre = np.array([1500.3, 500.2, planes - 2.5])
-    camera = Camera(centre + np.array([900, 700, 3000]), centre, (0, 1, 0), view_angle=4)
-    options = {"sample_distance": 1.0, "memory_limit": "100 MiB", "device": runtime}
-    held, launch = [before := runtime.allocated], Launch.__call__
-
-    def noted(self, *arguments, **how):
-        held.append(runtime.allocated)
-        launch(self, *arguments, **how)
-
-    monkeypatch.setattr(Launch, "__call__", noted)
-    image = raycast_volume(volume, camera, WINDOW, function, **options)
-    vdi = generate_vdi(volume, camera, WINDOW, function, **options)
-    assert max(held) - before <= 100 * 2**20
-    exact = reference.volume_image(part, camera, WINDOW, function, 1.0)
-    assert exact[..., 3].max() > 0.3
-    # A coordinate from 1024 to 2048 is rounded twice, as the form's value and as the sum at t, by
-    # half a unit in the last place, 2^-24 of 1024, each; a channel changes by less than 1 a voxel
-    bound = max(BOUND, 2.0**-24 * max(volume.dimensions))
-    assert_within(worst, "brick by brick", image, exact, bound)
-    assert_within(worst, "VDI at V_O", render_vdi(vdi, camera, device=runtime), image)
-
-
-def test_a_volume_beyond_float32_is_found_once(runtime, monkeypatch):
-    volume = Volume(((FIELD - 0.5) * 6e38).astype(np.float32))
-    function = transfer(-3e38, 3e38)
-    assert not upload.reads_natively(runtime, volume, function, None)
-    monkeypatch.setattr(upload, "upload_voxels", None)
-    assert not upload.reads_natively(runtime, volume, function, None)
-    assert not upload.uploads_of(field_volume()).too_large

@@ -29,7 +29,7 @@ from pyvista_vdi.errors import Cancelled, DeviceError, DeviceMemoryError, Kernel
 #: Buffers of a volume and of a VDI that are on the device, and those that are always small.
 VOLUME = {"volume 'values'", "ranges of macrocells"}
 VDI = {
-    *("list headers", "supersegment faces", "supersegment media"),
+    *("list headers", "centre rays", "supersegment faces", "supersegment media"),
     *("occupancy counts", "occupancy masks"),
 }
 SMALL = {"transfer function", "visible macrocells"}
@@ -170,7 +170,7 @@ def test_a_kernel_that_does_not_compile(runtime, operation, broken, monkeypatch)
     error = caught.value
     for said in (str(error), error.log, error.source):
         assert "missing_name" in said
-    assert "-D" in error.options
+    assert "-cl-std" in error.options
     del caught, error
     assert state_of(fresh) == before
     assert same(operation(fresh), expected)

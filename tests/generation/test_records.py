@@ -1,10 +1,10 @@
 """Records of runs (opencl/generation/merging.cl, shorten_lists.cl and homogeneity.cl): what merging
 two runs gives and costs, and the four ways of shortening a record.
 
-The reference is float64 and written from docs/conventions.md and the head of the kernel file: a run
-is a homogeneous medium of straight colour c and optical depth tau over a length; it looks like
-(c f, f) per reference length l with f = tau / (tau + l); merging costs what the sum of squares
-about the mean, along the ray, grows by. Cuts are those of reference.shading.
+The reference is float64, of docs/dev/conventions.md and the head of the kernel file: a run is a
+homogeneous medium of straight colour c and optical depth tau over a length; it looks like (c f, f)
+per reference length l with f = tau / (tau + l); merging costs what the sum of squares about the
+mean, along the ray, grows by. Cuts are those of reference.shading.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
     UnsupportedError,
 )
-from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -133,13 +132,6 @@ def test_opacities_of_all_levels_refer_to_the_finest(image):
         assert volume.default_unit_distance == expected
 
 
-def test_three_axes_alone(tmp_path):
-    volume = pvdi.open_volume(write_ome(tmp_path / "x.zarr", "0.4", VALUES[0, 0], AXES[2:]))
-    assert volume.store.axes == ("z", "y", "x")
-    assert volume.spacing == (0.25, 0.5, 2.0)
-    np.testing.assert_array_equal(volume.load().array, VALUES[0, 0])
-
-
 def test_level_of_a_view_says_why(image):
     path, _ = image
     finest = pvdi.open_volume(path)
@@ -233,16 +225,6 @@ def test_metadata_that_cannot_be_followed_are_refused(edit, error, message, ome)
         pvdi.open_volume(ome)
 
 
-def test_format_3_is_refused_by_name_where_zarr_is_older(tmp_path, monkeypatch):
-    zarr = pytest.importorskip("zarr")
-    folder = tmp_path / "x.ome.zarr"
-    folder.mkdir()
-    (folder / "zarr.json").write_text("{}")
-    monkeypatch.setattr(zarr, "__version__", "2.18.3")
-    with pytest.raises(UnsupportedError, match=r"zarr 2\.18\.3 .* install zarr 3"):
-        pvdi.open_volume(folder)
-
-
 def test_nothing_is_read_when_a_store_is_opened(image, tmp_path):
     """Chunks that cannot be decoded are only missed when they are asked for."""
     path = Path(shutil.copytree(image[0], tmp_path / "x.ome.zarr"))
@@ -316,13 +298,6 @@ def test_hdf5(tmp_path):
     assert (again.time, again.spacing, again.why) == (1, labelled.spacing, labelled.why)
 
 
-def test_numbers_of_numpy_choose_as_others_do(image):
-    volume = pvdi.open_volume(image[0], level=np.int64(1), time=np.uint8(1), channel=np.int32(2))
-    np.testing.assert_array_equal(volume.load().array, VALUES[1, 2, ::2, ::2, ::2])
-    assert volume.describe().startswith("level 1 of 3")
-    assert volume.at_level(0).channel == 2
-
-
 @pytest.mark.parametrize("name", ["x.zarr", "x.h5"])
 def test_a_store_that_is_written_anew_must_be_opened_again(name, tmp_path):
     zarr, h5py = pytest.importorskip("zarr"), pytest.importorskip("h5py")
@@ -346,33 +321,8 @@ def test_a_store_that_is_written_anew_must_be_opened_again(name, tmp_path):
     np.testing.assert_array_equal(again.load().array, VALUES[0, 0, 1:])
 
 
-def test_what_its_own_process_writes_into_an_hdf5_file_is_read(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(tmp_path / "x.h5", "w") as file:
-        file["v"] = VALUES[0, 0]
-        volume = pvdi.Volume(file["v"])
-        file["v"][1, 2, 3] = 9999
-        assert volume.finite_range()[1] == 9999
-
-
-def test_what_is_no_store_is_said(tmp_path):
-    pytest.importorskip("zarr")
-    pytest.importorskip("h5py")
-    (tmp_path / "x.h5").write_bytes(b"rubbish")
-    for name in ("none.zarr", "none.h5", "x.h5"):
-        with pytest.raises(InvalidVolumeError, match=f"{name} cannot be read as"):
-            pvdi.open_volume(tmp_path / name)
-
-
 @pytest.mark.parametrize(("name", "library"), [("x.zarr", "zarr"), ("x.h5", "h5py")])
 def test_an_absent_library_is_named(name, library, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, library, None)
     with pytest.raises(MissingDependencyError, match=r"pip install 'pyvista-vdi\["):
         pvdi.open_volume(name)
-
-
-def test_stores_are_told_by_their_names(tmp_path):
-    for name in ("a.zarr", "a.ome.zarr/", "a.h5::/x", "a.HDF5"):
-        assert is_store(name)
-    for name in ("a.nrrd", "a.vdi", "", ".", "x" * 300):
-        assert not is_store(name)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import errno
 import json
 import os
 import re
 import tracemalloc
 import zipfile
 import zlib
-from io import BytesIO, FileIO
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +16,12 @@ import pytest
 from extension_marks import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rewriting import JUNK, check_changed_bytes, declaring, described, rewritten
+from rewriting import check_changed_bytes, declaring, described, rewritten
 from strategies import random_vdi
 
 from pyvista_vdi import VDI, Camera, io
-from pyvista_vdi.cli import main
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.io.vdi_file import chunks, writer
+from pyvista_vdi.io.vdi_file import chunks
 from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
 
@@ -96,15 +93,6 @@ def test_reading_gives_back_every_bit(seed, codec, precision, tmp_path_factory):
     assert io.write(back, path, compression=codec).read_bytes() == first
 
 
-@pytest.mark.parametrize("codec", CODECS)
-def test_several_chunks_and_metadata(codec, tmp_path):
-    vdi = large_vdi(depth_origin=0.1, metadata={"criterion": "x", "values": [1, 2.5, None]})
-    assert vdi.n_supersegments > 2 * CHUNK_ROWS
-    back = io.read(io.write(vdi, tmp_path / "a.vdi", compression=codec))
-    assert back.equals(vdi)
-    assert (back.metadata, back.camera) == (vdi.metadata, vdi.camera)
-
-
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_chunks_that_end_within_a_list(precision, tmp_path):
     vdi = large_vdi((320, 256), per_list=3)
@@ -152,17 +140,6 @@ def test_the_same_vdi_gives_the_same_bytes_by_any_number_of_threads(tmp_path, mo
     assert io.write(vdi, tmp_path / "b.vdi").read_bytes() == first
 
 
-def test_compressed_and_packed_files_are_smaller(tmp_path):
-    vdi = large_vdi((160, 128))
-    sizes = {}
-    for codec in ("none", "zstd", "lz4", "deflate"):
-        for precision in PRECISIONS:
-            path = vdi.save(tmp_path / "a.vdi", precision=precision, compression=codec)
-            sizes[codec, precision] = path.stat().st_size
-        assert sizes[codec, "exact"] > sizes[codec, "8-byte"]
-    assert sizes["zstd", "exact"] < 0.9 * sizes["none", "exact"]
-
-
 def test_save_takes_text_overwrites_and_makes_metadata_of_numpy_plain(tmp_path):
     path = str(tmp_path / "a.vdi")
     small_vdi(1).save(path)
@@ -173,19 +150,6 @@ def test_save_takes_text_overwrites_and_makes_metadata_of_numpy_plain(tmp_path):
     assert names_in(tmp_path) == ["a.vdi"]
 
 
-def test_convert_packs_and_unpacks(tmp_path, capsys):
-    source = small_vdi(2).save(tmp_path / "exact.vdi")
-    packed, again = tmp_path / "packed.vdi", tmp_path / "again.vdi"
-    assert main(["convert", str(source), "-o", str(packed), "--precision", "8-byte"]) == 0
-    assert io.read(packed).equals(io.read(source).with_precision("8-byte"))
-    assert main(["convert", str(packed), "-o", str(again)]) == 0
-    assert io.read(again).precision == "8-byte"
-    assert main(["convert", str(packed), "-o", str(again), "--precision", "exact"]) == 0
-    assert io.read(again).precision == "exact"
-    assert main(["info", str(packed)]) == 0
-    assert "8-byte" in capsys.readouterr().out
-
-
 def test_info_says_what_the_vdi_is(tmp_path):
     vdi = large_vdi((40, 30), metadata={"tolerance": 0.5}, depth_origin=1.0)
     info = io.read_info(io.write(vdi, tmp_path / "a.vdi", compression="lz4"))
@@ -194,76 +158,6 @@ def test_info_says_what_the_vdi_is(tmp_path):
     assert (info.metadata, info.codec, info.format_version) == ({"tolerance": 0.5}, "lz4", 2)
     assert info.memory_bytes == vdi.nbytes
     assert info.file_bytes == (tmp_path / "a.vdi").stat().st_size
-
-
-def test_info_reads_as_little_of_a_large_file_as_of_a_small_one(tmp_path, monkeypatch):
-    """What is read is the description and the archive's directory, however large the arrays."""
-    read_bytes = []
-
-    class Counting(FileIO):
-        def read(self, *size):
-            data = super().read(*size)
-            read_bytes[-1] += len(data)
-            return data
-
-    for n_lists in ((2, 2), (640, 512)):
-        vdi = large_vdi(n_lists)
-        path = io.write(vdi, tmp_path / "a.vdi", compression="none")
-        read_bytes.append(0)
-        with monkeypatch.context() as counted:
-            counted.setattr(Path, "open", lambda path, mode="r": Counting(path, mode))
-            assert io.read_info(path).n_supersegments == vdi.n_supersegments
-    assert path.stat().st_size > 10**7
-    assert max(read_bytes) < 6000
-    assert read_bytes[1] - read_bytes[0] < 100  # longer numbers in the description
-
-
-@pytest.mark.parametrize(
-    ("error", "expected", "message"),
-    [
-        (OSError(errno.ENOSPC, "No space left on device"), VDIFileError, "No space left on device"),
-        (KeyboardInterrupt(), KeyboardInterrupt, None),
-        (MemoryError(), MemoryError, None),
-    ],
-)
-def test_a_failure_leaves_the_old_file_and_nothing_else(
-    error, expected, message, file, monkeypatch
-):
-    before = file.read_bytes()
-
-    def fail(stream, *_):
-        stream.write(b"half")
-        raise error
-
-    monkeypatch.setattr(writer, "write_chunks", fail)
-    with pytest.raises(expected, match=message):
-        small_vdi(2).save(file)
-    assert file.read_bytes() == before
-    assert names_in(file.parent) == [file.name]
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("no/such/folder/a.vdi", r"the folder .*folder does not exist; create it"),
-        ("folder.vdi", r"folder\.vdi cannot be written: it is a folder"),
-        ("plain/a.vdi", r"the folder .*plain does not exist"),
-        ("a.png", r"'.*a\.png' cannot be written as a VDI: the name must end in \.vdi.*'a\.vdi'"),
-        ("", r"must end in \.vdi"),
-        ("a\0b.vdi", "cannot be written"),
-        ("x" * 300 + ".vdi", "cannot be written"),
-    ],
-)
-def test_unwritable_targets_are_refused_before_anything_is_done(name, message, tmp_path):
-    (tmp_path / "folder.vdi").mkdir()
-    (tmp_path / "plain").write_text("not a folder")
-    target = f"{tmp_path}/{name}" if name else ""
-    with pytest.raises(VDIFileError, match=message):
-        io.checked_target(target)
-    with pytest.raises(VDIFileError, match=message):
-        small_vdi().save(target)
-    io.checked_target(tmp_path / "a.vdi")  # which can be written, and is left alone
-    assert names_in(tmp_path) == ["folder.vdi", "plain"]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="POSIX permissions and symbolic links")
@@ -303,23 +197,6 @@ def test_options_are_checked_before_anything_is_written(name, options, message, 
     with pytest.raises(InvalidArgumentError, match=message):
         small_vdi().save(tmp_path / name, **options)
     assert names_in(tmp_path) == []
-
-
-@pytest.mark.parametrize("value", [float("nan"), object(), {1: {2}}])
-def test_metadata_that_json_cannot_hold(value, tmp_path):
-    vdi = large_vdi((4, 4), metadata={"entry": value})
-    with pytest.raises(VDIFileError, match="metadata cannot be written"):
-        vdi.save(tmp_path / "a.vdi")
-    assert names_in(tmp_path) == []
-
-
-def test_options_of_another_format_and_absent_files_are_refused(file, tmp_path):
-    with pytest.raises(InvalidArgumentError, match="options none; got thickness"):
-        io.read(file, thickness=1.0)
-    with pytest.raises(VDIFileError, match=r"none\.vdi cannot be read: No such file or directory"):
-        io.read(tmp_path / "none.vdi")
-    with pytest.raises(VDIFileError, match="cannot be read"):
-        io.read(tmp_path)  # a folder
 
 
 def archive_with(text):
@@ -402,35 +279,6 @@ def test_a_missing_member(name, file):
     rewrite(file, lambda members: members.pop(name))
     with pytest.raises(VDIFileError, match=rf"its member '{name}' is missing|not a VDI file"):
         io.read(file)
-
-
-KEYS = "format version window_size n_supersegments camera bounds depth_origin codec chunk_rows"
-PACKED_JUNK = ("exact", 0.0, -0.5, 0.3, 2.0**-200, 2.0**200)
-
-
-CASES = [
-    *(("exact", key) for key in (*KEYS.split(), "arrays", "metadata")),
-    *(("8-byte", key) for key in ("precision", "depth_step", "arrays", "version")),
-]
-
-
-@pytest.mark.parametrize(("precision", "key"), CASES)
-def test_junk_in_the_description(precision, key, file):
-    whole = small_vdi(precision=precision).save(file, compression="none").read_bytes()
-    for value in (*JUNK, *(PACKED_JUNK if precision == "8-byte" else ())):
-        file.write_bytes(described(whole, **{key: value}))
-        # What is left is as good as what was there
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if (
-            (key == "metadata" and isinstance(value, dict))
-            or (key == "depth_origin" and number)
-            or (key == "depth_step" and value == 2**70)  # a power of two: another size of world
-        ):
-            with contextlib.suppress(VDIFileError):
-                io.read(file)
-        else:
-            with pytest.raises(VDIFileError):
-                io.read(file)
 
 
 def without(name):

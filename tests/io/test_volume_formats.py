@@ -445,14 +445,3 @@ def test_reading_in_threads_leaves_what_others_log_alone(tmp_path, caplog):
     assert len({each.result().array.tobytes() for each in read}) == 1
     assert [(each.handlers, each.filters, each.propagate) for each in loggers] == before
     assert "by another thread" in {record.getMessage() for record in caplog.records}
-
-
-def test_one_entrance(tmp_path, default_runtime):
-    """A path is a volume wherever one is taken."""
-    pv = pytest.importorskip("pyvista")
-    np.save(tmp_path / "a.npy", scan())
-    assert pvdi.open_volume(tmp_path / "a.npy").dimensions == (7, 6, 5)
-    plotter = pv.Plotter(off_screen=True)
-    actor = plotter.add_vdi(str(tmp_path / "a.npy"))
-    assert actor.bounds == pytest.approx((0, 6, 0, 5, 0, 4))
-    plotter.close()

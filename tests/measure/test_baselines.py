@@ -10,17 +10,14 @@ import pytest
 import strategies
 from oracle import explain, total
 
-from pyvista_vdi.model import compositing
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import Segment
-from pyvista_vdi.model.vdi import VDI
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 if not BENCHMARKS.is_dir():
     pytest.skip("the benchmarks are not beside the tests", allow_module_level=True)
 sys.path.insert(0, str(BENCHMARKS))
 
-from baselines import CRITERIA, WorldRays, cut, cut_runs  # noqa: E402
+from baselines import CRITERIA, WorldRays, cut_runs  # noqa: E402
 
 #: Largest difference per channel: they cut rays at t in float32, where a short stretch far from
 #: t = 0 has few digits; list space keeps 2e-5 (tests/support/oracle.py).
@@ -55,13 +52,6 @@ def test_pictures_are_the_oracles(runtime, way, kind):
     assert result.drawn > result.pixels / 10
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_an_empty_vdi_is_empty(runtime, way):
-    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
-    none = VDI(camera, (3, 2), [0] * 7, [], [], [], [], (-1, 1, -1, 1, -1, 1))
-    assert not WAYS[way](runtime, none).image(camera, (3, 2)).any()
-
-
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_one_medium_is_cut_into_equal_shares(criterion):
     whole = Segment(2.0, 10.0, np.array([0.2, 0.5, 0.9]), 3.0)
@@ -74,30 +64,3 @@ def test_one_medium_is_cut_into_equal_shares(criterion):
     }[criterion]
     np.testing.assert_allclose(share, np.full(8, share.sum() / 8))
     assert tau.sum() == pytest.approx(3.0)
-
-
-@pytest.mark.parametrize("criterion", CRITERIA)
-def test_lists_are_cut_to_the_limit_and_v_o_sees_the_same(criterion):
-    vdi = strategies.random_vdi(np.random.default_rng(7))
-    found = cut(vdi, criterion, 3)
-    assert found.counts.max() <= 3 < vdi.counts.max()
-    for before, after in zip(*(map(v.list_at, *places(v)) for v in (vdi, found)), strict=True):
-        seen = [
-            compositing.composite(v.color[part].astype(float), v.optical_depth[part].astype(float))
-            for v, part in ((vdi, before), (found, after))
-        ]
-        np.testing.assert_allclose(*seen, atol=1e-5)
-
-
-def places(vdi):
-    """The columns and the rows of a VDI's lists."""
-    width, height = vdi.window_size
-    y, x = np.divmod(np.arange(width * height), width)
-    return x.tolist(), y.tolist()
-
-
-def test_empty_stretches_make_no_supersegment():
-    """Two thin media far apart: of ten equal lengths only the two that hold something are left."""
-    parts = [Segment(0.0, 1.0, np.ones(3), 1.0), Segment(19.5, 20.0, np.ones(3), 1.0)]
-    found = cut_runs(parts, "length", 10)
-    assert [(part.front, part.back) for part in found] == [(0.0, 1.0), (19.5, 20.0)]

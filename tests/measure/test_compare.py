@@ -9,9 +9,9 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
-from pyvista_vdi.errors import DeviceError, InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.errors import DeviceError
 from pyvista_vdi.measure.bench import as_json
-from pyvista_vdi.measure.compare import NAMES, contact_sheet, measure, table
+from pyvista_vdi.measure.compare import NAMES, measure
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -60,22 +60,6 @@ def test_the_report_holds_every_figure(measured):
     assert report["system"]["OpenGL"]
     assert report["case"]["sample_distance"] == 0.2
     json.dumps(as_json(report), allow_nan=False)
-
-
-@pytest.mark.gl
-def test_the_report_becomes_text_and_a_picture(measured):
-    report, _, images, _ = measured
-    text = table(report)
-    assert f"{report['views'][1]['near']['vdi_to_raycaster']['ssim']:.5f}" in text
-    assert "VTK fixed-point" in text
-    sheet = contact_sheet(report, images)
-    # Five panels of the window's own width, two rows
-    assert sheet.shape[1] == pytest.approx(5 * SIZE[0], abs=20)
-    assert sheet.shape[0] == pytest.approx(2 * (SIZE[1] + 28), abs=10)
-    # A panel's pixels are the picture's: the first row's VDI, fourth column
-    left, top = 3 * (SIZE[0] + 4), 26
-    panel = sheet[top : top + SIZE[1], left : left + SIZE[0]]
-    assert np.array_equal(panel, io.to_bytes(images[0]["vdi"], (0, 0, 0)))
 
 
 @pytest.mark.gl
@@ -132,62 +116,6 @@ def test_a_blank_picture_is_an_error(volume, default_runtime):
     pytest.importorskip("pyvista")
     with pytest.raises(DeviceError, match="VTK's gpu mapper drew nothing: every pixel is black"):
         measure(volume, {"opacity": [0.0, 0.0, 0.0]}, SIZE, angles=(0,), repeats=1)
-
-
-@pytest.mark.parametrize("repeats", [0, 1])
-def test_without_vtk_and_timings(repeats, volume, default_runtime):
-    shade = pvdi.TransferFunction([(0, 0, 0), (1, 0.5, 0)], [0, 0.5], volume.finite_range())
-    looks, options = {"transfer_function": shade}, {"angles": (5,), "vtk": False}
-    report, _, images = measure(volume, looks, SIZE, repeats=repeats, **options)
-    assert set(images[5]) == {"raycaster", "vdi"}
-    (view,) = report["views"]
-    ssim = compare_images(images[5]["vdi"], images[5]["raycaster"]).ssim
-    assert [*view["near"]] == ["vdi_to_raycaster"]
-    assert view["near"]["vdi_to_raycaster"]["ssim"] == ssim
-    assert view["ratio_to_vtk"] is None
-    assert (report["generation_seconds"] is None) == (repeats == 0)
-    text = table(report)
-    assert "VTK fixed-point" not in text
-    assert ("Frames" in text, "Generation" in text) == (repeats > 0, repeats > 0)
-    assert contact_sheet(report, images).shape[1] == pytest.approx(3 * SIZE[0], abs=12)
-
-
-BLANK = pvdi.TransferFunction([(1, 1, 1)] * 2, [0, 0], (0, 1))
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"repeats": -1}, "repeats must be a whole number from 0 to 1000; got -1"),
-        ({"repeats": 2.5}, "repeats must be a whole number from 0 to 1000; got 2.5"),
-        ({"angles": ()}, "angles must be one or more numbers"),
-        ({"angles": (float("nan"),)}, "angles must be one or more numbers"),
-        ({"angles": (5, 5.0)}, "an angle is given twice"),
-        ({"sample_distance": 0}, "sample_distance must be .*; got 0"),
-        ({"classification": {"transfer_function": BLANK}}, "nothing is to be seen"),
-    ],
-)
-def test_what_is_asked_is_checked(options, message, volume, default_runtime):
-    with pytest.raises(InvalidArgumentError, match=message):
-        measure(volume, **{"classification": LOOKS, "vtk": False, **options})
-
-
-def test_a_machine_without_opengl_names_the_packages(volume, monkeypatch, default_runtime):
-    pytest.importorskip("pyvista")
-    from pyvista_vdi.vtk_pipeline.vtk import vtkRenderingOpenGL2
-
-    class NoWindow:
-        def __getattr__(self, name):
-            return lambda *_: 0
-
-    monkeypatch.delenv("VTK_DEFAULT_OPENGL_WINDOW", raising=False)
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr("sys.platform", "linux")
-    for name in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"):
-        monkeypatch.setattr(vtkRenderingOpenGL2, name, NoWindow, raising=False)
-    message = "VTK finds no OpenGL .* 'libegl1 libgl1-mesa-dri' or 'libosmesa6'.* --no-vtk"
-    with pytest.raises(MissingDependencyError, match=message):
-        measure(volume, LOOKS, SIZE)
 
 
 @pytest.mark.gl

@@ -80,7 +80,7 @@ def coloured(volume):
     """The scalars as opacities, under colours that change with the place.
 
     They span all bytes: VTK looks the opacities of a narrower range up elsewhere
-    (docs/conventions.md).
+    (docs/dev/conventions.md).
     """
     alpha = np.round(volume.array / volume.array.max() * 255.0)
     z, y, x = np.meshgrid(*(np.linspace(0, 255, n) for n in volume.array.shape), indexing="ij")

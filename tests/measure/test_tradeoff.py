@@ -13,10 +13,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.tradeoff import (
-    AXES,
     COSTS,
-    DEFAULT_AXES,
-    PAIRS,
     Point,
     Tradeoff,
     dominates,
@@ -42,39 +39,6 @@ def point(cost, ssim, noise=0.0, **setting):
     return Point(setting, costs, {"frame": noise, "generation": noise}, {0: cost}, {0: ssim})
 
 
-def test_the_default_sweep_changes_one_thing_or_a_pair():
-    settings = sweep()
-    assert settings[0] == {}
-    assert len({str(setting) for setting in settings}) == len(settings)
-    alone = [setting for setting in settings if len(setting) == 1]
-    assert alone == [{name: value} for name in DEFAULT_AXES for value in AXES[name]]
-    assert [setting for setting in settings if len(setting) > 1] == list(PAIRS)
-
-
-def test_pairs_need_both_axes():
-    axes = {"lists": (2.0,), "precision": ("8-byte",), "tolerance": (0.1,)}
-    alone = [{name: values[0]} for name, values in axes.items()]
-    assert sweep(axes) == [{}, *alone, {"lists": 2.0, "precision": "8-byte"}]
-    assert sweep(axes, pairs=False) == [{}, *alone]
-
-
-@pytest.mark.parametrize(
-    ("setting", "message"),
-    [
-        ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
-        ({"precision": "4-byte"}, "precision must be .*exact"),
-        ({"lists": 0.0}, "lists must be from 0.05 to 8; got 0.0"),
-        ({"preview": 1.5}, "preview must be from 0.02 to 1; got 1.5"),
-        ({"view_cone": 91.0}, "view_cone must be .*90"),
-        ({"size": 3}, "no axis 'size': known are max_supersegments"),
-    ],
-)
-def test_settings_are_checked(setting, message, shell, default_runtime):
-    volume, look = shell
-    with pytest.raises(InvalidArgumentError, match=message):
-        measure_tradeoff(volume, [setting], transfer_function=look, **TINY)
-
-
 def test_a_tiny_run_measures_what_each_setting_costs_and_gives(shell, default_runtime):
     pytest.importorskip("matplotlib")
     volume, look = shell
@@ -95,15 +59,6 @@ def test_a_tiny_run_measures_what_each_setting_costs_and_gives(shell, default_ru
     table = found.table()
     assert all(f"| {one.name} |" in table for one in found.points)
     assert len(found.plot().axes) == len(COSTS)
-
-
-def test_what_does_not_fit_is_refused_and_the_rest_goes_on(shell, default_runtime):
-    volume, look = shell
-    settings = [{"sample_distance": 1e-9}, {}]
-    found = measure_tradeoff(volume, settings, transfer_function=look, **TINY)
-    assert [one.name for one in found.points] == ["default"]
-    (why,) = found.refused.values()
-    assert "Error" in why
 
 
 def test_the_command_writes_figures_a_table_and_a_plot(shell, tmp_path, capsys, default_runtime):
@@ -132,23 +87,6 @@ def test_noise_is_not_taken_for_dominance():
     assert not dominates(point(0.8, 0.98, noise=0.2), slow)
     # Faster, and worse by more than what does not count
     assert not dominates(point(0.8, 0.979), slow)
-
-
-def test_gains_must_outweigh_losses():
-    # Better by 1.2 of what does not count in SSIM, worse by 0.9 of it in two costs
-    better = point(1.0, 0.9806)
-    worse = {"frame": 1.045, "generation": 1.045}
-    other = Point({}, {**better.costs, **worse}, {}, {0: 1.0}, {0: 0.9806})
-    one = Point({}, better.costs, {}, {0: 1.0}, {0: 0.98})
-    assert not dominates(other, one)
-    assert dominates(better, one)
-
-
-def test_a_front_and_what_is_dominated():
-    points = [point(1.0, 0.98), point(0.5, 0.95, lists=0.5), point(1.5, 0.97, tolerance=0.1)]
-    found = Tradeoff({}, points, {})
-    assert found.front("frame") == ["lists 0.5", "default"]
-    assert found.dominated() == {"tolerance 0.1": ["default"]}
 
 
 @given(st.lists(st.tuples(st.floats(0.1, 10), st.floats(0.5, 1)), min_size=2, max_size=7))

@@ -1,4 +1,4 @@
-"""The pages of ``docs/``: the tables that they include, and the names on them.
+"""The pages of ``docs/``: the names on them.
 
 Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one these tests lie in.
 """
@@ -29,8 +29,6 @@ pytestmark = pytest.mark.skipif(
     reason="no documentation at hand: set PYVISTA_VDI_CHECKOUT to a checkout",
 )
 
-INCLUDE = re.compile(r"```\{include\} (\S+)\n((?::\S+: .*\n)*)```")
-
 
 def _pages():
     pages = [page for page in DOCS.rglob("*.md") if "_build" not in page.parts]
@@ -38,29 +36,9 @@ def _pages():
     return sorted(pages)
 
 
-def test_included_tables_bring_no_headings():
-    """A title within an included file would be a page of its own in the site's menu."""
-    included = 0
-    for page in _pages():
-        for name, options in INCLUDE.findall(page.read_text(encoding="utf-8")):
-            if name.endswith("CHANGELOG.md"):  # the whole page
-                continue
-            text = (page.parent / name).read_text(encoding="utf-8")
-            where = dict(re.findall(r':(start-after|end-before): "(.*)"', options))
-            if "start-after" in where:
-                _before, found, text = text.partition(where["start-after"])
-                assert found, f"{page.name}: {name} has no {where['start-after']!r} in it"
-            if "end-before" in where:
-                text, found, _after = text.partition(where["end-before"])
-                assert found, f"{page.name}: {name} has no {where['end-before']!r} in it"
-            assert not re.search(r"^#", text, re.MULTILINE), f"{page.name}: headings of {name}"
-            included += 1
-    assert included > 5
-
-
 def _rows():
     """Yield the cells of each row of the tables on the page *Where is what*."""
-    for line in (DOCS / "where_is_what.md").read_text(encoding="utf-8").splitlines():
+    for line in (DOCS / "dev" / "where_is_what.md").read_text(encoding="utf-8").splitlines():
         if line.startswith("|") and not line.startswith("|---"):
             cells = [cell.strip() for cell in line.strip("|").split("|")]
             assert len(cells) == 5, line
@@ -98,7 +76,7 @@ def _anchors(page):
 def test_where_is_what_names_python_that_exists():
     pytest.importorskip("pyvista")
     missing = [name for row in _rows() for name in _named(row[1]) if not _is_importable(name)]
-    assert not missing, f"docs/where_is_what.md: {missing}"
+    assert not missing, f"docs/dev/where_is_what.md: {missing}"
 
 
 def test_where_is_what_names_kernels_tests_and_pages_that_exist():
@@ -118,9 +96,10 @@ def test_where_is_what_names_kernels_tests_and_pages_that_exist():
         target = re.search(r"\]\(([^)#]+)#?([^)]*)\)", page)
         assert target, page
         file, anchor = target.groups()
-        if not (DOCS / file).is_file() or (anchor and anchor not in _anchors(DOCS / file)):
+        led = DOCS / "dev" / file
+        if not led.is_file() or (anchor and anchor not in _anchors(led)):
             missing.append(f"{file}#{anchor}")
-    assert not missing, f"docs/where_is_what.md: {missing}"
+    assert not missing, f"docs/dev/where_is_what.md: {missing}"
 
 
 def test_sources_refer_to_pages_and_headings_that_exist():
@@ -152,6 +131,22 @@ def test_pages_name_files_that_exist():
             if not (CHECKOUT / name).is_file():
                 missing.add(f"{page.name}: {name}")
     assert not missing, sorted(missing)
+
+
+def test_pages_for_users_say_the_field_s_words():
+    lines = (DOCS / "dev" / "phrases.txt").read_text(encoding="utf-8").splitlines()
+    phrases = "|".join(re.escape(line) for line in lines if not line.startswith("#"))
+    said = []
+    for page in [*DOCS.glob("*.md"), CHECKOUT / "README.md"]:
+        # What is code, a link's place or a term that is explained stays
+        text = re.sub(
+            r"```.*?```|`[^`]*`|\]\([^)]*\)|^\|.*, V_[ON] \|",
+            "",
+            page.read_text("utf-8"),
+            flags=re.S | re.M,
+        )
+        said += [f"{page.name}: {each}" for each in re.findall(rf"\b(?:{phrases})\b", text)]
+    assert not said
 
 
 @pytest.fixture(scope="module")

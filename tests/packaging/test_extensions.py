@@ -66,8 +66,3 @@ def test_the_cores_tests_pass_without(name, without):
         check=False,
     )
     assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-2000:]
-
-
-def test_an_extension_that_needs_another_goes_with_it():
-    assert gone_with("series") == ["series", "insitu", "paraview", "sets", "web"]
-    assert gone_with("deep_exr") == ["deep_exr"]

@@ -1,11 +1,10 @@
-"""What can be told of Windows and macOS from here: names of files, imports, versions kept together.
+"""What can be told of Windows and macOS from here: imports, and versions kept together.
 
 Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one these tests lie in.
 """
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import subprocess
@@ -17,77 +16,16 @@ import pytest
 import pyvista_vdi
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
-PACKAGE = Path(pyvista_vdi.__file__).parent
 
 #: Modules of Python that Windows has not.
-POSIX = ("fcntl", "grp", "pwd", "resource", "termios", "tty", "pty", "posix", "syslog")
-#: Names that Windows keeps for devices, with any extension.
-RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
-
-
-def _at_import(tree):
-    """Yield the nodes that run when a module is imported: none in a function."""
-    waiting = [tree]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        for child in ast.iter_child_nodes(node):
-            if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-                waiting.append(child)
-
-
-@pytest.mark.fast
-def test_no_module_needs_posix_to_be_imported():
-    found = []
-    for path in PACKAGE.rglob("*.py"):
-        for node in _at_import(ast.parse(path.read_text(encoding="utf-8"))):
-            names = []
-            if isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
-                names = [node.module or ""]
-            found += [f"{path.name}:{node.lineno} {n}" for n in names if n.split(".")[0] in POSIX]
-    assert not found
+POSIX = ("fcntl", "grp", "pwd", "resource", "termios")
 
 
 def test_the_package_is_imported_where_posix_modules_are_absent():
-    # "posix" itself is what Python's os is made of here
-    code = f"import sys; sys.modules.update(dict.fromkeys({POSIX[:5]!r}))"
+    # psutil of Linux imports some of them itself
+    code = f"import psutil, sys; sys.modules.update(dict.fromkeys({POSIX!r}))"
     modules = "pyvista_vdi.cli.parser, pyvista_vdi.model.vdi"
     subprocess.run([sys.executable, "-c", f"{code}; import {modules}"], check=True)
-
-
-@pytest.fixture
-def names():
-    if not (CHECKOUT / ".git").exists():
-        pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
-    listing = subprocess.run(
-        ["git", "ls-files", "-z"], cwd=CHECKOUT, capture_output=True, check=True
-    )
-    return [name for name in os.fsdecode(listing.stdout).split("\0") if name]
-
-
-def test_every_file_can_be_checked_out_on_windows_and_macos(names):
-    parts = {part for name in names for part in name.split("/")}
-    assert not [p for p in parts if re.search(r'[<>:"\\|?*\x00-\x1f]|[. ]$', p)]
-    assert not [p for p in parts if RESERVED.fullmatch(p)]
-    assert len({name.lower() for name in names}) == len(set(names))
-    assert max(map(len, names)) < 160  # Windows' limit, 260, less a folder to check out into
-
-
-def test_text_is_opened_with_its_encoding():
-    found = []
-    for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if (
-                isinstance(node, ast.Call)
-                and isinstance(node.func, ast.Attribute)
-                and node.func.attr in ("read_text", "write_text")
-                and "encoding" not in {k.arg for k in node.keywords}
-                and len(node.args) < (1 if node.func.attr == "read_text" else 2)
-            ):
-                found.append(f"{path.relative_to(PACKAGE)}:{node.lineno}")
-    assert not found
 
 
 def test_one_version():

@@ -76,8 +76,8 @@ def test_another_transfer_function_uploads_its_table_alone(default_runtime, plot
         opacity.AddPoint(low, 0)
         opacity.AddPoint(255, 0.3)
         assert np.abs(seen(plotter) - first).mean() > 0.2
-        assert uploaded.count("integrals") == 1
-        assert set(uploaded) <= {"integrals", "rays", "opaque depth"}
+        assert uploaded.count("integrals of a transfer function") == 1
+        assert set(uploaded) <= {"integrals of a transfer function", "rays", "opaque depth"}
         assert "offsets" not in vars(actor.vdi)
         gc.collect()
         assert default_runtime.allocated <= held

@@ -1,4 +1,4 @@
-"""What a frame shows and what is made for it: each row of docs/window_events.md."""
+"""What a frame shows and what is made for it: each row of docs/dev/window_events.md."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The oracle: slow, plain float64 NumPy generation and raycasting; never imports the device code.
 
-Written from docs/conventions.md and from nothing in the kernels, it defines what is correct.
+Written from docs/dev/conventions.md and from nothing in the kernels, it defines what is correct.
 :func:`render` gives the exact image of any VDI from any view, :func:`render_joint` that of several
 together, :func:`render_range` and :func:`render_joint_range` what float32 arithmetic may make of a
 ray, :func:`volume_image` the direct volume rendering, :func:`build_vdi` a plain VDI, and

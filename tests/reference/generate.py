@@ -68,8 +68,8 @@ def samples(
     Samples lie at the midpoints of steps of model length ``sample_distance``, half the smallest
     spacing by default, from where the ray enters the grid, the last step being shorter, so that the
     steps' lengths add up to the ray's length in the grid whatever its directions are:
-    docs/conventions.md#from-a-volume-to-the-medium. In perspective a ray begins no earlier than at
-    the eye; one that misses the grid has no samples. One headlight lights a shaded volume by
+    docs/dev/conventions.md#from-a-volume-to-the-medium. In perspective a ray begins at the eye at
+    the earliest; one that misses the grid has no samples. One headlight lights a shaded volume by
     default.
     """
     width, height = check_window_size(window_size)

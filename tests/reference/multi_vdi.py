@@ -1,4 +1,4 @@
-"""The exact image of several VDIs together, in float64 (docs/conventions.md, "Several VDIs").
+"""The exact image of several VDIs together, in float64 (docs/dev/conventions.md, "Several VDIs").
 
 Written as the definition reads: a ray is cut at every face of every supersegment that it crosses;
 on each piece the extinctions of what covers it add, and the colour is their mean by extinction.

@@ -1,4 +1,4 @@
-"""What float32 may make of a ray: the oracle's range (docs/conventions.md#borders)."""
+"""What float32 may make of a ray: the oracle's range (docs/dev/conventions.md#borders)."""
 
 import itertools
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""The exact image of any VDI from any view, in float64: the oracle (docs/conventions.md).
+"""The exact image of any VDI from any view, in float64: the oracle (docs/dev/conventions.md).
 
 A VDI's medium is piecewise constant, so nothing is sampled: a ray is cut where it crosses from one
 list to the next, each piece is intersected with every supersegment of its list by a linear scan,
@@ -116,7 +116,7 @@ def inside_planes(ray: Ray, camera: Camera, clipping_planes: ArrayLike | None) -
 
 
 #: Nearest view depth of V_O, in diagonals of the bounds, that a ray is followed to in perspective:
-#: list coordinates are undefined at the eye (docs/conventions.md#lengths).
+#: list coordinates are undefined at the eye (docs/dev/conventions.md#lengths).
 NEAR_LIMIT = 1e-6
 
 
@@ -171,7 +171,7 @@ def centre_ray_scale(vdi: VDI) -> Array:
 
     Returns: float64 (H, W), bottom row first; for the identity as model transform ``sqrt(1 + (u_c
     t_x)^2 + (v_c t_y)^2)``, in parallel projection 1
-    (docs/conventions.md#a-supersegment-is-a-homogeneous-medium).
+    (docs/dev/conventions.md#a-supersegment-is-a-homogeneous-medium).
     """
     width, height = vdi.window_size
     scale = np.empty((height, width))
@@ -401,7 +401,7 @@ def crossings(lists: Lists, line: Line) -> Crossings:
         found.append(t[(t > line.t0) & (t < line.t1)])
     cuts = np.unique(np.concatenate(found))
 
-    # Find each piece's list; a border belongs to the higher index (docs/conventions.md#borders)
+    # Find each piece's list; a border belongs to the higher index (docs/dev/conventions.md#borders)
     t = (cuts[:-1] + cuts[1:]) / 2
     d = at[3] + t * slope[3]
     x = np.floor(((at[0] + t * slope[0]) / d + 1) / 2 * width)

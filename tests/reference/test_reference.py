@@ -1,4 +1,4 @@
-"""The oracle against itself: laws of docs/conventions.md that hold for any medium and any view."""
+"""The oracle against itself: laws of docs/dev/conventions.md, of any medium and any view."""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 from oracle import explain
-from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 
@@ -109,7 +108,7 @@ def check_scene(
     """Hold all images of a scene against float64; return the VDI.
 
     ``worst`` is the fixture that keeps the largest error. ``least_drawn``: pixels that every view
-    must see something in. ``bound``: None for what the samples' roundings add up to.
+    must see something in.
     """
     views = turned(camera, volume) if views is None else views
     scene = (volume, camera, size, function)
@@ -117,8 +116,6 @@ def check_scene(
     direct = raycast_volume(*scene, **options)
     exact = reference.volume_image(*scene, sample_distance, lights)
     assert (exact[..., 3] > 1e-9).sum() >= least_drawn
-    if bound is None:
-        bound = derived_bound(*scene, sample_distance, lights)
     assert_within(worst, "volume", direct, exact, bound)
     vdi = generate_vdi(*scene, max_supersegments=8, **options)
     assert_within(worst, "VDI at V_O", render_vdi(vdi, camera, device=runtime), exact, bound)
@@ -131,12 +128,6 @@ def assert_within(worst, what, image, exact, bound=BOUND):
     off = np.abs(image - exact).max()
     worst(what, off)
     assert off <= bound
-
-
-def derived_bound(volume, camera, size, function, sample_distance, lights):
-    """What the roundings of samples can do to the worst pixel of a VDI at V_O."""
-    rays = list(reference.samples(volume, camera, size, function, sample_distance, lights))
-    return 2 * max(one.color for one in uncertainties(volume, camera, size, function, rays))
 
 
 def check_views(runtime, worst, vdi, views, *, size=WINDOW, least_drawn=3, **ends):

@@ -10,20 +10,6 @@ import sys
 PATIENCE = 600
 
 
-#: What the engine does without.
-EXTRAS = ("cvista", "matplotlib", "pyvista", "vtk", "vtkmodules")
-
-
-def run_bare(arguments: list[str]) -> subprocess.CompletedProcess[str]:
-    """Run the command line where only the engine is installed."""
-    return run_python(
-        "import sys\n"
-        f"sys.modules.update(dict.fromkeys({EXTRAS!r}))\n"
-        "from pyvista_vdi.cli import main\n"
-        f"sys.exit(main({arguments!r}))\n"
-    )
-
-
 def run_python(code: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     env = {**os.environ, **environment}
     if "PYVISTA_VDI_DEVICE" not in environment:

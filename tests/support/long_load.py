@@ -28,7 +28,7 @@ import reference
 import pyvista_vdi as pvdi
 from pyvista_vdi.device import get_runtime
 
-#: Largest error that a channel may have beyond the oracle's range (docs/conventions.md).
+#: Largest error that a channel may have beyond the oracle's range (docs/dev/conventions.md).
 BOUND = 5e-5
 #: Share of the frames that is warm-up: every kernel has been compiled, every buffer was once there.
 WARM_UP = 0.3

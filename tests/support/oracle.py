@@ -1,7 +1,7 @@
 """A device's picture against the float64 oracle's range over the moved ray.
 
 Every channel of every pixel lies within 2e-5 of the range over the ray moved by the roundings of
-list coordinates (docs/conventions.md; the number of roundings is derived in
+list coordinates (docs/dev/conventions.md; the number of roundings is derived in
 ``reference.ranges``). 2e-5 is 336 unit roundoffs of float32: a ray in these tests
 composites up to about 100 supersegments, each with three roundings that reach the image, and the
 raycaster may drop what lies behind a transmittance of 1e-6.

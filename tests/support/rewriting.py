@@ -11,9 +11,6 @@ import numpy as np
 
 from pyvista_vdi.io.vdi_file.layout import INDEX_DTYPE
 
-#: What stands in a description where something else belongs.
-JUNK = (None, -1, True, 2**70, 1e300, "x", [], {}, [1], [[]], {"a": 1})
-
 
 def rewritten(data, edit, arrays=None, **options):
     """Return an archive with members changed; its checksums fit, where arrays have one chunk.

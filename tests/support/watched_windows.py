@@ -21,7 +21,7 @@ from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 #: Odd, so that no smaller image divides it.
 WINDOW = (121, 103)
 #: Seconds after which something that should have happened has not.
-LONG = 20.0
+LONG = 600.0
 MOVING, STILL = 30.0, 0.0001
 
 

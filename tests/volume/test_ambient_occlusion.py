@@ -20,7 +20,6 @@ from pyvista_vdi import (
 )
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.volume import classified_volume as device_volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 
 WINDOW = (7, 6)
@@ -57,25 +56,6 @@ def test_inside_a_homogeneous_medium_it_is_the_transmittance_of_the_radius(runti
     centre = np.array([[16.0, 16, 16]])
     direct = reference.ambient_transmittance(volume, function, centre, radius, 12)
     np.testing.assert_allclose(direct, expected, rtol=1e-6)
-
-
-@pytest.mark.parametrize("points", [25, 97])
-def test_at_the_centre_of_a_ball_it_is_the_transmittance_of_its_radius(runtime, points):
-    """exp(-sigma a) for a ball of radius a inside the radius looked at; cells of 1 and 2 voxels."""
-    x = np.linspace(-1, 1, points)
-    z, y, x = np.meshgrid(x, x, x, indexing="ij")
-    distance = np.sqrt(x**2 + y**2 + z**2)
-    volume = Volume(distance.astype(np.float32), spacing=(2 / (points - 1),) * 3)
-    function = homogeneous(0.6)
-    occlusion = AmbientOcclusion(0.9, directions=64)
-    found = nodes_of(runtime, volume, function, occlusion)
-    middle = tuple(n // 2 for n in found.shape)
-    expected = 0.4**0.5
-    # The ball's face is found to a part of a cell: measured 0.0045 and 0.0001
-    np.testing.assert_allclose(found[middle], expected, atol=0.01)
-    centre = np.full((1, 3), (points - 1) / 2)
-    direct = reference.ambient_transmittance(volume, function, centre, 0.9, 64, step=0.005)
-    np.testing.assert_allclose(direct, expected, atol=0.002)
 
 
 def half_space(depth, sigma, radius):
@@ -166,20 +146,6 @@ def test_with_everything_else_as_well(runtime, more):
     assert (plain - image)[..., :3].max() > 0.005
 
 
-def test_more_directions_come_closer_to_the_mean(runtime):
-    """Against 2048 of them, root mean square: .0040 with 12, .0013 with 32, .00001 with 512."""
-    volume, _, function, _ = case(11)
-    radius = 0.3 * volume.length
-    exact = nodes_of(runtime, volume, function, AmbientOcclusion(radius, directions=2048))
-    error = []
-    for n in (12, 32, 128, 512):
-        found = nodes_of(runtime, volume, function, AmbientOcclusion(radius, 1, n))
-        error.append(np.sqrt(np.mean((found - exact) ** 2)))
-    assert error == sorted(error, reverse=True)
-    assert error[1] < 0.003
-    assert error[3] < error[0] / 50
-
-
 def test_the_grid_is_near_the_definition():
     """Where something is to be seen; smaller cells than the radius's eighth are not needed."""
     rng = np.random.default_rng(3)
@@ -209,32 +175,6 @@ def test_where_all_light_arrives_not_a_bit_changes(runtime):
         assert plain.n_supersegments > 0
         assert occluded.equals(plain)
     assert "ambient_occlusion" not in occluded.metadata
-
-
-def test_it_is_computed_once_for_a_classification(runtime, monkeypatch):
-    volume, camera, function, occlusion = case(2)
-    computed = []
-    compute = device_volume.ambient_transmittances
-
-    def counted(*args, **kwargs):
-        computed.append(1)
-        return compute(*args, **kwargs)
-
-    monkeypatch.setattr(device_volume, "ambient_transmittances", counted)
-
-    def render(function=function, occlusion=occlusion):
-        raycast_volume(
-            volume, camera, WINDOW, function, ambient_occlusion=occlusion, device=runtime
-        )
-        return len(computed)
-
-    assert render() == 1
-    generate_vdi(volume, camera, WINDOW, function, ambient_occlusion=occlusion, device=runtime)
-    assert render(occlusion=AmbientOcclusion(occlusion.radius, 0.9, 20)) == 1
-    assert render(function.replace(colors=1 - function.colors, shading=Shading())) == 1
-    assert render(function.replace(opacities=function.opacities / 2)) == 2
-    assert render() == 3
-    assert render(occlusion=AmbientOcclusion(occlusion.radius / 2, 0.3, 20)) == 4
 
 
 def test_its_memory_is_given_back(runtime):

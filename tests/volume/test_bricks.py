@@ -11,12 +11,11 @@ from drawing import generate_vdi, raycast_volume
 from runtimes import fresh_runtime, let_lack
 
 from pyvista_vdi import Camera, Light, TransferFunction, Volume
-from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.lighting import Shading
-from pyvista_vdi.quality.view_error import ViewErrorEstimator
-from pyvista_vdi.volume.bricks import BrickLayout, DeviceBricks, fitting_layout, in_parts
+from pyvista_vdi.volume.bricks import BrickLayout, DeviceBricks
 
 WINDOW = (20, 13)
 #: Little enough that the volumes below do not fit, enough for the rays of that window.
@@ -154,12 +153,6 @@ def test_gradients_see_beyond_their_brick(same, looks, interpolation):
     assert same(volume, VIEWS["perspective"], function, lights=lights).layout.gradients
 
 
-def test_same_bytes_by_homogeneity(same, scene):
-    volume, _, function = scene
-    options = {"criterion": "homogeneity", "max_supersegments": 4}
-    same(volume, VIEWS["parallel"], function, limit=5 * 2**20, **options)
-
-
 def colours_of_their_own():
     rgba = RNG.integers(0, 256, (*FIELD.shape[:2], 100, 4), dtype=np.uint8)
     rgba[..., 3] = FIELD[..., :100] * 255
@@ -198,14 +191,6 @@ def test_a_file_larger_than_the_bricks(same, scene, tmp_path):
     same(volume, camera, function, unseen=mapped)
 
 
-def test_the_same_in_the_background(runtime, used, scene):
-    whole = make(runtime, *scene)
-    with runtime.background():
-        limited = make(runtime, *scene, memory_limit=LIMIT)
-    assert used
-    assert limited.equals(whole)
-
-
 def test_pictures_with_all_that_ends_a_ray(runtime, used, scene):
     volume, camera, function = scene
     depth = np.full(WINDOW[::-1], np.inf)
@@ -223,17 +208,6 @@ def test_pictures_with_all_that_ends_a_ray(runtime, used, scene):
     limited = raycast_volume(volume, camera, WINDOW, function, memory_limit=LIMIT * 0.8, **options)
     assert used
     assert np.array_equal(limited, image)
-
-
-def test_views_are_judged_within_the_limit(runtime, used, scene):
-    volume, camera, function = scene
-    vdi = make(runtime, *scene)
-    options = {"sample_distance": 1.0, "device": runtime}
-    free = ViewErrorEstimator(volume, function, **options)
-    short = ViewErrorEstimator(volume, function, memory_limit=2.9 * 2**20, **options)
-    judged, limited = (one.estimate(vdi, camera.azimuth(20), (90, 60)) for one in (free, short))
-    assert used
-    assert limited == judged
 
 
 def test_transparent_bricks_stay_where_they_are(runtime, used):
@@ -293,25 +267,6 @@ def test_the_limit_is_kept_and_the_estimate_says_so(runtime, used, limit):
         assert own.allocated == 0
 
 
-def test_a_limit_that_holds_the_volume_changes_nothing(runtime, used, scene):
-    stated = estimate(scene[0], WINDOW, memory_limit="1 GiB")
-    assert stated.volume < 1.1 * scene[0].array.nbytes + 2**20
-    vdi = make(runtime, *scene, memory_limit="1 GiB")
-    assert not used
-    assert vdi.equals(make(runtime, *scene))
-
-
-def test_progress_can_end_it_and_nothing_stays(runtime, used, scene):
-    gc.collect()
-    before = runtime.allocated
-    with pytest.raises(Cancelled):
-        make(runtime, *scene, memory_limit=LIMIT, progress=lambda done: done < 0.5)
-    assert used
-    used.clear()
-    gc.collect()
-    assert runtime.allocated == before
-
-
 @pytest.mark.parametrize("buffer", ["samples of steps", "recorded runs", "wanted bricks"])
 def test_an_error_that_is_kept_keeps_no_bricks(runtime, used, scene, monkeypatch, buffer):
     gc.collect()
@@ -364,55 +319,3 @@ def test_sizes(text, nbytes):
 def test_no_sizes(wrong):
     with pytest.raises(InvalidArgumentError, match="memory_limit must be a number of bytes"):
         memory_limit_bytes(wrong)
-
-
-@pytest.mark.parametrize("dimensions", [(2, 2, 2), (65, 64, 66), (130, 17, 33), (300, 200, 100)])
-@pytest.mark.parametrize("gradients", [False, True])
-@pytest.mark.parametrize("shift", [4, 5, 6])
-def test_bricks_cover_every_cell_and_what_its_samples_read(dimensions, gradients, shift):
-    layout = BrickLayout.of(dimensions, shift, gradients, 1)
-    array = np.zeros(dimensions[::-1], np.uint8)
-    edge = 2**shift
-    covered = np.zeros(array.shape, bool)
-    for brick in range(layout.n_bricks):
-        grid, own = layout.region(brick)
-        part = array[grid]
-        assert min(part.shape) > 0
-        assert max(part.shape) <= layout.points
-        covered[grid] = True
-        x, y, _ = layout.counts
-        numbers = (brick // (x * y), brick // x % y, brick % x)
-        for n, points, place, inside in zip(numbers, array.shape, grid, own, strict=True):
-            first, last = n * edge, min((n + 1) * edge, points - 1)  # points of its cells
-            reads = (first - gradients, last + 2 * gradients)
-            assert place.start <= max(reads[0], 0)
-            assert place.stop > min(reads[1], points - 1)
-            # Address of a point: its index less that of the brick's first
-            assert place.start - inside.start == first - layout.before
-    assert covered.all()
-
-
-def test_few_bytes_make_small_bricks():
-    found = [fitting_layout((1025,) * 3, 1, False, n * 2**20, 2**40) for n in (1, 4, 100, 20000)]
-    shifts, slots = zip(*((layout.shift, n) for layout, n in found), strict=True)
-    assert shifts == (5, 5, 6, 6)
-    assert slots[-1] == 16**3  # all of them
-    assert slots[-2] == (100 * 2**20 - 8 * 16**3) // 65**3
-    assert fitting_layout((1025,) * 3, 1, False, 2**15, 2**40) is None
-    # And no more than one buffer may hold
-    layout, few = fitting_layout((1025,) * 3, 4, True, 2**34, 2**27)
-    assert few * layout.brick_bytes <= 2**27
-
-
-@pytest.mark.parametrize("nbytes", [1, 3000, 50000, 10**6])
-@pytest.mark.parametrize("blocks", [(1, 1, 1), (5, 4, 3), (40, 1, 7)])
-def test_parts_have_whole_blocks_and_leave_out_none(blocks, nbytes):
-    x, y, z = blocks
-    seen = np.zeros((z, y, x), int)
-    for place, points in in_parts(blocks, 8, 2, nbytes):
-        seen[place] += 1
-        lengths = [p.stop - p.start for p in points]
-        assert all(p.start == 8 * b.start for p, b in zip(points, place, strict=True))
-        assert all(p.stop == 8 * b.stop + 1 for p, b in zip(points, place, strict=True))
-        assert math.prod(lengths) <= max(nbytes / 2, 9**3)
-    assert (seen == 1).all()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import march_ways
 import numpy as np
 import pytest
@@ -20,8 +18,6 @@ from pyvista_vdi import (
     Volume,
 )
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.rays import Variant
 
 WINDOW = (7, 6)
 
@@ -200,32 +196,6 @@ def test_gradient_opacity_multiplies_the_step_s_opacity():
     np.testing.assert_allclose(tau, -np.log(1 - magnitude / 20 * alpha), rtol=1e-6)
 
 
-def compiled(runtime, lights=None, **options):
-    """What kernels are compiled for with these looks."""
-    volume = smooth_volume(np.random.default_rng(1))
-    return DeviceVolume(runtime, volume, looks(volume, **options), lights=lights).variant
-
-
-def test_kernels_compile_only_what_is_used(default_runtime):
-    plain = compiled(default_runtime, shaded=False)
-    assert (plain.shaded, plain.gradient_opacity) == (0, False)
-    for more, options in (
-        ({"shaded": 2}, {}),
-        ({"shaded": 1}, {"lights": LIGHTS["directional"]}),
-        ({"shaded": 1}, {"lights": LIGHTS["positional"]}),
-        ({"gradient_opacity": True}, {"shaded": False, "gradient": True}),
-    ):
-        assert compiled(default_runtime, **options) == replace(plain, **more)
-
-
-def test_programs_have_twelve_switches_at_most():
-    """What kernels add themselves: BLEND_MODE, and VECTOR_FUNCTIONS, which goes with one ray's."""
-    assert len(Variant().defines) + 1 <= 12
-    assert Variant().one_by_one is False
-    for alone in ({"double_float": True}, {"sharp": True}, {"compensated": 2}, {"index": "ulong"}):
-        assert Variant(**alone).one_by_one
-
-
 def test_lights_change_nothing_without_shading(runtime):
     volume, camera, function = case(2, shaded=False)
     dark, lit = (
@@ -235,4 +205,3 @@ def test_lights_change_nothing_without_shading(runtime):
     assert lit.equals(dark)
     assert "lights" not in dark.metadata
     assert "shading" not in dark.metadata["transfer_function"]
-    assert compiled(runtime, LIGHTS["positional"], shaded=False) == compiled(runtime, shaded=False)

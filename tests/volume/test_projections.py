@@ -7,7 +7,7 @@ import pytest
 from settings import with_settings
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import Camera, TransferFunction, UnsupportedError, Volume
+from pyvista_vdi import Camera, TransferFunction, Volume
 
 BLENDINGS = ("maximum", "minimum", "average", "additive")
 
@@ -152,19 +152,3 @@ def test_pictures_are_add_volume_s(default_runtime, blending):
     pictures = [np.concatenate([p[..., :3], opaque], axis=-1) for p in (image, theirs)]
     assert pvdi.compare_images(*pictures).ssim >= 0.98
     assert np.ptp(theirs) > 0.2
-
-
-def test_what_does_not_go_with_them_is_refused(default_runtime):
-    volume = random_volume(4)
-    for options, name in (
-        ({"ambient_occlusion": True}, "ambient_occlusion"),
-        ({"opacity_multiplier": 0.5}, "opacity_multiplier"),
-        ({"memory_limit": "1 GB"}, "memory_limit"),
-    ):
-        with pytest.raises(UnsupportedError, match=f"'maximum' does not go with {name}"):
-            shown(volume, "maximum", default_runtime, **options)
-    rgba = Volume(np.zeros((4, 4, 4, 4), np.uint8))
-    with pytest.raises(UnsupportedError, match="RGBA"):
-        shown(rgba, "average", default_runtime)
-    with pytest.raises(pvdi.InvalidArgumentError, match="blending must be one of .*'mip'"):
-        shown(volume, "mip", default_runtime)

@@ -7,11 +7,11 @@ import pytest
 import reference
 import strategies
 from drawing import raycast_volume
-from reference.generate import classify, medium_at
+from reference.generate import classify
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.compositing import composite
-from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
 SHAPE = (5, 6, 7)  # z, y, x
@@ -103,26 +103,6 @@ def test_classification_is_linear_between_nodes_and_constant_beyond():
     np.testing.assert_array_equal(classify(table, np.array([-1.0, 0, 7]))[1], [0.5] * 3)
 
 
-def test_nearest_takes_the_point_whose_voxel_holds_the_position():
-    volume = Volume(np.arange(8.0).reshape(2, 2, 2))
-    table = TransferFunction([[0, 0, 0], [1, 1, 1]], [0, 0.7], (0, 7), unit_distance=1)
-    position = np.array([[0.49, 0, 0], [0.5, 0, 0], [0, 0.5, 0.5], [1, 1, 1], [1.1, 0, 0]])
-    _, tau = medium_at(volume, table, position, np.ones(5))
-    expected = -np.log1p(-np.array([0, 1, 6, 7]) / 7 * float(np.float32(0.7)))
-    np.testing.assert_allclose(tau, [*expected, 0], atol=1e-15)
-
-
-def test_nan_is_transparent_and_opaque_is_opaque():
-    volume = Volume(np.array([[[np.nan, 1.0]] * 2] * 2))
-    table = TransferFunction([[1, 1, 1]] * 2, [1, 1], (0, 1), unit_distance=1e6)
-    position = np.array([[0.0, 0, 0], [1, 0, 0]])
-    _, tau = medium_at(volume, table, position, np.ones(2))
-    np.testing.assert_array_equal(tau, [0, OPAQUE_OPTICAL_DEPTH])
-    linear = table.replace(interpolation="linear")
-    _, tau = medium_at(volume, linear, np.array([[0.999, 0, 0]]), np.ones(1))
-    np.testing.assert_array_equal(tau, [0])  # one corner of the cell is NaN
-
-
 @pytest.mark.parametrize(
     ("budget", "weighting"),
     [(1, "transmittance"), (3, "optical_depth"), (3, "transmittance"), (20, "transmittance")],
@@ -143,15 +123,3 @@ def test_a_plain_vdi_keeps_its_budget_and_all_optical_depth(budget, weighting):
         exact = reference.volume_image(*scene, table)
         # Colours and optical depths are stored in float32; the near limit takes 1e-6 of a diagonal
         np.testing.assert_allclose(reference.render(vdi, scene[1]), exact, atol=3e-5)
-
-
-def test_merging_sees_opacity_of_black_material():
-    """Three black layers of different density in two supersegments: the denser stays alone."""
-    values = np.array([1, 1, 2, 2, 9, 9], dtype=np.uint8)[::-1, None, None]
-    volume = Volume(np.broadcast_to(values, (6, 2, 2)).copy())
-    table = TransferFunction([[0, 0, 0]] * 2, [0, 0.9], (0, 9), unit_distance=1)
-    camera = Camera(
-        (0.5, 0.5, -5), (0.5, 0.5, 0), (0, 1, 0), parallel_projection=True, parallel_scale=0.1
-    )
-    vdi = reference.build_vdi(volume, camera, (1, 1), table, max_supersegments=2)
-    np.testing.assert_allclose(vdi.back[0], 1.5, atol=1e-6)

@@ -59,14 +59,6 @@ def test_clipping_planes_keep_the_side_their_normal_points_to(opacity, planes, e
     np.testing.assert_allclose(image, opacity_over(length), rtol=RTOL)
 
 
-def test_opaque_geometry_ends_only_its_own_rays_top_row_first(opacity):
-    depth = np.full((5, 6), np.inf)
-    depth[0, 2] = 21.0
-    expected = np.full((5, 6), opacity_over(SIZE))
-    expected[0, 2] = opacity_over(1.0)
-    np.testing.assert_allclose(opacity(opaque_depth=depth)[..., 3], expected, rtol=RTOL)
-
-
 @pytest.mark.parametrize(
     ("dtype", "interpolation"),
     [

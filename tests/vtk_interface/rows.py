@@ -117,7 +117,7 @@ MAPPER = (
     Row("FinalColorWindow FinalColorLevel", SAME, "", lambda s: (
         s.mapper.SetFinalColorWindow(0.6), s.mapper.SetFinalColorLevel(0.3))[:0]),
     Row("ScalarMode ScalarModeToUsePointFieldData ArrayName ArrayAccessMode", SAME,
-        "arrays of points and cells alike; the VDI is made anew", chosen),
+        "arrays of points and cells alike; the VDI is regenerated", chosen),
     Row("ArrayId", SAME, "", lambda s: chosen(s, 1)),
     Row("SelectScalarArray", SAME, "", lambda s: (
         s.mapper.SelectScalarArray("w"), s.mapper.SetScalarModeToUsePointFieldData())[:0]),
@@ -127,7 +127,7 @@ MAPPER = (
     Row("BlendModeToComposite", SAME, "", lambda s: s.mapper.SetBlendModeToComposite()),
     Row("BlendMode", REFUSED, "others than composite: `render_volume(blending=)` has some",
         lambda s: s.mapper.SetBlendModeToAdditive()),
-    Row("SampleDistance", SAME, "the VDI is made anew", lambda s: s.mapper.SetSampleDistance(2.0)),
+    Row("SampleDistance", SAME, "the VDI is regenerated", lambda s: s.mapper.SetSampleDistance(2.0)),
     Row("ImageSampleDistance", SAME, "", lambda s: s.mapper.SetImageSampleDistance(2.0)),
     Row("AutoAdjustSampleDistances MaximumImageSampleDistance", SAME,
         "previews in windows, while a hand moves", lambda s: s.mapper.AutoAdjustSampleDistancesOn()),

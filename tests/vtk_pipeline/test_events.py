@@ -1,4 +1,4 @@
-"""Each row of docs/pipeline_events.md, against VTK's GPU mapper: pictures and bounds after it."""
+"""Each row of docs/dev/pipeline_events.md, against VTK's GPU mapper: pictures and bounds."""
 
 from __future__ import annotations
 
@@ -420,6 +420,6 @@ def test_it_is_as_with_vtks_mapper(name, way, expected_messages, recwarn):
 
 
 def test_the_page_has_these_events():
-    page = (CHECKOUT / "docs" / "pipeline_events.md").read_text(encoding="utf-8")
+    page = (CHECKOUT / "docs" / "dev" / "pipeline_events.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (.+?) \|", page, re.MULTILINE)
     assert [row for row in rows if row not in ("event", "---")] == list(EVENTS)

@@ -251,6 +251,8 @@ def _meshes(actor: Any, missing: list[str]) -> Iterator[dict[str, Any]]:
             continue
         shown = "points" if look.GetRepresentation() == 0 else kind
         lit = shown == "triangles" and bool(look.GetLighting())
+        if shown == "lines" and look.GetLineWidth() > 1:
+            missing.append("the width of lines")
         yield {
             "kind": shown,
             "half": ((high - low) / 2).tolist(),

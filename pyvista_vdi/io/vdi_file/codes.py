@@ -86,18 +86,3 @@ def packed_of_stored(
         strides.astype(np.uint16),
         Codes(*(code.astype(np.uint32, copy=False) for code in codes)).words(),
     )
-
-
-def channel_differences(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return (blue, green - blue, red - blue) of (red, green, blue), uint8 (n, 3), modulo 256.
-
-    Most colour maps' channels rise and fall together: the differences are small or repeat.
-    """
-    red, green, blue = colors.T
-    return np.stack([blue, green - blue, red - blue], axis=1)
-
-
-def colors_of_differences(differences: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return what :func:`channel_differences` was given."""
-    blue, green, red = differences.T
-    return np.stack([red + blue, green + blue, blue], axis=1)

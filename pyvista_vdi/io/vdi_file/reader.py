@@ -19,7 +19,7 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError, PackedArray, workers
-from pyvista_vdi.io.vdi_file.codes import colors_of_differences, packed_of_stored
+from pyvista_vdi.io.vdi_file.codes import packed_of_stored
 from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -337,7 +337,8 @@ class _OpenFile:
                 rows = stored[name][first:last]
                 packed[name].read(first, rows)
                 if packed[name].layout.filter == "channel-difference":
-                    rows[:] = colors_of_differences(rows)
+                    blue, green, red = rows.T
+                    rows[:] = np.stack([red + blue, green + blue, blue], axis=1)
             if names == faces and packed["back"].layout.filter == "difference":
                 # Fronts less the back before them, and backs less their own fronts
                 gap, back = (stored[name][first:last] for name in names)

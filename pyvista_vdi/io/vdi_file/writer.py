@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
 from pyvista_vdi.io.vdi_file.coarse import coarser
-from pyvista_vdi.io.vdi_file.codes import channel_differences, stored_rows
+from pyvista_vdi.io.vdi_file.codes import stored_rows
 from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
@@ -141,7 +141,9 @@ def _encoder(
         elif packing is not None:
             rows = stored_rows(packing, name, first, last)
             if layout.filter == "channel-difference":
-                rows = channel_differences(rows)
+                # Most colour maps' channels rise and fall together: small numbers, or the same
+                red, green, blue = rows.T
+                rows = np.stack([blue, green - blue, red - blue], axis=1)
         elif layout.filter == "difference":
             # Bit patterns modulo 2**32, exact: of fronts less those of the backs before (the first
             # as it stands, 0 where supersegments touch), and of backs less those of their fronts

@@ -98,7 +98,9 @@ class Driver:
         self._astray = False  # whether something else than the actor draws
         # What the last frame showed, and by what
         self._images, self._last = Images(), NOTHING
+        self._stand_in = False  # whether that was a volume whose VDI is to come
         self._texture, self._no_depth, self._scissor = ImageTexture(), NoDepth(), Scissor()
+        self._style: tuple[bool, bool] | None = None  # how the shader shows it, in no selection
         self._selection, self._scene_at_hand = Selection(), SceneAtHand(self._say_not_exported)
         self._view: View | None = None
         self._counted = self._generation = 0  # the VDI that was shown last, and how many were
@@ -141,7 +143,7 @@ class Driver:
                 "this VDIMapper is already behind another VDIActor: give each actor its own "
                 "(the VDI itself can be shared)"
             )
-        self._actor = weakly(actor)
+        self._actor, self._style = weakly(actor), None
 
     def leave_actor(self, actor: Any) -> None:
         """Forget that actor, if it is this one."""
@@ -246,8 +248,10 @@ class Driver:
         effects = effects_without(renderer)
         for text in effects.values():
             self._warnings.warn(text)
-        peeled = "vtkDualDepthPeelingPass" in effects
-        self._selection.leave(actor, occluded="vtkSSAOPass" in effects, peeled=peeled)
+        style = ("vtkSSAOPass" in effects, "vtkDualDepthPeelingPass" in effects)
+        if style != self._style:
+            self._selection.leave(actor, occluded=style[0], peeled=style[1])
+            self._style = style
         with suppress(VDIError):  # which what is drawn says
             self.box.Update()
         drawn = self._last = self._guarded(self._paint, mapper, renderer) or self._last
@@ -276,6 +280,7 @@ class Driver:
     def _paint(self, mapper: Any, renderer: Any) -> Drawn:
         """Return the frame's image: one that is kept, or a new one."""
         frame = self._showing(Frame.current(renderer, self._actor(), mapper))
+        self._stand_in = frame is not None and frame.stand_in
         if frame is None:
             return self._last
         window, settings = self.window, self.settings
@@ -378,15 +383,15 @@ class Driver:
         vdi = source.last()
         if vdi is None:
             return None
+        shown = frame.showing(vdi, number_of(vdi))
         if self.settings.regenerate == "auto":
-            seen = self._as_made(vdi, frame.showing(vdi, number_of(vdi)))
+            seen = self._as_made(vdi, shown)
             cone = vdi.metadata.get("view_cone")
             cone = cone if isinstance(cone, int | float) else _VIEW_CONE
             for cause, message in lacking(seen, cone, source.remedy):
                 # Once for all VDIs of one view, such as the steps of a series
                 self._warnings.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
-        full = not self.window.previews(self.settings)
-        return replace(frame.showing(vdi, number_of(vdi)), full=full)
+        return replace(shown, full=not self.window.previews(self.settings))
 
     def _planned(
         self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool
@@ -824,7 +829,7 @@ class Driver:
             progress=self._background.progress,
             generation=self._generation,
             vdi=vdi,
-            stand_in=last.stand_in,
+            stand_in=self._stand_in,
             drawn=last.way,
             time=None if player is None else player.time,
             level=self.level,
@@ -916,7 +921,7 @@ class Driver:
 
     def _select(self, mapper: Any, renderer: Any) -> None:
         """Draw what can be picked of what the last frame showed, or the first would show."""
-        actor, selection = self._actor(), self._selection
+        actor, selection, self._style = self._actor(), self._selection, None
         selection.enter(actor, renderer.GetSelector())
         seen = None
         try:

@@ -105,7 +105,6 @@ class Drawn:
     depth: Image | None = None  # where its rays ended
     number: int | None = None  # by which an upload is known
     joint: bool = False  # a part of a picture that other actors show the rest of
-    stand_in: bool = False  # of the volume, until there is a VDI
     way: RenderMode = "vdi"  # what was raycast
     pixels: Image | None = None
 
@@ -158,8 +157,8 @@ class Images:
             assert frame.vdi is not None
             image = render_vdi(frame.vdi, request)
         self._raycasts += 1
-        known: dict[str, Any] = {"stand_in": frame.stand_in, "way": frame.way, "pixels": pixels}
-        drawn = Drawn(image, frame.full_size, frame.depth, self._raycasts, **known)
+        of = (frame.full_size, frame.depth, self._raycasts)
+        drawn = Drawn(image, *of, way=frame.way, pixels=pixels)
         gone = self._kept.keep(frame.key, drawn)
         if gone is not None:
             self._free = gone.pixels

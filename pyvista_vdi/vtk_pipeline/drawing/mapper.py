@@ -55,7 +55,7 @@ def _to_mode(mode: int) -> Callable[[Any], None]:
 
 
 class ArrayChoiceMethods:
-    """VTK's methods that choose an array; the VDI is made anew of it.
+    """VTK's methods that choose an array; the VDI is regenerated.
 
     What they say is kept from the proxy, which has no such array, and told to the source.
     """
@@ -174,7 +174,7 @@ class ArrayChoiceMethods:
             source.SetScalars(name)
 
     def SetSampleDistance(self, distance: float) -> None:
-        """Set the length of a step, model units, of which the VDI is made anew.
+        """Set the length of a step, model units, from which the VDI is regenerated.
 
         Raises
         ------
@@ -261,45 +261,37 @@ class VDIMapperMethods(ArrayChoiceMethods):
     def SetSeries(self, series: VDICollection) -> None:
         """Draw a step of this series, the first one at first: see :attr:`VDIActor.time`.
 
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none.
+        InvalidArgumentError is raised if it is none.
         """
-        if not isinstance(series, VDICollection) or series.times is None:
-            raise InvalidArgumentError(
-                f"SetSeries takes a VDISeries; got {type(series).__name__}: VDISeries(vdis) "
-                "makes one of several VDIs"
-            )
-        self._set_input(input_of(series))
+        self._set_collection(series, "Series", times=True)
 
     def GetSeries(self) -> VDICollection | None:
         """Return the series of which a step is drawn; ``None`` where there is none."""
-        shown = self._collection()
-        return None if shown is None or shown.times is None else shown
+        return self._collection(times=True)
 
     def SetVDISet(self, vdi_set: VDICollection) -> None:
         """Draw a set: of each frame's view the VDI that is nearest, or a blend of several.
 
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none.
+        InvalidArgumentError is raised if it is none.
         """
-        if not isinstance(vdi_set, VDICollection) or vdi_set.times is not None:
-            raise InvalidArgumentError(
-                f"SetVDISet takes a VDISet; got {type(vdi_set).__name__}: VDISet(vdis) makes "
-                "one of several VDIs"
-            )
-        self._set_input(input_of(vdi_set))
+        self._set_collection(vdi_set, "Set", times=False)
 
     def GetVDISet(self) -> VDICollection | None:
         """Return the set that is drawn; ``None`` where there is none."""
-        shown = self._collection()
-        return None if shown is None or shown.times is not None else shown
+        return self._collection(times=False)
 
-    def _collection(self) -> VDICollection | None:
-        return None if self.driver.input is None else self.driver.input.collection
+    def _set_collection(self, given: VDICollection, kind: str, *, times: bool) -> None:
+        if not isinstance(given, VDICollection) or (given.times is not None) != times:
+            method, name = f"Set{'' if times else 'VDI'}{kind}", f"VDI{kind}"
+            raise InvalidArgumentError(
+                f"{method} takes a {name}; got {type(given).__name__}: {name}(vdis) makes one of "
+                "several VDIs"
+            )
+        self._set_input(input_of(given))
+
+    def _collection(self, *, times: bool) -> VDICollection | None:
+        shown = None if self.driver.input is None else self.driver.input.collection
+        return shown if shown is not None and (shown.times is not None) == times else None
 
     def GetVDI(self) -> VDI | None:
         """Return the VDI that was drawn last, or would be drawn; ``None`` before the first."""

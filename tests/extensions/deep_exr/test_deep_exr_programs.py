@@ -15,9 +15,7 @@ OpenEXR = pytest.importorskip("OpenEXR")
 from deep_programs import COMMANDS, RECORDED, SIZE, VIEW, make, pair  # noqa: E402
 
 import pyvista_vdi as pvdi  # noqa: E402
-from pyvista_vdi import examples  # noqa: E402
 from pyvista_vdi.errors import VDIFileError, VDIWarning  # noqa: E402
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera  # noqa: E402
 
 A, B = pair()
 
@@ -128,20 +126,3 @@ def test_openexrs_own_checks_accept_our_files(tmp_path):
         check.restype = ctypes.c_bool  # true where something is wrong
         for core in (False, True):
             assert not check(str(path).encode(), False, False, core)
-
-
-def test_oiiotool_flattens_to_the_picture_from_the_generating_view(tmp_path, default_runtime):
-    """Within 2/255 of ``render`` at V_O."""
-    program = shutil.which("oiiotool") or pytest.skip("oiiotool is not installed")
-    pytest.importorskip("pyvista")  # colour maps by name
-    volume, size = examples.load_data("brain", as_volume=True), (160, 90)
-    view = filling_camera(volume.bounds, size)
-    for name, looks in TRANSFER_FUNCTIONS.items():
-        vdi = pvdi.generate(volume, view, size, **looks)
-        deep, flat = vdi.save(tmp_path / "deep.exr"), tmp_path / "flat.exr"
-        command = [program, str(deep), "--flatten", "--ch", "R,G,B,A", "-d", "float", "-o"]
-        subprocess.run([*command, str(flat)], check=True, capture_output=True)
-        pixels = OpenEXR.File(str(flat)).channels()["RGBA"].pixels
-        picture = pvdi.render(vdi, view)
-        assert picture.max() > 0.3, name  # something is there
-        assert np.abs(pixels - picture).max() <= 2 / 255, name

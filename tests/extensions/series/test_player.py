@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import VDIFileError
 from pyvista_vdi.extensions.series.shown import SeriesInput
 
 #: Seconds after which something that should have happened has not.
@@ -110,25 +110,6 @@ def test_a_step_is_shown_by_its_index_or_by_its_time(player, steps):
     assert not player.playing
 
 
-@pytest.mark.parametrize("step", [N, -N - 1, 1.5, "first", None])
-def test_steps_that_there_are_not(player, step):
-    with pytest.raises(InvalidArgumentError, match=f"from 0 to {N - 1}"):
-        player.step = step
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        *(({"rate": rate}, "rate") for rate in (0, -1, float("nan"), float("inf"), "fast", True)),
-        ({"memory_limit": "much"}, "memory_limit"),
-    ],
-)
-def test_rates_and_limits_that_are_none(player, arguments, named):
-    with pytest.raises(InvalidArgumentError, match=named):
-        player.play(**arguments)
-    assert not player.playing
-
-
 def test_every_step_is_shown_when_it_is_due(player, steps, clock):
     player.play(rate=10)
     player.advance()
@@ -181,31 +162,6 @@ def test_without_a_loop_the_last_step_is_the_end(player, clock):
     assert (player.step, player.playing) == (0, True)
 
 
-def test_the_end_comes_although_the_last_step_is_damaged(player, steps, clock):
-    steps.damaged = (N - 1,)
-    player.step = N - 3
-    player.play(rate=10, loop=False)
-    player.advance()
-    told = 0
-    for _ in range(10):
-        try:
-            look(player, clock, 0.1)
-        except VDIFileError:
-            told += 1
-    assert (player.step, player.playing, told) == (N - 2, False, 1)
-
-
-def test_a_seek_goes_on_playing_from_there(player, clock):
-    player.play(rate=10)
-    player.advance()
-    clock.now += 0.1
-    player.step = 5
-    assert player.playing
-    player.advance()
-    assert look(player, clock)
-    assert player.step == 6
-
-
 def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
     steps.damaged = (2,)
     player.play(rate=10)
@@ -224,16 +180,6 @@ def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
     player.step = 2
     with pytest.raises(VDIFileError, match="step 2"):
         _ = player.current
-
-
-def test_few_steps_are_held_where_memory_is_short(player, steps, clock):
-    steps.copies = True
-    player.play(rate=10, memory_limit=1)
-    player.advance()
-    for _ in range(N - 1):
-        look(player, clock)
-        assert steps.living() <= 4
-    assert steps.asked[: N - 1] == list(range(1, N))
 
 
 @pytest.mark.parametrize("kept", [N, 6])

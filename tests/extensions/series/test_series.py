@@ -224,13 +224,6 @@ def test_what_cannot_be_a_series_is_refused(change, what, volumes, camera):
         pvdi.generate_series(**arguments, transfer_function=_table())
 
 
-def test_refusals_name_the_function_and_the_remedy(volumes, camera):
-    with pytest.raises(InvalidArgumentError, match="call generate"):
-        pvdi.generate_series(volumes[0], camera, SIZE)
-    with pytest.raises(TypeError, match="generate_series.*'cmap'"):
-        pvdi.generate_series(volumes, camera, SIZE, colormap="bone")
-
-
 def test_series_of_vdis_at_hand(series):
     again = pvdi.VDISeries(list(series))
     assert again.times == (0.0, 1.0, 2.0, 3.0)

@@ -20,7 +20,6 @@ from stepped_vdis import SIZE, packed_steps, same, stepped_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.model.standard_cases import filling_camera
 
 #: What a file of the format before this one begins with.
 EARLIER = b"\x89VDIS\r\n\x1a" + bytes(40)
@@ -73,20 +72,6 @@ def test_a_step_is_a_vdi_file_and_a_file_is_the_folder_zipped(steps, saved, tmp_
     assert json.loads((saved / "series.json").read_text())["times"] == [0.0, 0.5, 1.0, 1.5, 2.0]
     assert same(pvdi.read(saved / "000003.vdi"), steps[3])
     assert all_same(pvdi.read(saved), steps)
-
-
-@pytest.mark.every(4)
-@pytest.mark.parametrize("compression", ["zstd", "lz4", "deflate", "none"])
-@pytest.mark.parametrize("precision", ["8-byte", "exact"])
-def test_precisions_and_compressions(precision, compression, tmp_path):
-    steps = [stepped_vdi(step=k) for k in range(2)]
-    options = {"precision": precision, "compression": compression}
-    read = pvdi.read(pvdi.VDISeries(steps).save(tmp_path / "a.vdis", **options))
-    with pvdi.SeriesWriter(tmp_path / "b.vdis", **options) as out:
-        for step in steps:
-            out.append(step)
-    for series in (read, pvdi.read(tmp_path / "b.vdis")):
-        assert all_same(series, [vdi.with_precision(precision) for vdi in steps])
 
 
 def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
@@ -230,15 +215,6 @@ def test_a_file_that_is_cut_off_or_changed_is_noticed(tmp_path):
         assert right >= len(steps) - 1
 
 
-def test_a_file_that_is_compressed_once_more_is_refused(steps, tmp_path):
-    saved = pvdi.VDISeries(steps[:1]).save(tmp_path / "a.vdis")
-    with zipfile.ZipFile(saved) as one, zipfile.ZipFile(tmp_path / "b.vdis", "w", 8) as other:
-        for name in one.namelist():
-            other.writestr(name, one.read(name))
-    with pytest.raises(VDIFileError, match="zip -0"):
-        pvdi.read(tmp_path / "b.vdis")
-
-
 def test_a_step_that_does_not_fit_is_not_counted(steps, tmp_path):
     resource = pytest.importorskip("resource")
     path = tmp_path / "a.vdis"
@@ -255,38 +231,6 @@ def test_a_step_that_does_not_fit_is_not_counted(steps, tmp_path):
         assert content_of(path) == before
         out.append(steps[2])
     assert all_same(pvdi.read(path), [steps[0], steps[2]])
-
-
-def test_a_writer_takes_volumes(tmp_path, default_runtime):
-    z, y, x = np.mgrid[:9, :8, :7]
-    volumes = [pvdi.Volume((x * y + z + k).astype(np.float32)) for k in range(3)]
-    camera = filling_camera(volumes[0].bounds, SIZE)
-    shades = np.linspace(0, 1, 16)
-    table = pvdi.TransferFunction(np.stack([shades] * 3, axis=1), shades * 0.7, (0.0, 60.0))
-    path = tmp_path / "a.vdis"
-    with pvdi.SeriesWriter(path, camera, SIZE, transfer_function=table) as out:
-        for volume in volumes:
-            out.append(volume)
-    made = pvdi.generate_series(volumes, camera, SIZE, transfer_function=table)
-    assert all_same(pvdi.read(path), made)
-
-
-@pytest.mark.parametrize(
-    ("options", "what"),
-    [
-        ({"compression": "rar"}, "compression"),
-        ({"level": 10}, "level"),
-        ({"precision": "half"}, "precision"),
-        ({"name": "a.vdi"}, r"\.vdis"),
-    ],
-)
-def test_options_and_names_that_there_are_not(options, what, steps, tmp_path):
-    path = tmp_path / options.get("name", "a.vdis")
-    options = {key: value for key, value in options.items() if key != "name"}
-    for save in (pvdi.VDISeries(steps[:1]).save, pvdi.SeriesWriter):
-        with pytest.raises((InvalidArgumentError, VDIFileError), match=what):
-            save(path, **options)
-    assert not list(tmp_path.iterdir())
 
 
 _WRITES = """

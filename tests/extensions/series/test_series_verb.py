@@ -134,13 +134,10 @@ def _arrays(folder):
 
 
 KINDS = {
-    "a store without names": (_store, [0, 1, 2]),
     "a store of named axes": (lambda folder: _store(folder, list("tzyx")), [0, 1, 2]),
     "OME-Zarr that says times": (lambda folder: _store(folder, scale=0.25), [1, 1.25, 1.5]),
     "numbers in names": (_arrays, [0, 1, 2]),
-    "numbers, no times": (_images, [0, 1, 2]),
     "numbers and times": (lambda folder: _images(folder, TIMES), TIMES),
-    "times that fall": (lambda folder: _images(folder, TIMES[::-1]), [0, 1, 2]),
     "times of some": (lambda folder: _images(folder, (0.5, None, 1.0)), [0, 1, 2]),
     "a collection": (_pvd, TIMES),
     "a series in JSON": (_json, TIMES),
@@ -179,35 +176,11 @@ def test_what_is_done_with_names_and_times_is_said(capsys, tmp_path, monkeypatch
     assert colors[1] == min(colors)
 
 
-def test_one_time_step_of_a_store(capsys, tmp_path):
-    _store(tmp_path)
-    target = tmp_path / "run.vdis"
-    run(capsys, "series", tmp_path / "t.zarr", "--time-index", "1", "-o", target, *LOOK)
-    (step,) = pvdi.read(target)
-    assert 255 * step.color.mean() == pytest.approx(VALUES[1], abs=2)
-
-
-def test_a_step_without_a_value_is_named(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for k in (0, 1, 2):
-        np.save(f"s_{k}.npy", np.full((5, 5, 5), np.nan if k == 1 else k + 1, np.float32))
-    error = run(capsys, "series", "s_0.npy", "s_1.npy", "s_2.npy", "-o", "s.vdis", *LOOK, status=1)
-    for part in ("s_1.npy", "step 1", "NaN", "leave"):
-        assert part in error
-
-
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
         ("a.pvd", "<VTKFile><Collection/></VTKFile>", "lists no files"),
-        ("a.pvd", "{", "no list of time steps"),
-        (
-            "a.pvd",
-            '<V><DataSet file="b.vti"/><DataSet file="c.vti"/></V>',
-            "2 files for the time 0",
-        ),
         ("a.pvd", '<V><DataSet timestep="now" file="b.vti"/></V>', "no files with times"),
-        ("a.pvd", '<V><DataSet file="b.vti"/></V>', "b.vti"),
         ("a.vti.series", '{"files": [{"name": "b.vti"}]}', "no list of time steps"),
         ("absent.pvd", None, "cannot be read"),
     ],
@@ -219,21 +192,6 @@ def test_lists_that_are_none_are_refused_by_name(name, text, said, capsys, tmp_p
     error = run(capsys, "series", tmp_path / name, "-o", tmp_path / "a.vdis", status=1)
     assert said in error
     assert str(tmp_path) in error
-
-
-def test_a_verb_of_one_volume_says_what_to_do_with_several(capsys, tmp_path):
-    _pvd(tmp_path)
-    error = run(capsys, "generate", tmp_path / "run.pvd", "-o", tmp_path / "a.vdi", *LOOK, status=1)
-    assert "lists time steps" in error
-    assert "pyvista-vdi series" in error
-
-
-def test_info(series, capsys):
-    out = run(capsys, "info", series)
-    assert "3, times 0 to 2" in out
-    assert "24 x 16" in out
-    state = json.loads(run(capsys, "info", series, "--json"))
-    assert state["times"] == [0.0, 0.5, 2.0]
 
 
 def test_to_single_files_and_back(series, capsys, tmp_path):
@@ -264,33 +222,12 @@ def test_a_step_is_shown_by_its_time(series, capsys, tmp_path):
         assert np.array_equal(one, other)
 
 
-def test_times_of_what_has_none(series, volumes, capsys, tmp_path):
-    pytest.importorskip("pyvista")
-    pvdi.read(series)[0].save(tmp_path / "step.vdi")
-    for file in (tmp_path / "step.vdi", volumes[0]):
-        for option in (["--play"], ["--time", "1"], ["--rate", "5"]):
-            target = tmp_path / "p.png"
-            error = run(capsys, "view", file, "--screenshot", target, *option, status=1)
-            assert f"{' '.join(option)} is for series" in error
-            assert not target.exists()
-    arguments = ("render", tmp_path / "step.vdi", "-o", target, "--time", "1")
-    assert "--time 1 is for series" in run(capsys, *arguments, status=1)
-
-
-def test_images_of_steps_are_written_as_asked_for(series, capsys, tmp_path):
-    pytest.importorskip("OpenEXR")
-    run(capsys, "convert", series, "-o", tmp_path / "step.exr")
-    alone = pvdi.read(series)[1].save(tmp_path / "alone.exr")
-    assert (tmp_path / "step_0001.exr").read_bytes() == alone.read_bytes()
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ("series {0} {vdi} -o x.vdis", "not some of each"),
         ("series {0} {1} -o x.vdis --times 1", "2 steps and 1 times"),
-        ("series {0} -o x.vdi", ".vdis"),
-        ("series {vdi} -o x.vdis --cmap bone", "--cmap bone is for volumes"),
+        ("render {vdi} -o x.png --time 1", "--time 1 is for series"),
         (
             "convert {series} -o b.vdis --camera-json absent",
             "--camera-json absent is for deep images, .exr",
@@ -317,13 +254,3 @@ def test_a_folder_becomes_one_file_and_is_not_replaced_by_one(series, capsys, tm
     message = run(capsys, "convert", series, "-o", folder, status=1)
     assert "it is a folder" in message
     assert "3, times 0 to 2" in run(capsys, "info", folder)
-
-
-@pytest.mark.slow
-def test_a_run_that_fails_leaves_what_was_there(series, volumes, capsys, tmp_path):
-    path = tmp_path / "run.vdis"
-    path.write_bytes(series.read_bytes())
-    np.save(tmp_path / "flat.npy", np.zeros((3, 4)))
-    run(capsys, "series", volumes[0], tmp_path / "flat.npy", "-o", path, status=1)
-    assert path.read_bytes() == series.read_bytes()
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["flat.npy", "run.vdis"]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import zipfile
-
 import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
-from vtk_builds import vtk_or_skip
-from vtk_sources import executions, ready_source, some_property
+from vtk_sources import ready_source, some_property
 from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
@@ -81,18 +78,6 @@ def test_the_reader_gives_the_step_nearest_to_the_time_down_the_pipeline(path):
         assert picture.GetOutputDataObject(0).GetDimensions()[:2] == series[step].picture_size
 
 
-def test_a_step_is_read_once(path):
-    reader = reader_of(path)
-    executed = executions(reader)
-    for time, n in ((3.0, 1), (3.0, 1), (0.5, 2), (3.0, 3)):
-        reader.UpdateTimeStep(time)
-        reader.Update()
-        assert len(executed) == n
-    opened = reader.GetSeries()
-    reader.UpdateTimeStep(1.0)
-    assert reader.GetSeries() is opened
-
-
 def test_a_series_grows_while_it_is_read(path, tmp_path):
     series, reader = pvdi.read(path), reader_of(tmp_path / "b.vdis")
     mapper = pvdi.VDIMapper()
@@ -108,37 +93,6 @@ def test_a_series_grows_while_it_is_read(path, tmp_path):
             if i == 0:
                 mapper.SetInputConnection(reader.GetOutputPort())
             assert mapper.GetVDI().equals(vdi)
-
-
-def test_files_of_one_vdi_have_no_time(path, tmp_path):
-    vdi, reader = pvdi.read(path)[1], reader_of(path)
-    reader.UpdateTimeStep(4.0)
-    vdi.save(tmp_path / "a.vdi")
-    reader.SetFileName(tmp_path / "a.vdi")
-    assert announced(reader) is None
-    reader.Update()
-    image = reader.GetOutputDataObject(0)
-    assert vdi_from_image(image).equals(vdi)
-    assert time_of(image) is None
-    with pytest.raises(VDIFileError, match="is not a series"):
-        reader.GetSeries()
-
-
-def test_what_is_wrong_with_a_series_is_said(path):
-    with zipfile.ZipFile(path) as archive:
-        place = archive.getinfo("000001.vdi").header_offset + 100
-    content = bytearray(path.read_bytes())
-    content[place] ^= 1
-    path.write_bytes(content)
-    reader = reader_of(path)
-    assert announced(reader) == (TIMES, (0.5, 4.0))
-    reader.UpdateTimeStep(0.5)
-    with pytest.raises(VDIFileError, match=r"000001\.vdi"):
-        reader.UpdateTimeStep(1.0)
-    with pytest.raises(InvalidArgumentError, match="finite"):
-        reader.UpdateTimeStep(float("nan"))
-    reader.UpdateTimeStep(4.0)
-    assert time_of(reader.GetOutputDataObject(0)) == 4.0
 
 
 SIZE = (24, 18)
@@ -212,20 +166,6 @@ def test_a_source_makes_a_vdi_of_the_time_that_is_asked_for(vdis):
         assert source.GetVDI() is vdi or len(producer.read) > reads
 
 
-def test_a_source_behind_what_interpolates_in_time(default_runtime):
-    """VTK's filter asks for the two steps around the time; its image is what the VDI is made of."""
-    balls = [ball_at(0), ball_at(0), ball_at(0)]
-    balls[1]["v"] = balls[0]["v"] / 3
-    producer, between = Moving(balls), vtk_or_skip("vtkTemporalInterpolator")()
-    between.SetInputConnection(producer.GetOutputPort())
-    source = source_of(between)
-    source.UpdateTimeStep(0.75)
-    half = ball_at(0)
-    half["v"] = (balls[0]["v"] + balls[1]["v"]) / 2
-    np.testing.assert_allclose(source.GetVolume().array.ravel(), half["v"], rtol=1e-12)
-    assert source.GetVDI().equals(made_of(half))
-
-
 def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
     producer = Moving()
     early, late = source_of(producer), source_of(producer)
@@ -239,26 +179,6 @@ def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
     third = source_of(producer)
     producer.UpdateTimeStep(1.0)
     assert third.GetVDI().equals(vdis[1])
-
-
-def test_extents_follow_a_volume_that_grows(default_runtime):
-    """With the volume's bounds covered, the lists are more as the volume is larger."""
-    balls = [ball_at(0) for _ in TIMES]
-    for step, ball in enumerate(balls):
-        ball.spacing = tuple(np.array(ball.spacing) * (1 + 0.2 * step))
-    producer, voi = Moving(balls), vtkExtractVOI()
-    source = source_of(producer)
-    source.SetCoverage("bounds")
-    voi.SetInputConnection(source.GetOutputPort())
-    seen = []
-    for time in TIMES:
-        source.UpdateTimeStep(time)
-        width, height = source.GetVDI().window_size
-        voi.SetVOI(0, width - 1, 0, height - 1, 0, 0)
-        voi.UpdateTimeStep(time)
-        assert voi.GetOutput().GetDimensions() == (width, height, 1)
-        seen.append(width)
-    assert seen[0] < seen[1] < seen[2]
 
 
 @pytest.fixture
@@ -335,22 +255,6 @@ def test_a_series_of_a_source_with_times(vdis):
     for step in range(3):
         assert series[step].equals(vdis[step])
     assert producer.read == [0, 1, 2]
-
-
-def test_a_series_of_pyvistas_readers(vdis, tmp_path):
-    """A .pvd file: each step is a composite data set of one block."""
-    entries = []
-    for step, time in enumerate(TIMES):
-        ball_at(step).save(tmp_path / f"{step}.vti")
-        entries.append(f'<DataSet timestep="{time}" part="0" file="{step}.vti"/>')
-    (tmp_path / "a.pvd").write_text(
-        '<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>'
-        f"{''.join(entries)}</Collection></VTKFile>"
-    )
-    reader, looks = pv.get_reader(tmp_path / "a.pvd"), {"volume_property": some_property()}
-    series = pvdi.generate_series(reader, CAMERA, SIZE, **looks, precision="exact")
-    assert series.times == TIMES
-    assert all(series[step].equals(vdis[step]) for step in range(3))
 
 
 def test_what_cannot_be_a_series_is_refused():

@@ -65,12 +65,9 @@ def test_a_view_is_found_and_read_without_another(vdis, saved, tmp_path):
     "changes",
     [
         {"views": None},
-        {"views": [{}]},
-        {"views": 7},
         {"views": []},
         {"picture_size": [0, 1]},
         {"bounds": [1, 2]},
-        {"bounds": [0, 1, 0, 1, 0, None]},
         {"camera": 3},
         {"version": 2},
     ],

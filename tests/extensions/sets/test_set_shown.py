@@ -11,7 +11,7 @@ from plugin_scenes import CLASSIFICATION, soft_ball
 from watched_windows import finish, frame, picture_of, turned
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.extensions.sets import shown as of_sets
 
 
@@ -129,12 +129,3 @@ def test_a_set_makes_no_vdi_at_rest(plotter, made):
     assert (len(made), actor.status.stand_in) == (n, False)
     with pytest.raises(InvalidArgumentError, match="without a volume"):
         actor.regenerate()
-
-
-def test_what_only_a_volume_can_honour_is_refused(plotter, made):
-    with pytest.raises(UnsupportedError, match="cmap"):
-        plotter.add_vdi(made, cmap="bone")
-    actor = shown(plotter, made)
-    with pytest.raises(InvalidArgumentError, match="SetVDISet"):
-        actor.mapper.SetVDISet([made[0]])
-    assert actor.mapper.GetSeries() is None

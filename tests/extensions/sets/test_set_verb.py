@@ -42,18 +42,6 @@ def test_a_volume_becomes_a_set(saved, capsys):
     assert len(state["views"]) == len(vdis)
 
 
-def test_it_is_rendered_from_all_sides(saved, capsys, tmp_path):
-    from PIL import Image
-
-    vdis = pvdi.read(saved)
-    run(capsys, "render", saved, "-o", tmp_path / "a.png", "--azimuth", "140")
-    with Image.open(tmp_path / "a.png") as picture:
-        seen = np.asarray(picture)[..., 3]
-    image = pvdi.render(vdis, vdis.camera.azimuth(140))
-    assert np.abs(seen / 255 - image[..., 3]).max() <= 0.5 / 255 + 1e-6
-    assert seen.max() > 50
-
-
 @pytest.mark.gl
 def test_it_is_viewed(saved, capsys, tmp_path):
     assert "written" in run(capsys, "view", saved, "--screenshot", tmp_path / "v.png")
@@ -68,15 +56,3 @@ def test_it_is_converted(saved, capsys, tmp_path):
     assert len(pvdi.read(tmp_path / "a.html")) == len(vdis)
     assert f"{len(vdis)} files" in run(capsys, "convert", saved, "-o", tmp_path / "v.vdi")
     assert pvdi.read(tmp_path / "v_0001.vdi").equals(vdis[1])
-
-
-def test_mistakes_are_named(volume, saved, capsys, tmp_path):
-    assert ".vdiset" in run(capsys, "set", volume, "-o", tmp_path / "a.vdi", status=1)
-    message = run(capsys, "view", saved, "--play", "--screenshot", tmp_path / "a.png", status=1)
-    assert "--play is for series" in message
-    bad = ["set", volume, "-o", tmp_path / "a.vdiset", "--half-angle", "200"]
-    assert "half_angle" in run(capsys, *bad, status=1)
-    for option in (["--thickness", "1"],):
-        error = run(capsys, "convert", saved, "-o", tmp_path / "a.vdiset", *option, status=1)
-        assert f"{' '.join(option)} is for" in error
-    assert not list(tmp_path.iterdir())

@@ -62,18 +62,6 @@ def test_directions_are_spread_within_an_angle_of_an_axis():
         assert cosines.min() >= np.cos(np.radians(40)) - 1e-12
 
 
-def test_an_orbit_looks_at_the_centre_from_its_directions(volume, around):
-    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
-    chosen = directions(20)
-    for view, direction in zip(orbit(around, volume.bounds, chosen), chosen, strict=True):
-        arm = np.subtract(view.position, centre)
-        assert np.allclose(arm / np.linalg.norm(arm), direction)
-        assert np.linalg.norm(arm) == pytest.approx(
-            np.linalg.norm(np.subtract(around.position, centre))
-        )
-        assert np.allclose(view.axes[2], -direction)
-
-
 def test_the_nearest_is_that_of_the_least_angle(made, around):
     for view in orbit(around, made.bounds, directions(30)):
         angles = [angle_from_generating_view(vdi, view) for vdi in made]
@@ -128,20 +116,6 @@ def test_weights_add_up_and_nothing_jumps_on_a_path(made, around):
         if previous is not None:
             assert np.abs(dense - previous).max() < 0.1
         previous = dense
-
-
-def test_without_blending_the_nearest_is_shown_alone(made, around):
-    view = around.azimuth(11)
-    made.blend = 0
-    try:
-        assert made.weights(view) == [(made.nearest(view), 1.0)]
-        picture = pvdi.render(made, view)
-        alone = pvdi.render(made[made.nearest(view)], view, SIZE)
-        assert np.array_equal(picture, alone)
-    finally:
-        made.blend = 6
-    with pytest.raises(InvalidArgumentError, match="blend"):
-        made.blend = -1
 
 
 def test_a_picture_is_the_weighted_mean(made, around):

@@ -17,7 +17,7 @@ from pyvista_vdi.model.standard_cases import filling_camera
 
 #: Of pictures that are compared, and of viewers: large enough for a bar and its settings.
 SIZE, ROOM = (161, 91), (480, 330)
-PHONE = {"viewport": {"width": 390, "height": 500}, "has_touch": True, "is_mobile": True}
+PHONE = {"viewport": {"width": 300, "height": 420}, "has_touch": True, "is_mobile": True}
 
 BAR = ["Reset the view", "Save the picture (PNG)", "Full screen", "Settings"]
 AXES = {"+x": (1, 0, 0), "\u2212x": (-1, 0, 0), "+y": (0, 1, 0), "\u2212y": (0, -1, 0)}
@@ -165,6 +165,7 @@ def test_keys_reach_and_use_every_control(vdi, ball):
     ball.wait_for("document.fullscreenElement === null")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("width", [390, 600])
 def test_settings_do_not_cover_the_picture_of_a_narrow_page(width, kept, from_disk):
     viewport = {"width": width, "height": 400}
@@ -227,6 +228,7 @@ def test_a_saved_picture_is_what_is_seen(ball):
     assert np.abs(saved[..., :3] - expected).max() <= 2  # straight colours have eight bits, too
 
 
+@pytest.mark.slow
 def test_without_controls_there_are_none(ball):
     ball.evaluate("viewer.setAttribute('controls', 'none')")
     assert ball.page.get_by_role("button").count() == 0
@@ -346,7 +348,7 @@ def test_pictures_of_values_are_those_of_render(kept, from_disk):
 @pytest.mark.slow
 def test_exact_values_are_shown_and_a_file_without_a_look_has_a_ramp(kept, open_page, tmp_path):
     page = open_page(SIZE)
-    page.load(kept.save(tmp_path / "kept.vdi").read_bytes())
+    page.load(kept.save(tmp_path / "kept.vdi", compression="deflate").read_bytes())
     assert points_of(page) == [0, 0, 1, 1]
     assert page.evaluate("viewer.values.range") == list(RANGE)
     lengths = page.evaluate("[...viewer.values.histogram]")
@@ -478,6 +480,7 @@ def test_a_link_shows_what_was_seen_and_the_address_is_followed(vdi, from_disk):
     assert other.evaluate("viewer.camera") == home
 
 
+@pytest.mark.slow
 def test_of_several_viewers_the_first_of_a_key_is_followed(vdi, open_page):
     page = open_page(SIZE, attributes='hash="left"', files={"ball.vdi": file_of(vdi)})
     page.evaluate(

@@ -56,14 +56,14 @@ def test_arrays_are_python_s(precision):
 def test_the_coarse_level_comes_before_the_rest_is_there():
     """Bytes and base64 text that ends anywhere; before it an empty VDI of the same view."""
     vdi = random(1, (24, 18))
-    data, small, window = file_of(vdi), coarser(vdi), list(vdi.window_size)
+    data, small = file_of(vdi), coarser(vdi)
     cut = data.index(b"PK\3\4", data.index(b"PK\5\6"))  # the member behind the coarse level
     early, all_of_it = in_node(
         """async (text, cut) => {
           const { LevelDecoder } = await from("decode.js");
           const bytes = bytesOf(text), levels = [], rest = textOf(bytes.subarray(cut - 10));
-          const decoder = new LevelDecoder(({ level, offsets, windowSize, pictureSize }) =>
-            levels.push([level, offsets.at(-1), windowSize, pictureSize]));
+          const decoder = new LevelDecoder(({ level, offsets, windowSize }) =>
+            levels.push([level, offsets.at(-1), windowSize]));
           await decoder.push(bytes.slice(0, cut - 10));
           await decoder.push(rest.slice(0, 26));
           const early = levels.length;
@@ -76,9 +76,9 @@ def test_the_coarse_level_comes_before_the_rest_is_there():
     )
     assert early == 2
     assert all_of_it == [
-        ["begun", 0, [1, 1], window],
-        ["coarse", small.n_supersegments, list(small.window_size), window],
-        ["full", vdi.n_supersegments, window, window],
+        ["begun", 0, [1, 1]],
+        ["coarse", small.n_supersegments, list(small.window_size)],
+        ["full", vdi.n_supersegments, list(vdi.window_size)],
     ]
 
 

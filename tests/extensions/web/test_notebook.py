@@ -631,7 +631,7 @@ def test_axe_finds_nothing_in_our_part_of_an_output(open_widget, series):
     """With the bar and a panel, and below the picture a series' button and slider."""
     page = open_widget(VDIWidget(series))
     page.evaluate("viewers[0].style.cssText = 'display: block; width: 420px; height: 340px'")
-    page.page.get_by_role("button", name="View and marks").first.click()
+    page.page.get_by_label("Settings", exact=True).first.click()
     page.wait_for("viewers.every(({ series }) => series.complete)")
     assert_axe_finds_nothing(page, "viewers[0]")
 

@@ -163,6 +163,7 @@ def test_it_plays_by_slider_button_and_keys(series, path, shown_from):
     page.assert_shows(series[N - 1], SIZE, turned)
 
 
+@pytest.mark.slow
 def test_a_damaged_step_is_named_and_the_next_is_shown(series, path, shown_from):
     files = folder_of(path) | {"ball.vdis/000003.vdi": b"broken" * 9}
     page = shown_from("ball.vdis/", files)
@@ -298,6 +299,7 @@ def test_a_page_from_disk_has_the_set_in_it(vdis, set_path, open_page, tmp_path)
     assert [each.name for each in tmp_path.iterdir()] == ["lumps.html"]
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_a_set_is_said(vdis, set_path, shown_from):
     """A view that is damaged is named, and others are shown."""
     files, nearest = folder_of(set_path), vdis.nearest(vdis.camera)

@@ -88,11 +88,11 @@ def test_a_page_is_sent_what_its_view_needs(page):
 @pytest.mark.slow
 def test_look_and_time_are_changed_in_the_page(page):
     wait(page, "remote.received.vdis === 1")
-    page.page.get_by_label("Colours").select_option("hot")
+    page.page.locator("#controls").get_by_label("Colours").select_option("hot")
     wait(page, "remote.received.vdis >= 2")
     assert ssim_of(page, cmap="hot") > ENOUGH
 
-    page.page.get_by_label("Time").fill("1")
+    page.page.locator("#controls").get_by_label("Time").fill("1")
     wait(page, "remote.received.vdis >= 3")
 
 
@@ -110,7 +110,7 @@ def test_axe_finds_nothing(scheme, server, open_page):
     page = open_page(url=server.url, viewport=viewport, color_scheme=scheme)
     wait(page, "remote.received.vdis === 1")
     assert_axe_finds_nothing(page)
-    page.page.get_by_role("button", name="Brightness, opacity and clipping").click()
+    page.page.get_by_label("Settings", exact=True).first.click()
     assert_axe_finds_nothing(page)
 
 
@@ -129,7 +129,7 @@ def test_controls_have_names_and_a_range_that_is_none_is_said(page):
     assert len(names) == len(set(names)) == 5
     assert all(name and not name.replace(".", "").isdigit() for _, name in names)
 
-    line, inputs = page.page.locator("output"), page.page.locator("input[type=number]")
+    line, inputs = page.page.locator("#status"), page.page.locator("input[type=number]")
     valid = "[...document.querySelectorAll('input[type=number]')].map((it) => it.validity.valid)"
     page.evaluate("() => { remote.looks = []; remote.setLook = (look) => remote.looks.push(look) }")
     inputs.nth(0).fill("200")
@@ -141,7 +141,7 @@ def test_controls_have_names_and_a_range_that_is_none_is_said(page):
     # Nothing of it was told, and what else is chosen leaves the range as it was
     clims = [[200, page.evaluate("remote.hello.range[1]")]]
     assert page.evaluate("remote.looks.map(({ clim }) => clim)") == clims
-    page.page.get_by_label("Colours").select_option("hot")
+    page.page.locator("#controls").get_by_label("Colours").select_option("hot")
     assert page.evaluate("remote.looks.map(({ clim }) => clim)") == 2 * clims
     inputs.nth(1).fill("250")
     inputs.nth(1).press("Tab")
@@ -161,7 +161,7 @@ def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     def serve(token, port=0):
         return web.serve([BALL], port=port, token=token, wait=False, announce=None, **LOOK)
 
-    line = "document.querySelector('output').textContent"
+    line = "document.querySelector('#status').textContent"
     serving = serve("a")
     viewport = {"width": SIZE[0], "height": SIZE[1] + 100}
     refusals = "ERR_CONNECTION|WebSocket|403"
@@ -172,7 +172,7 @@ def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     wait(page, f"{line}.includes('no connection to the server; trying again in')")
     # All of it can be read, and the viewer is as large as before
     hidden = "(({ scrollHeight, clientHeight }) => scrollHeight - clientHeight)"
-    assert page.evaluate(f"{hidden}(document.querySelector('output'))") == 0
+    assert page.evaluate(f"{hidden}(document.querySelector('#status'))") == 0
     assert page.evaluate("viewer.clientHeight") == height
     serving = serve("a", serving.port)
     wait(page, f"remote.received.vdis === 2 && !{line}.includes('trying')")

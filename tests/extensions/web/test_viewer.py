@@ -417,6 +417,7 @@ def test_broken_files_are_a_sentence_and_nothing_else(data, open_page):
         assert words[name] in answer["alert"]
 
 
+@pytest.mark.slow
 def test_another_address_is_looked_at_where_it_lies(data, open_page):
     """What it gives in the same place is seen from the same view."""
     far = soft_ball(16)
@@ -528,10 +529,11 @@ def test_memory_stays_flat_over_frames_and_swaps(vdi, data, open_page):
           }};
         }}"""
     )
-    page.evaluate("use(100, 5)")
+    page.evaluate("use(500, 20)")
     session = page.page.context.new_cdp_session(page.page)
 
     def used():
+        page.evaluate("heard.length = 0")  # of this page, not of the viewer
         session.send("HeapProfiler.collectGarbage")
         heap = session.send("Runtime.getHeapUsage")["usedSize"]
         return page.evaluate("JSON.stringify(alive)"), heap

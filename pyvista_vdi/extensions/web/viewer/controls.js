@@ -68,13 +68,9 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
   const takes = []; // what takes the viewer's look to a slider
   const change = (changes) => (viewer.look = { ...viewer.look, ...changes });
   const factor = (name, label) => {
-    const output = htmlElement("span", { className: "said" });
     const made = slider(label, { min: -3, max: 3, step: 0.05 }, (x) => change({ [name]: 2 ** x }));
-    takes.push((look) => {
-      output.textContent = `\u00d7${inShort(Number(look[name].toPrecision(3)))}`;
-      setSlider(made, Math.log2(look[name]), output.textContent);
-    });
-    return htmlElement("label", {}, htmlElement("span", {}, label), made, output);
+    takes.push((look) => setSlider(made, Math.log2(look[name]), `\u00d7${inShort(look[name])}`));
+    return htmlElement("label", {}, htmlElement("span", {}, label), made);
   };
   const cut = (axis) => htmlElement("fieldset", {}, htmlElement("legend", {}, `Clip ${axis}`),
     ...["from", "to"].map((end, isHigh) => {
@@ -90,12 +86,12 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
       });
       return made;
     }));
-  const editor = transferEditor?.(viewer, button); // in pages that keep values; others have colours
+  const editor = transferEditor(viewer, button);
   const ofColors = [factor("brightness", "Brightness"), factor("opacity", "Opacity")];
   const keys = Object.entries(KEYS).flatMap(([key, does]) =>
     [htmlElement("dt", {}, key), htmlElement("dd", {}, does)]);
   const panel = htmlElement("div", { className: "panel", tabIndex: 0, role: "group", label: "Settings" },
-    htmlElement("div", { className: "views" }, ...choices), ...(editor ? [editor.element] : []),
+    htmlElement("div", { className: "views" }, ...choices), editor.element,
     ...ofColors, ..."xyz".split("").map(cut),
     button("As it was made", () => (viewer.look = AS_MADE), "As it was made"),
     htmlElement("dl", {}, ...keys));
@@ -115,7 +111,7 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
     if (!settings.open) return;
     const { bounds, look, values } = viewer;
     takes.forEach((take) => take(look));
-    editor?.show();
+    editor.show();
     ofColors.forEach((each) => (each.hidden = Boolean(values)));
     choices.forEach((each) => (each.disabled = !bounds));
   };
@@ -125,7 +121,7 @@ export function viewerControls({ frame, canvas }, viewer, say, signal) {
       if (panel.contains(target)) opener.focus();
       settings.open = false;
     } else if (target === canvas && canFill && event.key.toLowerCase() === "f") goFull();
-    else if (!editor?.key(event, target)) { // buttons and sliders do it by themselves
+    else if (!editor.key(event, target)) { // buttons and sliders do it by themselves
       return frame.contains(target) && ([" ", "Enter"].includes(event.key) ||
         (["range", "select-one"].includes(target.type) && OF_SLIDER.test(event.key)));
     }

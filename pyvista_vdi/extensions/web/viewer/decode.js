@@ -7,7 +7,7 @@ import { GrowingBytes, REMEDY, VDIFileError, crc32, damaged, inflate } from "./b
 const VERSION = 4;
 const MOST_COMPRESSED = 1032; // deflate makes no more bytes of one
 const CHUNK_ROWS = 1 << 16;
-/** Constants of docs/conventions.md, "Packed supersegments". */
+/** Constants of docs/dev/conventions.md, "Packed supersegments". */
 const DEPTH_CODES = 16383, TAU_CODES = 4095, GRID = 2 ** 24 - 2 ** 15;
 const MAX_EDGE = 65536;
 const DESCRIPTION = "vdi.json", COARSE = "coarse.vdi";
@@ -44,8 +44,7 @@ export class LevelDecoder {
         stride: new Uint16Array(1) });
     }
     if (!coarse) return;
-    const { metadata, pictureSize } = view;
-    this.onLevel({ ...await decodeVDI(checkedMember(coarse), "coarse"), metadata, pictureSize });
+    this.onLevel({ ...await decodeVDI(checkedMember(coarse), "coarse"), metadata: view.metadata });
   }
 
   /** Say that there are no more bytes; resolves when the full level has been given. */
@@ -61,11 +60,11 @@ export class LevelDecoder {
  *
  * @param {Uint8Array} bytes The file.
  * @param {"coarse"|"full"} level What the VDI is said to be.
- * @returns {Promise<object>} windowSize [W, H], camera, bounds, depthOrigin, metadata, pictureSize,
+ * @returns {Promise<object>} windowSize [W, H], camera, bounds, depthOrigin, metadata,
  *   values (of lists that keep them, in the places of colours and optical depths), level, precision
  *   ("exact" or "8-byte"), offsets: Uint32Array(W H + 1). Exact: front, back, opticalDepth:
  *   Float32Array(n), color: Float32Array(3 n). 8-byte: words: Uint32Array(2 n), origin:
- *   Int32Array(W H), stride: Uint16Array(W H), depthStep. Frames and units: docs/conventions.md.
+ *   Int32Array(W H), stride: Uint16Array(W H), depthStep. Units: docs/dev/conventions.md.
  * @throws {VDIFileError} A sentence that says what is wrong.
  */
 export async function decodeVDI(bytes, level = "full") {
@@ -157,26 +156,22 @@ function described(members) {
     chunk_rows: d.chunk_rows === CHUNK_ROWS,
     precision: ["exact", "8-byte"].includes(d.precision),
     depth_step: d.precision !== "8-byte" || Number.isInteger(Math.log2(d.depth_step)),
-    window_size: isSize(d.window_size),
+    window_size: areNumbers(d.window_size, 2) &&
+      d.window_size.every((edge) => Number.isInteger(edge) && edge >= 1 && edge <= MAX_EDGE),
     bounds: areNumbers(d.bounds, 6) && [0, 2, 4].every((k) => d.bounds[k] <= d.bounds[k + 1]),
     depth_origin: Number.isFinite(d.depth_origin),
     camera: isCamera(d.camera),
     metadata: d.metadata !== null && typeof d.metadata === "object",
   });
-  const made = d.metadata.dial?.window_size;
   const view = {
     windowSize: d.window_size, camera: d.camera, bounds: d.bounds, depthOrigin: d.depth_origin,
-    metadata: d.metadata, pictureSize: isSize(made) ? made : d.window_size,
-    ...(d.format === WITH_VALUES && { values: checkedValues(d) }),
+    metadata: d.metadata, ...(d.format === WITH_VALUES && { values: checkedValues(d) }),
   };
   return { ...d, view, n };
 }
 
 const areNumbers = (x, length) =>
   Array.isArray(x) && x.length === length && x.every(Number.isFinite);
-
-const isSize = (x) => areNumbers(x, 2) &&
-  x.every((edge) => Number.isInteger(edge) && edge >= 1 && edge <= MAX_EDGE);
 
 // What is known of lists that keep values: their range, and lengths in model units.
 function checkedValues({ deferred }) {

@@ -40,7 +40,6 @@ export class VDIViewer extends HTMLElement {
   #scene = null; // what is seen beside the VDI, or will be as soon as it can
   #series = null;
   #player = null; // of a series, or what chooses of a set
-  #step = null; // that is drawn with the next frame, and told of then
   #linked = false; // whether the view came from the page's address
   #wantedTime = null; // of a series, from there
   #address = null;
@@ -66,8 +65,8 @@ export class VDIViewer extends HTMLElement {
     };
     root.append(htmlElement("div", { className: "box" }, ...Object.values(parts)));
     this.#shown = new Renderer(this, parts, {
-      busy: () => this.playing, took: () => this.#tellStep(),
-      drawn: (full, latest) => this.#drawn(full, latest), failed: (error) => this.#fail(error),
+      busy: () => this.playing, drawn: (full, latest) => this.#drawn(full, latest),
+      failed: (error) => this.#fail(error),
     });
     this.#ready.promise.catch(() => {}); // who awaits it is told; nobody need
   }
@@ -368,8 +367,9 @@ export class VDIViewer extends HTMLElement {
     this.#series = series;
     const player = this.#player = new (series.views ? Surround : Player)(series, {
       show: (prepared, step) => {
-        this.#step = { step, time: this.series && series.times[step] };
         this.#show(prepared);
+        const detail = { step, time: series.times[step] };
+        if (!series.views) this.dispatchEvent(new CustomEvent("vditime", { detail }));
       },
       changed: () => {
         if (player !== this.#player) return;
@@ -402,7 +402,7 @@ export class VDIViewer extends HTMLElement {
 
   #endSeries() {
     this.#player?.close();
-    this.#player = this.#series = this.#step = null;
+    this.#player = this.#series = null;
     this.#controls?.show();
   }
 
@@ -414,12 +414,6 @@ export class VDIViewer extends HTMLElement {
   // The element is ready again when a step that is asked for, or about to be drawn, is drawn.
   #awaitStep() {
     if ((this.#shown.pending || !this.#player.settled) && this.#ready.settled) this.#renew();
-  }
-
-  #tellStep() {
-    const detail = this.#step;
-    this.#step = null;
-    if (detail && this.series) this.dispatchEvent(new CustomEvent("vditime", { detail }));
   }
 
   // -- the page's address ------------------------------------------------------------------------
@@ -472,7 +466,7 @@ export class VDIViewer extends HTMLElement {
     }
     if (this.#source && this.#loading.signal.aborted) this.load(this.#source).catch(() => {});
     this.#player?.resume();
-    this.#controls = playerControls?.(this.#parts.controls, this);
+    this.#controls = playerControls(this.#parts.controls, this);
     this.#controls?.show();
     this.#bar = viewerControls(this.#parts, this, (text) => this.#hint(text), signal);
     this.#listen(signal);

@@ -21,7 +21,7 @@ export async function load(source, { onLevel, onSeries, onProgress = () => {},
   let pieces = null;
   try {
     const { reading } = await withWorker(signal, async (ask) => {
-      const folder = onSeries && Series && seriesFolder(source);
+      const folder = onSeries && seriesFolder(source);
       if (folder) {
         series(await Series.ofFolder(folder.name, async (file) =>
           new Uint8Array(await (await fetched(new URL(file, folder.url))).arrayBuffer())));
@@ -33,7 +33,7 @@ export async function load(source, { onLevel, onSeries, onProgress = () => {},
       for (let next; head.whole.length < BEGIN || head.broken; head.push(next.value)) {
         if ((next = await pieces.next()).done) break;
       }
-      if (onSeries && beginsAsSeries?.(head.whole)) {
+      if (onSeries && beginsAsSeries(head.whole)) {
         return { reading: Series.ofPieces(head.whole, pieces, series) }; // without this worker
       }
       const hear = ({ prepared }) => level(prepared);
@@ -55,11 +55,10 @@ const EMBEDDED = 'script[type="application/vdi+base64"]';
  * where there is no such script yet.
  */
 export function embedded(element) {
-  return element.querySelector(EMBEDDED) &&
-    { [Symbol.asyncIterator]: () => embeddedTexts(element) };
+  return element.querySelector(EMBEDDED) && { [Symbol.asyncIterator]: () => textsIn(element) };
 }
 
-async function* embeddedTexts(element) {
+async function* textsIn(element) {
   for (let taken = 0; ;) {
     const parsed = document.readyState !== "loading";
     const scripts = element.querySelectorAll(EMBEDDED);

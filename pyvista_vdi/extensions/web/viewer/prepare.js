@@ -18,9 +18,9 @@ export function prepare(vdi) {
   const packed = vdi.precision === "8-byte";
   const n = vdi.offsets[vdi.offsets.length - 1];
   const arrays = packed ? packedLists(vdi, frame, space, n) : exactLists(vdi, frame, space, n);
-  const { windowSize, camera, bounds, level, precision, pictureSize, metadata } = vdi;
+  const { windowSize, camera, bounds, level, precision, metadata } = vdi;
   return {
-    windowSize, camera, bounds, level, precision, pictureSize, metadata, n, frame, space, packed,
+    windowSize, camera, bounds, level, precision, metadata, n, frame, space, packed,
     ...arrays, boxes: occupiedBoxes(vdi, frame, space, arrays), step: packed ? vdi.depthStep * frame.scale : 0,
     ...(vdi.values && { values: preparedValues(vdi, frame, space) }),
   };

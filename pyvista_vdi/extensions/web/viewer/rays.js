@@ -1,4 +1,4 @@
-// Rays and list space in float64 (docs/conventions.md, "Rays", "List coordinates").
+// Rays and list space in float64 (docs/dev/conventions.md, "Rays", "List coordinates").
 //
 // Along the ray of pixel (x, y) of a window every quantity that the shader needs is affine in the
 // pixel and in t, the view depth of the ray's camera less a reference depth near the data: six

@@ -44,9 +44,8 @@ export class Renderer {
 
   /**
    * What draws into a viewer's canvas, and a scene's texts into the one over it. Of the host
-   * `busy()` says whether there will be frames without end; `took()` is called when the next frame has
-   * another VDI, `drawn(full, latest)` after a frame: whether with all pixels, and of what is to be
-   * shown by now; `failed(error)`.
+   * `busy()` says whether there will be frames without end; `drawn(full, latest)` is called after a
+   * frame: whether with all pixels, and of what is to be shown by now; `failed(error)`.
    */
   constructor(viewer, { canvas, over }, host) {
     [this.#viewer, this.#canvas, this.#over, this.#host] = [viewer, canvas, over, host];
@@ -196,7 +195,6 @@ export class Renderer {
       if (!this.pending) return;
       this.#taken = this.prepared;
       this.#raycaster.set(this.prepared);
-      this.#host.took();
     } catch (error) {
       this.#host.failed(error);
     }

@@ -11,7 +11,6 @@ import { dot, subtract } from "./vectors.js";
 const SAMPLES = 4;
 
 const PLACES = ["position", "color", "normal"];
-const MODES = { points: "POINTS", lines: "LINES", triangles: "TRIANGLES" };
 
 // View coordinates are VTK's: x to the right, y up, z to the viewer.
 const MESH_VERTEX_SHADER = `#version 300 es
@@ -224,7 +223,7 @@ export class Scene {
         gl.uniform1i(u.smoothed, Boolean(attributes[2]));
         gl.uniform1f(u.size, Math.max(1, size * density));
         gl.bindVertexArray(drawn.array);
-        gl.drawArrays(gl[MODES[kind]], 0, attributes[0].length / 3);
+        gl.drawArrays(gl[kind.toUpperCase()], 0, attributes[0].length / 3);
       }
     }
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, buffers.passes[1]);

@@ -14,8 +14,6 @@ p, .hint { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em 1em;
   color: white; background: #000a; }
 .controls { position: absolute; inset: auto 0 0 0; display: flex; align-items: center; gap: 0.5em;
   padding: 2px 0.5em; font: 14px sans-serif; color: white; background: #0008; }
-.controls button { min-width: 36px; min-height: 36px; padding: 0.3em; border: 0; font: inherit;
-  color: inherit; background: none; cursor: pointer; }
 .controls input { flex: 1; min-width: 3em; height: 36px; margin: 0; accent-color: white; }
 .controls output { min-width: 3em; overflow: hidden; text-align: right;
   font-variant-numeric: tabular-nums; }
@@ -29,7 +27,7 @@ progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; bord
 .bar { display: flex; opacity: 0; transition: opacity .3s; }
 :host(:hover) .bar, canvas:focus-visible ~ .frame .bar, .bar:focus-within, .bar:has(details[open]) {
   opacity: 1; }
-.frame :is(button, summary) { box-sizing: border-box; min-width: 36px; min-height: 36px; margin: 0;
+:is(button, summary) { box-sizing: border-box; min-width: 36px; min-height: 36px; margin: 0;
   padding: 8px; border: 0; border-radius: 6px; font: inherit; color: inherit; background: none;
   list-style: none; cursor: pointer; }
 .frame :is(button, summary):hover, details[open] > summary { background: #8884; }
@@ -46,7 +44,6 @@ progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; bord
 .panel legend { float: inline-start; min-width: 80px; padding: 0; }
 .panel label > span:first-child { min-width: 80px; }
 .panel input { flex: 1; width: 0; min-width: 0; height: 32px; margin: 0; accent-color: var(--mark); }
-.panel .said { min-width: 44px; text-align: end; font-variant-numeric: tabular-nums; }
 .panel dl { display: grid; grid-template-columns: 3fr 2fr; gap: 4px 12px; margin: 8px 0 4px; }
 .panel dd { margin: 0; }
 

@@ -1,5 +1,5 @@
 // What a transfer function makes of lists that keep values: a table by mean and spread, which the
-// shader looks up (docs/conventions.md, "Values in place of colours"; model/classify_values.py).
+// shader looks up (docs/dev/conventions.md, "Values in place of colours").
 import { COLORMAPS, colorsOf } from "./colormaps.js";
 
 /** Steps of the mean over the range of values: those of 8 bytes. */
