@@ -91,7 +91,7 @@ def nifti(file: Path) -> list[VolumeInFile]:
     with gzip.open(values) if packed else values.open("rb") as stream:
         size = sum(map(len, iter(partial(stream.read, 1 << 24), b"")))
     if size < needed:
-        raise InvalidVolumeError(f"it has {size} of {needed} bytes: it is cut off")
+        raise ValueError(f"it has {size} of {needed} bytes: it is cut off")
     slope, shift = real(2, 112)
     if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
         array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled
@@ -119,7 +119,7 @@ def mrc(file: Path) -> list[VolumeInFile]:
     words, reals = (np.frombuffer(head, f"{order}{kind}4", 56) for kind in "if")
     shape, mode, mapped = words[2::-1].tolist(), int(words[3]), words[16:19].tolist()
     if head[208:212] != b"MAP " or mode not in _MODES or sorted(mapped) != [1, 2, 3]:
-        raise InvalidVolumeError(f"it is no map, or of a mode ({mode}) that is none of {[*_MODES]}")
+        raise ValueError(f"it is no map, or of a mode ({mode}) that is none of {[*_MODES]}")
     axes = "".join("?xyz"[n] for n in mapped)
     counts = np.maximum(words[7:10], 1)
     step = np.where(reals[10:13] > 0, reals[10:13].astype(np.float64) / counts, 1.0)
