@@ -57,6 +57,8 @@ _kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
 def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
     """Return the volume that a VTK image is, the same until the image is told to be modified."""
     matrix = getattr(image, "GetDirectionMatrix", None)
+    if not hasattr(image, "GetMTime"):
+        return Volume.from_vtk(image, scalars, preference)  # which says what it is
     made_of = (scalars, preference, image.GetMTime(), matrix and matrix().GetMTime())
     kept = _kept.get(id(image))
     if kept is not None and kept[0] == made_of:

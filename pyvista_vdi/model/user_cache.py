@@ -44,9 +44,10 @@ def writable_cache(name: str, author: str | None = None) -> Path:
 
     Raises OSError if files cannot be made in it.
     """
-    folder = Path(platformdirs.user_cache_dir(name, author or False))
-    if not folder.is_absolute():  # there is no home, and the system does not know the user
-        raise OSError(f"there is no home for {folder}")
+    try:
+        folder = Path(platformdirs.user_cache_dir(name, author or False))
+    except RuntimeError as error:  # there is no home, and the system does not know the user
+        raise OSError(str(error)) from error
     folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(f"{folder} is write-protected")

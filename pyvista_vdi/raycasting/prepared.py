@@ -398,7 +398,7 @@ class KeptValues(PreparedVDI):
             shown.lit = share_lit(self._lists, *self.depths, look.optical_depths)
         with (
             kept_together() as keep,
-            runtime.upload(look.integrals(), "integrals") as table,
+            runtime.upload(look.integrals(), "integrals of a transfer function") as table,
         ):
             shown.headers = keep(self._made((bundles,), "list headers", np.uint64))
             shown.faces = keep(self._made((self._entries, 2), "supersegment faces"))

@@ -180,6 +180,7 @@ def test_offsets_of_64_bits(runtime, precision):
     images = []
     for long_offsets in (False, True):
         prepared.long_offsets = long_offsets
+        prepared.switches["OFFSET_T"] = "long" if long_offsets else "int"
         if long_offsets and precision == "8-byte":  # whose headers are offsets
             headers = runtime.download(prepared.headers).astype(np.int64)
             prepared.headers = runtime.upload(headers, "list headers")

@@ -43,7 +43,7 @@ def test_the_picture_in_the_callers_memory_is_the_same(runtime, aligned):
     [
         (np.empty((17, 31, 3), np.float32), "out must be float32 of the image's shape"),
         (np.empty((17, 31, 4)), "out must be float32 of the image's shape"),
-        (np.empty((4, 31, 17), np.float32).T, "'image' exchanges C-contiguous elements"),
+        (np.empty((4, 31, 17), np.float32).T, "'image' must be C-contiguous"),
     ],
 )
 def test_an_image_that_does_not_fit_is_refused(runtime, out, message):

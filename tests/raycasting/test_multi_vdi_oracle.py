@@ -318,6 +318,9 @@ ONE = slabs_vdi(CAMERA, [4.5, 5.5], 0.7, bounds=BOUNDS)
 WIDE = slabs_vdi(CAMERA, [4.5, 5.5], 0.7, window=(2, 1), bounds=BOUNDS)
 
 
+CUTOFF = pvdi.Settings(transmittance_cutoff=0.1)
+
+
 @pytest.mark.parametrize(
     ("vdis", "options", "message"),
     [
@@ -329,7 +332,7 @@ WIDE = slabs_vdi(CAMERA, [4.5, 5.5], 0.7, window=(2, 1), bounds=BOUNDS)
         ([ONE, ONE], {"cropping": BOUNDS}, "a list with an entry for each of the 2 VDIs"),
         ([ONE, ONE], {"opacity_multiplier": [1.0]}, "or one for each of the 2 VDIs"),
         ([ONE, ONE], {"preview_samples": 9}, "preview_samples is for a single VDI"),
-        ([ONE, ONE], {"transmittance_cutoff": 0.1}, "transmittance_cutoff is for a single VDI"),
+        ([ONE, ONE], {"settings": CUTOFF}, "transmittance_cutoff is for a single VDI"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(vdis, options, message):
