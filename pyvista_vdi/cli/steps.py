@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -15,7 +14,7 @@ from pyvista_vdi.cli.text import printable
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.time_steps import in_step_order, listed_steps, lists_steps
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.imports import import_pyvista
+from pyvista_vdi.plotting.imports import vtk_steps
 
 
 @dataclass(frozen=True)
@@ -64,12 +63,8 @@ def _steps_of(
             yield from _steps_of(str(listed), options, at, in_chunks=in_chunks)
         return
     elif file.lower().endswith((".vti", ".pvti", ".vtkhdf")):  # others announce none, or others
-        several: Sequence[Any] = ()
-        times: tuple[float, ...] = ()
-        with quietly(), suppress(Exception):  # reading one volume says what is wrong
-            from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
-
-            several, times = steps_and_times(import_pyvista().get_reader(file).reader)
+        with quietly():
+            several, times = vtk_steps(file)
         if len(times) > 1 and time is None:
             for i, at in enumerate(times):
                 yield Step(f"{file}, step {i}", at, partial(_read_step, several, i, given))

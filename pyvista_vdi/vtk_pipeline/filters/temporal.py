@@ -36,8 +36,7 @@ def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
 
     if not times:
         raise InvalidArgumentError(
-            f"{type(source).__name__} announces no time steps, which a series is made of: use what "
-            "it gives as one volume, or one VDI"
+            f"{type(source).__name__} announces no time steps: use it as one volume, or as one VDI"
         )
     return StepSequence(read, len(times)), times
 
