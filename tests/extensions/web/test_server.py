@@ -32,6 +32,7 @@ from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.view import View
 
 #: Seconds for whatever must happen: far more than it takes, also beside other tests.
 PATIENCE = 120
@@ -46,9 +47,9 @@ MADE = {"precision": "8-byte", "max_supersegments": 8}
 HELD = 1 << 14
 
 
-def source_of(*volumes, **look):
+def source_of(*volumes, lists=1280 * 720, **look):
     options = GenerationOptions(max_supersegments=8, precision="8-byte")
-    return Source(volumes, Classification.composited(look, "serve"), options, lists=1280 * 720)
+    return Source(volumes, Classification.composited(look, "serve"), options, lists=lists)
 
 
 @pytest.fixture(scope="module")
@@ -160,6 +161,16 @@ async def test_a_view_gets_a_vdi_of_its_own_with_the_lists_in_view(client):
     await client.idle()
     assert client.said[-1] == {"type": "status", "doing": None}
     assert client.vdis == 1  # nothing is in view: nothing was sent
+
+
+def test_fewer_lists_than_pixels_show_the_same(default_runtime):
+    few = source_of(HIGH, lists=2000, **LOOK)
+    size, file = few.make(Wish(View(CAMERA, SIZE)), lambda: False)
+    inner = math.prod(edge - 2 for edge in size)  # whole lists reach beyond by one on each side
+    assert inner < 2000 <= math.prod(size)
+    shown = pvdi.render(reader.read("a.vdi", stream=io.BytesIO(file)), CAMERA, SIZE)
+    truth = pvdi.render_volume(HIGH, CAMERA, SIZE, **LOOK)
+    assert pvdi.compare_images(shown, truth).ssim > 0.97
 
 
 @by_clients(1)
