@@ -49,13 +49,12 @@ def show_plotter(plotter: Any, *, screenshot: Any = None, **options: Any) -> Any
     import pyvista as pv
     from pyvista.jupyter.notebook import handle_plotter
 
-    from pyvista_vdi.extensions.web.scene import scenes_of
-    from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
+    from pyvista_vdi.extensions.web.scene import is_vdi, scenes_of
 
     plotter.render()  # VDIs are made in the first frame
     props = (prop for renderer in plotter.renderers for prop in renderer.GetViewProps())
     try:
-        if any(isinstance(prop, VDIActorMethods) and prop.GetVisibility() for prop in props):
+        if any(is_vdi(prop) and prop.GetVisibility() for prop in props):
             from pyvista_vdi.extensions.web.plotter_widget import PlotterWidget, SubplotsWidget
 
             scenes = scenes_of(plotter, "the notebook's viewer", follow=True)

@@ -47,6 +47,11 @@ class Scene:
     left_out: list[str]  # what is not shown, by name
 
 
+def is_vdi(prop: Any) -> bool:
+    """Whether a prop shows a VDI."""
+    return isinstance(prop, VDIActorMethods)
+
+
 def scenes_of(plotter: Any, where: str, *, follow: bool = False) -> list[Scene]:
     """Return what each renderer of a plotter that has been drawn shows; warn of what is left out.
 
@@ -73,14 +78,14 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     boxes: list[Any] = []
     flat: list[Any] = []
     actor: Any = None
-    shown: Shown | None = None
+    shown: Any = None
 
     # Sort what is drawn into VDIs, meshes and what VTK draws into the picture
     visible = [prop for prop in renderer.GetViewProps() if prop.GetVisibility()]
-    visible.sort(key=lambda p: isinstance(p, VDIActorMethods) and not (p.series or p.vdi_set))
+    visible.sort(key=lambda p: is_vdi(p) and not (p.series or p.vdi_set))
     for prop in visible:
         missing: list[str] = []
-        if isinstance(prop, VDIActorMethods):
+        if is_vdi(prop):
             matrix, several = as_array(prop.GetMatrix()), prop.series or prop.vdi_set
             vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
             if vdi is None:
@@ -113,8 +118,7 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     camera = None if follow else viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
     head = {"camera": camera, "meshes": meshes, "picture": _picture(renderer, flat), "vdis": vdis}
     text = json.dumps(head, default=lambda numbers: b64encode(numbers).decode())
-    data = zlib.compress(text.encode(), 6)
-    planes = vdis[0]["planes"] if vdis else []
+    data, planes = zlib.compress(text.encode(), 6), vdis[0]["planes"] if vdis else []
     return Scene(shown, actor, planes, data, _background(renderer), left_out)
 
 
@@ -123,7 +127,7 @@ def state_of(renderer: Any) -> Any:
     states: list[Any] = []
     for prop in renderer.GetViewProps():
         own = prop.GetRedrawMTime()
-        if isinstance(prop, VDIActorMethods):  # its mapper is modified in each frame
+        if is_vdi(prop):  # its mapper is modified in each frame
             matrix = as_array(prop.GetMatrix()).tolist()
             own = (look_of(prop), prop.opacity_multiplier, matrix, _planes(prop, []))
         states.append((prop.GetAddressAsString(""), bool(prop.GetVisibility()), own))
@@ -142,9 +146,9 @@ def look_of(actor: Any) -> Any:
 
 def _planes(actor: Any, missing: list[str]) -> list[list[float]]:
     """Return the planes that an actor is clipped to, origin and normal, world."""
-    mapper = actor.GetMapper()
-    planes = [[*p.GetOrigin(), *p.GetNormal()] for p in mapper.GetClippingPlanes() or ()]
-    if mapper.GetCropping():
+    clipping = actor.GetMapper().GetClippingPlanes() or ()
+    planes = [[*plane.GetOrigin(), *plane.GetNormal()] for plane in clipping]
+    if actor.GetMapper().GetCropping():
         missing.append("cropping")
     if len(planes) > MOST_PLANES:
         missing.append(f"{len(planes) - MOST_PLANES} of its clipping planes")
@@ -200,7 +204,6 @@ def _meshes(actor: Any, missing: list[str]) -> Iterator[dict[str, Any]]:
         colors = vtk.vtk_to_numpy(mapped).reshape(mapped.GetNumberOfTuples(), -1)[:, :3]
     of_each_cell = mapped is not None and bool(int(of_cells))
     normals = poly.GetPointData().GetNormals() if look.GetInterpolation() > 0 else None
-    normals = None if normals is None else vtk.vtk_to_numpy(normals).astype(np.float32)
 
     # Send the points of each kind of cell about their middle, as browsers compute in float32
     first, middle = 0, poly.GetCenter()
@@ -217,7 +220,7 @@ def _meshes(actor: Any, missing: list[str]) -> Iterator[dict[str, Any]]:
             "radius": poly.GetLength() / 2,
             "points": (points[used] - middle).astype(np.float32),
             "colors": colors[owner if of_each_cell else used].astype(np.uint8),
-            "normals": None if normals is None else normals[used],
+            "normals": None if normals is None else vtk.vtk_to_numpy(normals)[used].astype("f4"),
             "lit": bool(look.GetLighting()),
             "size": look.GetPointSize(),
         }
@@ -269,12 +272,10 @@ def _picture(renderer: Any, flat: list[Any]) -> str | None:
 
 def _effects(renderer: Any) -> list[str]:
     """Name what changes a renderer's picture as a whole, and cannot be shown."""
-    window = renderer.GetRenderWindow()
-    behind = [other for other in window.GetRenderers() if other.GetLayer() < renderer.GetLayer()]
     effects = {
         "its render pass or shadows": renderer.GetPass() or renderer.GetUseShadows(),
-        "enable_stereo_render": window.GetStereoRender(),
-        "add_background_image": any(other.VisibleActorCount() for other in behind),
+        "enable_stereo_render": renderer.GetRenderWindow().GetStereoRender(),
+        "add_background_image": renderer.GetLayer() > 0,  # its renderer is behind
         "the background's texture (set_environment_texture)": renderer.GetTexturedBackground(),
         "a background's gradient": renderer.GetGradientBackground() and renderer.GetGradientMode(),
     }

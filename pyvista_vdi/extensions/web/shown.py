@@ -144,7 +144,7 @@ def picture(
     """
     placed = vdi.camera.model_transform if placed is None else placed
     view = camera_of(camera).replace(model_transform=placed)
-    how = {"clipping_planes": clipping_planes, "opacity_multiplier": opacity_multiplier}
+    how: Any = {"clipping_planes": clipping_planes, "opacity_multiplier": opacity_multiplier}
     return to_bytes(render(vdi, view, window_size, **how), background)
 
 

@@ -290,7 +290,7 @@ def test_what_the_viewer_leaves_out_is_named(plotter):
     plotter.screenshot()
     actor.mapper.SetCropping(True)
     plotter.show_grid()
-    words = r"without cropping \(PlotterVDIActor\), its place .*: see all by"
+    words = r"without its place .*, cropping \(PlotterVDIActor\): see all by"
     with pytest.warns(UserWarning, match=words):
         show_plotter(plotter)
 
