@@ -13,8 +13,8 @@ from pyvista_vdi.cli.inputs import laid_out, open_store, quietly, read_volume
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.time_steps import in_step_order, listed_steps, lists_steps
-from pyvista_vdi.io.volumes.formats import FORMATS
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.imports import vtk_steps
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,9 @@ def _steps_of(
         for listed, at in listed_steps(file):
             yield from _steps_of(str(listed), options, at, in_chunks=in_chunks)
         return
-    elif file.lower().endswith(FORMATS["VTK"].suffixes):
-        from pyvista_vdi.plotting.volume_files import steps_of
-
+    elif file.lower().endswith((".vti", ".pvti", ".vtkhdf")):  # others announce none, or others
         with quietly():
-            several, times = steps_of(file)
+            several, times = vtk_steps(file)
         if len(times) > 1 and time is None:
             for i, at in enumerate(times):
                 yield Step(f"{file}, step {i}", at, partial(_read_step, several, i, given))

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import re
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, with_article
+from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.volumes import as_grid
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, volume_from_vtk
-from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
+from pyvista_vdi.vtk_pipeline.filters.temporal import only_grid
 
 
 def volumes_in(file: Path) -> list[VolumeInFile]:
@@ -28,20 +23,14 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
 
     Equidistant rectilinear grids are uniform, and the only grid of a multi-block is its volume.
     """
-    data = _read(file)
-    while isinstance(data, pv.MultiBlock):
-        blocks = [block for block in data if block is not None]
-        grids = [block for block in blocks if isinstance(block, pv.ImageData)]
-        if len(grids or blocks) != 1:
-            break
-        (data,) = grids or blocks
-    if isinstance(data, pv.RectilinearGrid):
-        with contextlib.suppress(UnsupportedError):
-            data, _ = as_grid(data, None, None)
-    if not isinstance(data, pv.ImageData):
-        kind = with_article(type(data).__name__)
-        remedy = "resample it to a pyvista.ImageData first"
-        raise UnsupportedError(f"{file} holds {kind}, not a uniform grid: {remedy}")
+    # Legacy files may have any name; what VTK would print is raised
+    legacy = head_of(file).startswith(b"# vtk DataFile")
+    with vtk.caught_messages() as window, pv.vtk_verbosity("off"):
+        read = pv.get_reader(file, force_ext=".vtk" if legacy else None).read()
+    if "error" in (written := window.GetOutput()).lower():  # of what is no error it warns, too
+        said = written.partition("\n")[2].partition("\n\n")[0].split("): ", 1)[-1]
+        raise InvalidVolumeError(f"{file} cannot be read ({' '.join(said.split())}): write it anew")
+    data, _ = as_grid(pv.wrap(only_grid(read)), None, None)
     if is_vdi_image(data):
         raise InvalidVolumeError(
             f"{file} is a VDI in its VTK form, not a volume: "
@@ -58,36 +47,4 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
             array = Lazy(data.dimensions[::-1], values.dtype, partial(np.asarray, values))
             volume = partial[Volume](volume_from_vtk, data, key, kind)
             found.append(VolumeInFile(array, "zyx", place, name, meant=meant, volume=volume))
-    if not found:
-        raise InvalidVolumeError(f"{file} holds no scalars that PyVista could read")
     return found
-
-
-def _read(file: Path) -> Any:
-    """Read by PyVista; what VTK would print is raised."""
-    # Legacy files may have any name
-    legacy = head_of(file).startswith(b"# vtk DataFile")
-    with vtk.caught_messages() as window, pv.vtk_verbosity("off"):
-        data = pv.get_reader(file, force_ext=".vtk" if legacy else None).read()
-    written = window.GetOutput()
-    # A warning that says Error is one
-    said = re.findall(r"(?s)(?:ERROR|(?i:warning)): In [^\n]*\n(.*?)(?=\n\n|\Z)", written)
-    for text in (" ".join(one.split()).split("): ", 1)[-1] for one in said):
-        if "rror" in text or "ERROR" in written:
-            raise InvalidVolumeError(f"{file} cannot be read as a volume: {text}: write it anew")
-    return data
-
-
-def steps_of(path: str | os.PathLike[str]) -> tuple[Sequence[Any], tuple[float, ...]]:
-    """Return what a file holds at each of its times, read when it is asked for, and the times.
-
-    There are none where its reader announces none, or it cannot be read.
-    """
-    with contextlib.suppress(Exception):  # of each format; reading one volume says what is wrong
-        reader: Any = pv.get_reader(path)
-        if hasattr(reader, "time_values"):
-            return steps_and_times(reader)
-        # That of legacy .vtk files announces others
-        if Path(path).suffix.lower() in (".vti", ".pvti", ".vtkhdf"):
-            return steps_and_times(reader.reader)
-    return (), ()

@@ -69,9 +69,9 @@ def of_several(folder: Path, volumes: list[pvdi.Volume], camera: pvdi.Camera) ->
 
 def mistakes(grid: pv.ImageData, camera: pvdi.Camera, plotter: pvdi.Plotter) -> None:
     """Make mistakes that a checker of types finds: each is silenced, and would be useless else."""
-    pvdi.generate(grid, camera, (64, 48), max_supersegments="many")  # type: ignore[arg-type]
-    pvdi.generate(grid, camera, (64, 48), colour_map="bone")  # type: ignore[arg-type]
-    pvdi.generate(grid, 5, (64, 48))  # type: ignore[arg-type]
+    pvdi.generate(grid, camera, (64, 48), max_supersegments="many")  # type: ignore[call-overload]
+    pvdi.generate(grid, camera, (64, 48), colour_map="bone")  # type: ignore[call-overload]
+    pvdi.generate(grid, 5, (64, 48))  # type: ignore[call-overload]
     pvdi.render("a.vdi", camera)  # type: ignore[arg-type]
     plotter.add_vdi(grid, precision="half")  # type: ignore[arg-type]
     pvdi.generate_series([grid], 5, (64, 48))  # type: ignore[arg-type]

@@ -115,7 +115,7 @@ def test_compressed_slices_and_those_that_cannot_be_decoded(tmp_path):
         data.PixelData = pydicom.encaps.encapsulate([b"none"])
         data["PixelData"].VR = "OB"
 
-    with pytest.raises(UnsupportedError, match=r"compressed as MPEG2 .*gdcmconv --raw"):
+    with pytest.raises(InvalidVolumeError, match=r"00\.dcm cannot .*MPEG2 .*: write it anew, unc"):
         pvdi.read_volume(write(tmp_path / "mpeg", edit=nobodys))
 
 
@@ -148,7 +148,7 @@ def test_frames_of_one_file_lie_where_it_says(tmp_path):
     check(pvdi.read_volume(tmp_path / "enhanced.dcm"), np.diag(SPACING))
     del enhanced.PerFrameFunctionalGroupsSequence
     enhanced.save_as(tmp_path / "film.dcm", enforce_file_format=True)
-    with pytest.raises(UnsupportedError, match="5 frames that do not say where they lie"):
+    with pytest.raises(InvalidVolumeError, match="5 frames that do not say where they lie"):
         pvdi.read_volume(tmp_path / "film.dcm")
 
 
@@ -180,7 +180,7 @@ def test_a_damaged_slice_is_said(damage, tmp_path):
         last.write_bytes(content[:rows])
     else:
         last.write_bytes(content.replace(b"-10", b"?10", 1))
-    said = rf"1 of 5 files in the folder .*scan are left out.*{last.name} cannot be read"
+    said = rf"1 files or series in the folder .*scan are left out.*{last.name} cannot be read"
     with pytest.warns(VDIWarning, match=said):
         assert pvdi.read_volume(folder).dimensions == (7, 6, 4)
     for path in folder.iterdir():
@@ -202,7 +202,7 @@ def test_slices_that_do_not_make_a_volume(tmp_path):
     at(ORIGIN + 40, (1, 0, 0, 0, 0, -1))
     with pytest.raises(InvalidVolumeError, match="turned against each other"):
         pvdi.read_volume(folder)
-    with pytest.raises(InvalidVolumeError, match=r"00\.dcm holds one slice: give the folder"):
+    with pytest.raises(InvalidVolumeError, match=r"00\.dcm holds .*, or one: give the folder"):
         pvdi.read_volume(folder / "00.dcm")
     (tmp_path / "none").mkdir()
     with pytest.raises(InvalidVolumeError, match=r"none holds no slices .* give the folder"):

@@ -258,11 +258,7 @@ def test_times_channels_and_calibration_of_tiff(tmp_path):
         how["description"] = f"ImageJ=1.53t\nimages=3\nslices=3\n{said}"
         path = tmp_path / f"{name}.tif"
         tifffile.imwrite(path, np.full((3, 4, 5), 40000, np.uint16), **how)
-        if name == "curve":
-            with pytest.warns(pvdi.VDIWarning, match="ImageJ's function 4, which is not applied"):
-                volume = pvdi.read_volume(path)
-        else:
-            volume = pvdi.read_volume(path)
+        volume = pvdi.read_volume(path)
         assert (volume.array.dtype, set(volume.array.ravel())) == (dtype, {means})
 
 
@@ -365,13 +361,8 @@ def test_what_is_no_stack_of_slices_is_refused(tmp_path):
     write_slices(tmp_path, [np.zeros((6, 5), np.uint8), np.zeros((6, 5), np.uint16)])
     with pytest.raises(InvalidVolumeError, match=r"slice_1\.png has .* type uint16"):
         pvdi.read_volume(tmp_path)
-    write_slices(tmp_path, scan(np.uint8)[:2], "tif")
-    with pytest.raises(InvalidVolumeError, match="holds TIFF and PNG files"):
-        pvdi.read_volume(tmp_path)
-    for path in tmp_path.glob("*.tif"):
-        path.unlink()
     (tmp_path / "slice_1.png").write_bytes(b"\x89PNG\r\n\x1a\n")
-    with pytest.raises(InvalidVolumeError, match=r"slice_1\.png cannot be read as a picture"):
+    with pytest.raises(InvalidVolumeError, match=r"slice_1\.png cannot be read as a slice"):
         pvdi.read_volume(tmp_path)
 
 

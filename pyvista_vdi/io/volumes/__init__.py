@@ -1,6 +1,6 @@
 """Volumes in files of many formats: one door, and a thin adapter for each format.
 
-``table.py`` has the formats; ``in_file.py`` makes a volume of what an adapter finds.
+``formats.py`` has the formats; ``in_file.py`` makes a volume of what an adapter finds.
 """
 
 from __future__ import annotations

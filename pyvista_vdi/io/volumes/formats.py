@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import re
 from collections.abc import Callable
 from functools import partial
@@ -14,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVolumeError, warn_external
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.io.axes import in_one_unit, one_unit, to_world
-from pyvista_vdi.io.time_steps import natural_key
+from pyvista_vdi.io.stores import is_store
+from pyvista_vdi.io.time_steps import lists_steps, natural_key
 from pyvista_vdi.io.volumes.dicom import dicom
-from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of, stack
-from pyvista_vdi.model.host_memory import aligned_empty
+from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of, stack
 
 #: Units of length in NIfTI, types in MRC, and what OME and ImageJ call a micrometre.
 _UNITS = {1: "m", 2: "mm", 3: "um"}
@@ -40,22 +41,16 @@ def nrrd(file: Path) -> list[VolumeInFile]:
     if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space", "???"}:
         array, axes, place = _by_itk(file)
         # ITK turns frames that grow to the right and the front: turn them back
-        space = "".join(re.findall(r"(?im)^space: *(\S+)", head)).lower()
-        initials = "".join(word[0] for word in space.split("-")) if "-" in space else space
-        signs = [1 - 2 * (initials[:1] == "r"), 1 - 2 * (initials[1:2] == "a"), 1, 1]
+        right, front = (re.search(f"(?im)^space: *{n}", head) for n in ("r", r"([rl]a|\w+-a)"))
+        signs = [-1 if right else 1, -1 if front else 1, 1, 1]
         return [VolumeInFile(array, axes, np.diag(signs) @ place)]
-
-    def read() -> NDArray[Any]:
-        values, _ = nrrd.read(str(file), index_order="C")
-        array = aligned_empty(values.shape, values.dtype.newbyteorder("="))
-        array[...] = values  # where a CPU device reads it without a copy of its own
-        return array
 
     steps = header.get("space directions", header.get("spacings", np.ones(3)))
     place = to_world(np.transpose(steps), header.get("space origin", np.zeros(3)))
     units = [str(unit) for unit in header.get("space units", header.get("units", ("", "", "")))]
     dtype = np.dtype(nrrd.reader._determine_datatype(header)).newbyteorder("=")
-    lazy = Lazy(header["sizes"][::-1].tolist(), dtype, read)
+    shape, read = header["sizes"][::-1].tolist(), partial(nrrd.read, str(file), index_order="C")
+    lazy = Lazy(shape, dtype, lambda: read()[0])
     return [VolumeInFile(lazy, "zyx", place, str(header.get("content", "")), one_unit(units))]
 
 
@@ -63,12 +58,7 @@ def _by_itk(file: Path) -> tuple[NDArray[Any], str, NDArray[np.float64]]:
     """Return what SimpleITK reads: an array, its axes, and its place in ITK's frame."""
     import SimpleITK
 
-    shown = SimpleITK.ProcessObject.GetGlobalWarningDisplay()
-    SimpleITK.ProcessObject.SetGlobalWarningDisplay(False)
-    try:
-        image = SimpleITK.ReadImage(str(file))
-    finally:
-        SimpleITK.ProcessObject.SetGlobalWarningDisplay(shown)
+    image = SimpleITK.ReadImage(str(file))
     array, n = SimpleITK.GetArrayFromImage(image), image.GetDimension()
     axes = "tzyx"[-n:] if n < 5 else "?" * (n - 4) + "tzyx"
     if (components := image.GetNumberOfComponentsPerPixel()) > 1:
@@ -95,14 +85,13 @@ def nifti(file: Path) -> list[VolumeInFile]:
     n, *counts = short(8, 40).tolist()
     # Refuse values that ITK would fill up with zeros, or that gzip's checksum refuses
     needed = int(real(1, 108)[0]) + np.prod(counts[:n], dtype=object) * int(short(1, 72)[0]) // 8
-    values, size = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name)), 0
+    values = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name))
     with values.open("rb") as plain:
-        unpacked: Any = gzip.open if plain.read(2) == b"\x1f\x8b" else Path.open
-    with unpacked(values, "rb") as stream:
-        while part := stream.read(1 << 24):
-            size += len(part)
+        packed = plain.read(2) == b"\x1f\x8b"
+    with gzip.open(values) if packed else values.open("rb") as stream:
+        size = sum(map(len, iter(partial(stream.read, 1 << 24), b"")))
     if size < needed:
-        raise InvalidVolumeError(f"it has {size} of {needed} bytes: it is cut off")
+        raise ValueError(f"it has {size} of {needed} bytes: it is cut off")
     slope, shift = real(2, 112)
     if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
         array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled
@@ -130,7 +119,7 @@ def mrc(file: Path) -> list[VolumeInFile]:
     words, reals = (np.frombuffer(head, f"{order}{kind}4", 56) for kind in "if")
     shape, mode, mapped = words[2::-1].tolist(), int(words[3]), words[16:19].tolist()
     if head[208:212] != b"MAP " or mode not in _MODES or sorted(mapped) != [1, 2, 3]:
-        raise InvalidVolumeError(f"it is no map, or of a mode ({mode}) that is none of {[*_MODES]}")
+        raise ValueError(f"it is no map, or of a mode ({mode}) that is none of {[*_MODES]}")
     axes = "".join("?xyz"[n] for n in mapped)
     counts = np.maximum(words[7:10], 1)
     step = np.where(reals[10:13] > 0, reals[10:13].astype(np.float64) / counts, 1.0)
@@ -161,21 +150,17 @@ def tiff(file: Path) -> list[VolumeInFile]:
     import tifffile
 
     def read(number: int, down: int) -> NDArray[Any]:
-        with tifffile.TiffFile(file) as again:
-            values = np.flip(again.asarray(series=number), down)
+        values = np.flip(tifffile.imread(file, series=number), down)
         return values if kept is None else (values * slope + shift).astype(kept)
 
     found = []
     with tifffile.TiffFile(file) as opened:
         # ImageJ keeps signed values as unsigned ones, and others by a line
-        said = (opened.imagej_metadata or {}) if opened.is_imagej else {}
+        said = opened.imagej_metadata or {}
         shift, slope = float(said.get("c0", 0.0)), float(said.get("c1", 1.0))
         signed = (slope, shift) == (1, -32768) and opened.series[0].dtype == np.uint16
         function = said.get("cf", 0 if (slope, shift) != (1, 0) else -1)
         kept = np.dtype(np.int16 if signed else np.float32) if function == 0 else None
-        if function not in (-1, 0, 20, 21):  # none, or of an uncalibrated density
-            said = f"{file} calibrates its values by ImageJ's function {function}"
-            warn_external(f"{said}, which is not applied: apply it in ImageJ")
         for number, series in enumerate(opened.series):
             axes = str(series.axes).lower()
             # Of axes that nothing names the last is z
@@ -195,9 +180,8 @@ def tiff(file: Path) -> list[VolumeInFile]:
 
 def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, list[str]]:
     """Return the spacing along x, y and z, its unit and the channels' names, as the file says."""
-    size, unit, alone, names = [1.0, 1.0, 1.0], "", "", []
-    per = page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
-    described = opened.ome_metadata if opened.is_ome else ""
+    size, unit, names = [1.0, 1.0, 1.0], "", []
+    described = opened.ome_metadata
     of_ome = ET.fromstring(described).findall(".//{*}Pixels")[number:] if described else []
     if of_ome:
         x, y, z = (of_ome[0].get(f"PhysicalSize{axis}") for axis in "XYZ")
@@ -205,20 +189,18 @@ def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, l
         names = [channel.get("Name", "") for channel in of_ome[0].findall("{*}Channel")]
         if x:
             size, unit = in_one_unit([float(x), float(y or 1), float(z or 1)], units)
-            alone = "" if z else f"{x} x {y}"
+        if x and not z:
+            said = f"{opened.filename} says that pixels are {x} x {y}, and not how far apart slices"
+            warn_external(f"{said} are: spacing is taken as 1; give spacing=(x, y, z)")
     elif opened.is_imagej:
         entries = opened.imagej_metadata or {}
+        per = page.get_resolution() if {282, 283} <= {*page.tags.keys()} else (0, 0)
         size = [*(1 / n if n else 1.0 for n in per), float(entries.get("spacing", 1.0)) or 1.0]
         unit = str(entries.get("unit", "")).replace("pixel", "")
         unit = "um" if unit in _MICRONS else unit
         names = [str(n) for n in entries.get("Labels", ())]
     elif opened.is_lsm:  # of Zeiss, in metres
         size, unit = [1e6 * float(opened.lsm_metadata[f"VoxelSize{a}"]) for a in "XYZ"], "um"
-    elif int(page.tags.valueof("ResolutionUnit", 1)) == 3 and all(per):
-        alone = f"{10 / per[0]:g} x {10 / per[1]:g} mm"  # an inch's are most often nobody's
-    if alone:
-        said = f"{opened.filename} says that pixels are {alone}, and not how far apart slices are"
-        warn_external(f"{said}: spacing is taken as 1; give spacing=(x, y, z)")
     return size, unit, names
 
 
@@ -237,32 +219,27 @@ def pictures(path: Path) -> list[VolumeInFile]:
     The top row is the last along y, as VTK has pictures.
     """
     files = slices_in(path) if path.is_dir() else [path]
-    if len({file.suffix.lower() == ".png" for file in files}) > 1:
-        raise InvalidVolumeError(f"{path} holds TIFF and PNG files: put those of one volume apart")
     if len(files) < 2:
         raise InvalidVolumeError(f"{path} holds one slice, and a volume needs two: give the folder")
     numbers = [int(n[-1]) for file in files if (n := re.findall(r"\d+", file.stem))]
     if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
         names = f"{files[0].name} to {files[-1].name}, {len(files)} files"
         warn_external(f"slices in {path} are not evenly spaced ({names}): are some missing?")
-    slices = stack(files, _picture)
-    return [VolumeInFile(slices, "zyxs"[: len(slices.shape)])]
 
-
-def _picture(file: Path) -> NDArray[Any]:
-    try:
-        if file.suffix.lower() != ".png":
+    def read(i: int) -> NDArray[Any]:
+        if files[i].suffix.lower() != ".png":
             import tifffile
 
-            return np.asarray(tifffile.imread(file))[::-1]
+            return np.asarray(tifffile.imread(files[i]))[::-1]
         from PIL import Image
 
-        with Image.open(file) as picture:
+        with Image.open(files[i]) as picture:
             found = np.asarray(picture.convert("RGBA") if picture.mode == "P" else picture)
             # Of 16 bits, as older versions have them
             return found.astype(np.uint16 if picture.mode == "I" else found.dtype)[::-1]
-    except Exception as error:  # each format has readers, and exceptions, of its own
-        raise InvalidVolumeError(f"{file} cannot be read as a picture: {error}") from error
+
+    slices = stack(files, read)
+    return [VolumeInFile(slices, "zyxs"[: len(slices.shape)])]
 
 
 def vtk(file: Path) -> list[VolumeInFile]:
@@ -302,3 +279,34 @@ _TABLE: Any = (
 FORMATS = {
     name: VolumeFormat(name, tuple(suffixes.split()), *more) for name, suffixes, *more in _TABLE
 }
+
+
+def format_of(path: str | os.PathLike[str]) -> VolumeFormat:
+    """Return the format of a file, by its name or else by its content, or of a folder.
+
+    HDF5 of any store. What does not exist, or is of no format, is refused with a remedy.
+    """
+    if is_store(path):
+        return FORMATS["HDF5"]
+    file, why = Path(path), ""
+    name = file.name.lower()
+    if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
+        why = "does not exist: check the volume's path, or try pyvista_vdi.examples (--example)"
+    elif file.is_dir():
+        return FORMATS["PNG slices" if slices_in(file) else "DICOM"]
+    elif not file.is_file() or not file.stat().st_size:
+        why = "cannot be read as a volume: it is empty, or no file"
+    elif lists_steps(file):
+        why = "lists time steps: name the file of one, or make a series (pyvista-vdi series)"
+    elif name.endswith((".vdi", ".exr", ".html")):
+        why = "is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
+    if why:
+        raise InvalidVolumeError(f"{file} {why}")
+    for each in FORMATS.values():
+        if name.endswith(each.suffixes):
+            return each
+    head = head_of(file)
+    for each in FORMATS.values():
+        if each.magic and (head.startswith(each.magic) or head[128:].startswith(each.magic)):
+            return each
+    raise UnsupportedError(f"{file} is of no format that is read here: {REMEDY}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError
-from pyvista_vdi.model.host_memory import require_host_memory
+from pyvista_vdi.model.host_memory import aligned_empty, require_host_memory
 from pyvista_vdi.model.volume import Volume
 
 #: What to do with what is not read.
@@ -23,12 +24,10 @@ def head_of(file: Path) -> bytes:
     """Return a file's first bytes, unpacked where it is compressed by gzip."""
     with file.open("rb") as stream:
         head = stream.read(4096)
-    if not head.startswith(b"\x1f\x8b"):
-        return head
-    try:
-        return zlib.decompressobj(wbits=31).decompress(head, 4096)
-    except zlib.error:
-        return b""
+    if head.startswith(b"\x1f\x8b"):
+        with suppress(zlib.error):  # it only begins so
+            return zlib.decompressobj(wbits=31).decompress(head, 4096)
+    return head
 
 
 class Lazy:
@@ -42,25 +41,33 @@ class Lazy:
 
 
 def stack(
-    slices: Sequence[Any], read: Callable[[Any], NDArray[Any]], *, mixed: bool = False
+    files: Sequence[Path], read: Callable[[int], NDArray[Any]], *, mixed: bool = False
 ) -> Lazy:
-    """Return slices of one size as an array along z, of one type unless they are ``mixed``."""
-    first = read(slices[0])
+    """Return slices of one size, read by number, along z; of one type unless ``mixed``."""
+
+    def one(i: int) -> NDArray[Any]:
+        try:
+            return read(i)
+        except Exception as error:  # each format has readers, and exceptions, of its own
+            why = f"({' '.join(str(error).split())}): write it anew, uncompressed"
+            raise InvalidVolumeError(f"{files[i]} cannot be read as a slice {why}") from error
+
+    first = one(0)
 
     def read_all() -> NDArray[Any]:
-        array = np.empty((len(slices), *first.shape), first.dtype)
-        for i, name in enumerate(slices):
-            one = read(name)
-            if one.shape != first.shape or (one.dtype != first.dtype and not mixed):
+        array = np.empty((len(files), *first.shape), first.dtype)
+        for i, file in enumerate(files):
+            values = one(i)
+            if values.shape != first.shape or (values.dtype != first.dtype and not mixed):
                 raise InvalidVolumeError(
-                    f"{name} has {one.shape} pixels of type {one.dtype}, and {slices[0]} "
+                    f"{file} has {values.shape} pixels of type {values.dtype}, and {files[0]} "
                     f"{first.shape} of {first.dtype}: the slices of a volume have one size and type"
                 )
-            array = array.astype(np.promote_types(array.dtype, one.dtype), copy=False)
-            array[i] = one
+            array = array.astype(np.promote_types(array.dtype, values.dtype), copy=False)
+            array[i] = values
         return array
 
-    return Lazy((len(slices), *first.shape), first.dtype, read_all)
+    return Lazy((len(files), *first.shape), first.dtype, read_all)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,20 +166,17 @@ def volume_of(
         )
     if found.volume is not None:
         return found.volume()
-    points = np.prod([count[axis] for axis in kept], dtype=object)
-    require_host_memory(
-        points * found.dtype.itemsize, f"the volume in {file}", "take less", free=True
-    )
-    values = found.array[tuple(slice(None) if a in kept else at.get(a, 0) for a in axes)]
-    if isinstance(values, np.memmap):  # a file that shrinks under a map kills the process
-        values = np.array(values)
-    values = values.transpose([kept.index(a) for a in "zyxs" if a in kept])
+    needed = np.prod([count[axis] for axis in kept], dtype=object) * found.dtype.itemsize
+    require_host_memory(needed, f"the volume in {file}", "take less", free=True)
+    read = found.array[tuple(slice(None) if a in kept else at.get(a, 0) for a in axes)]
+    read = read.transpose([kept.index(a) for a in "zyxs" if a in kept])
+    # Copy, as a file that shrinks under a map kills the process, to where CPU devices need no copy
+    values = aligned_empty(read.shape, read.dtype.newbyteorder("="))
+    values[...] = read
     values = _grey(values, file) if values.ndim == 4 else values
-    # Place it by its map from point index to world coordinates
-    lengths = np.linalg.norm(found.to_world[:3, :3], axis=0)
-    turn = found.to_world[:3, :3] / np.where(lengths > 0, lengths, 1.0)
+    turn = found.to_world[:3, :3] / [length or 1.0 for length in found.spacing]
     name = found.channels[at["c"]] if found.channels else found.name or "values"
-    volume = Volume(values, lengths, found.to_world[:3, 3], turn, name=name)
+    volume = Volume(values, found.spacing, found.to_world[:3, 3], turn, name=name)
     volume.unit = found.unit
     return volume
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.filters.algorithm import announced_times
-from pyvista_vdi.vtk_pipeline.vtk import vtkCompositeDataSet
+from pyvista_vdi.vtk_pipeline.vtk import vtkCompositeDataSet, vtkImageData
 
 
 def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
@@ -27,17 +27,16 @@ def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
     def read(i: int) -> Any:
         if of_pyvista:
             source.set_active_time_point(i)
-            return _only_block(source.read())
+            return only_grid(source.read())
         source.UpdateTimeStep(times[i])
-        data = _only_block(source.GetOutputDataObject(0))
+        data = only_grid(source.GetOutputDataObject(0))
         step = data.NewInstance()
         step.ShallowCopy(data)  # the output is another one at another time
         return step
 
     if not times:
         raise InvalidArgumentError(
-            f"{type(source).__name__} announces no time steps, which a series is made of: use what "
-            "it gives as one volume, or one VDI"
+            f"{type(source).__name__} announces no time steps: use it as one volume, or as one VDI"
         )
     return StepSequence(read, len(times)), times
 
@@ -62,8 +61,8 @@ class StepSequence(Sequence[Any]):
             return self._read(range(self._n)[index])
 
 
-def _only_block(data: Any) -> Any:
-    """Return the only block of a composite data set, as files with times often have; else it."""
+def only_grid(data: Any) -> Any:
+    """Return the only uniform grid of a composite data set, or its only block; else the whole."""
     if not isinstance(data, vtkCompositeDataSet):
         return data
     blocks, iterator = [], data.NewIterator()
@@ -71,4 +70,5 @@ def _only_block(data: Any) -> Any:
     while not iterator.IsDoneWithTraversal():
         blocks.append(iterator.GetCurrentDataObject())
         iterator.GoToNextItem()
-    return blocks[0] if len(blocks) == 1 else data
+    found = [block for block in blocks if isinstance(block, vtkImageData)] or blocks
+    return found[0] if len(found) == 1 else data

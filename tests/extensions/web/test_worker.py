@@ -96,7 +96,7 @@ def test_modules_start_it_and_where_none_may_be_that_is_said_once(folder, serve,
 
 
 @pytest.mark.parametrize("bundler", BUNDLERS)
-def test_bundlers_take_it_with_them(bundler, folder, serve, request):
+def test_bundlers_take_it_with_them(bundler, folder, serve, chromium):
     command = shutil.which(bundler)
     if command is None:
         pytest.skip(f"needs {bundler} in the path: npm install --global {bundler}")
@@ -107,6 +107,6 @@ def test_bundlers_take_it_with_them(bundler, folder, serve, request):
     shutil.copy(folder / "ball.vdi", out)
     if bundler != "vite":
         shutil.copy(folder / "index.html", out)
-    workers, warnings = workers_and_warnings(request.getfixturevalue("chromium"), serve(out))
+    workers, warnings = workers_and_warnings(chromium, serve(out))
     assert workers
     assert not warnings
