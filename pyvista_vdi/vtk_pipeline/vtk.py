@@ -50,7 +50,7 @@ _NAMES = {
     "vtkCommonMath": "vtkMatrix4x4",
     "vtkCommonTransforms": "vtkTransform",
     "vtkFiltersCore": (
-        "vtkCellDataToPointData vtkClipPolyData vtkContourFilter vtkExtractEdges "
+        "vtkCellDataToPointData vtkContourFilter "
         "vtkImageAppend vtkResampleToImage vtkTriangleFilter"
     ),
     "vtkFiltersGeneral": "vtkMultiBlockDataGroupFilter vtkTransformFilter",

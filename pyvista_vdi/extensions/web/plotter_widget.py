@@ -123,6 +123,7 @@ class PlotterWidget(VDIWidget):
         if actor is None:
             return
         self._placed, self.clipping_planes = as_array(actor.GetMatrix()), scene.planes
+        self._opacity_multiplier = actor.opacity_multiplier
         if self._look != (look := look_of(actor)):
             self._look, self.vdi = look, scene.shown
         if actor.series is not None:

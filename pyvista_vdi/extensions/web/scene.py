@@ -11,32 +11,28 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from base64 import b64encode
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import pyvista as pv
 
 from pyvista_vdi.errors import warn_external
 from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
 from pyvista_vdi.extensions.web.page import CONTROLS, POLICY, html_page, viewer
-from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of
+from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of, png
 from pyvista_vdi.model.checks import one_of
-from pyvista_vdi.model.cropping import PRESETS, Cropping
-from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import whole_file
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 
-#: The numbers of a scene's arrays in JavaScript: their names there, by NumPy's.
-_KINDS = {"float32": "Float32Array", "uint8": "Uint8Array"}
-
-#: What is drawn flat in the same place whatever the view.
-_FLAT = ("vtkTextActor", "vtkCornerAnnotation", "vtkScalarBarActor", "vtkLegendBoxActor")
+#: What VTK draws in the same place whatever the view.
+_FIXED = ("vtkTextActor", "vtkCornerAnnotation", "vtkScalarBarActor", "vtkLegendBoxActor")
 
 
 @dataclass
@@ -46,7 +42,7 @@ class Scene:
     shown: Shown | None  # by the viewer itself: the first actor's VDI, series or set
     actor: Any  # that one
     planes: list[list[float]]  # that it is clipped to
-    data: bytes  # all the rest, as scene.js takes it
+    data: bytes  # all the rest, for scene.js: deflated JSON, in which arrays are base64
     background: str  # as CSS has it
     left_out: list[str]  # what is not shown, by name
 
@@ -78,27 +74,36 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     names = {prop: name for name, prop in getattr(renderer, "actors", {}).items()}
     left_out = _effects(renderer)
     meshes: list[dict[str, Any]] = []
-    vdis: list[Any] = []  # tuples of the actor, the series or set, the VDI, and where it is seen
+    vdis: list[dict[str, Any]] = []  # the first one is the viewer's own: a series or set if any is
+    boxes: list[Any] = []
     flat: list[Any] = []
-    of_this_view: list[Any] = []
+    actor: Any = None
+    shown: Any = None
 
-    # Sort what is drawn into VDIs, meshes and what is flat
-    for prop in filter(lambda prop: prop.GetVisibility(), renderer.GetViewProps()):
+    # Sort what is drawn into VDIs, meshes and what VTK draws into the picture
+    visible = [prop for prop in renderer.GetViewProps() if prop.GetVisibility()]
+    visible.sort(key=lambda p: is_vdi(p) and not (p.series or p.vdi_set))
+    for prop in visible:
         missing: list[str] = []
         if is_vdi(prop):
             matrix, several = as_array(prop.GetMatrix()), prop.series or prop.vdi_set
             vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
-            if vdi is not None:
-                limits = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
-                vdis.append((prop, several, _thinned(vdi, prop.opacity_multiplier), limits))
-                # The viewer plays the first series, or follows the first set
-                if several is not None and sum(each[1] is not None for each in vdis) > 1:
-                    missing.append(f"all but one of {len(several)} VDIs")
-        elif any(prop.IsA(kind) for kind in _FLAT):
-            flat.append(prop)
+            if vdi is None:
+                continue
+            where = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
+            file = None if actor is None else bare_file(vdi)
+            vdis.append({**where, "opacity": prop.opacity_multiplier, "file": file})
+            boxes.append(np.reshape(prop.GetBounds(), (3, 2)).T)
+            if actor is None:
+                actor, shown = prop, vdi if several is None else several
+                if several is not None and several.value_range is not None:  # pages show colours
+                    shown = several.classified(volume_property=prop.GetProperty())
+            elif several is not None:
+                missing.append(f"all but one of {len(several)} VDIs")
         elif prop.IsA("vtkActor2D") or prop.IsA("vtkCubeAxesActor"):
-            of_this_view.append(prop)
-            missing.append("its place in other views than the first")
+            flat.append(prop)
+            if not any(prop.IsA(kind) for kind in _FIXED):
+                missing.append("its place in other views than the first")
         elif isinstance(prop, vtk.vtkActor):
             meshes += _meshes(prop, missing)
         else:
@@ -106,34 +111,15 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
         # By the name that it was given, or else its class
         name = re.split(r"\((?:Addr|0x)", names.get(prop, ""))[0] or type(prop).__name__
         left_out += [f"{what} ({name})" for what in missing]
-    vdis.sort(key=lambda each: each[1] is None)
-    boxes = [np.reshape(actor.GetBounds(), (3, 2)).T for actor, *_ in vdis]
     if any((a[0] < b[1]).all() and (b[0] < a[1]).all() for a, b in combinations(boxes, 2)):
         left_out.append("the mixing of VDIs that overlap")
+    left_out += ["the turning of axes"] * bool(_axes(renderer))
 
-    # Have VTK draw what is flat: that of all views, and that of this one
-    others = _around(renderer)
-    left_out += ["axes in other views than the first"] * bool(others)
-    camera = viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
-    head = {
-        "camera": None if follow else camera,
-        "view": camera,
-        "size": list(renderer.GetSize()),
-        "meshes": meshes,
-        "pictures": [_picture(renderer, flat), _picture(renderer, of_this_view, others)],
-        "vdis": [  # the first one is the viewer's own
-            {**limits, "file": np.frombuffer(bare_file(vdi), np.uint8) if k else None}
-            for k, (_, _, vdi, limits) in enumerate(vdis)
-        ],
-    }
-    first: Any = vdis[0] if vdis else (None, None, None, {"planes": []})
-    actor, several, shown, limits = first
-    if several is not None:
-        if several.value_range is not None:  # pages show colours
-            several = several.classified(volume_property=actor.GetProperty())
-        factor = actor.opacity_multiplier
-        shown = several if factor == 1 else several._mapped(lambda vdi: _thinned(vdi, factor))
-    return Scene(shown, actor, limits["planes"], _packed(head), _background(renderer), left_out)
+    camera = None if follow else viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
+    head = {"camera": camera, "meshes": meshes, "picture": _picture(renderer, flat), "vdis": vdis}
+    text = json.dumps(head, default=lambda numbers: b64encode(numbers).decode())
+    data, planes = zlib.compress(text.encode(), 6), vdis[0]["planes"] if vdis else []
+    return Scene(shown, actor, planes, data, _background(renderer), left_out)
 
 
 def state_of(renderer: Any) -> Any:
@@ -142,9 +128,10 @@ def state_of(renderer: Any) -> Any:
     for prop in renderer.GetViewProps():
         own = prop.GetRedrawMTime()
         if is_vdi(prop):  # its mapper is modified in each frame
-            own = (look_of(prop), as_array(prop.GetMatrix()).tolist(), _planes(prop, []))
+            matrix = as_array(prop.GetMatrix()).tolist()
+            own = (look_of(prop), prop.opacity_multiplier, matrix, _planes(prop, []))
         states.append((prop.GetAddressAsString(""), bool(prop.GetVisibility()), own))
-    others = [(other.GetAddressAsString(""), other.GetViewport()) for other in _around(renderer)]
+    others = [(other.GetAddressAsString(""), other.GetViewport()) for other in _axes(renderer)]
     return states, renderer.GetSize(), _background(renderer), others
 
 
@@ -152,33 +139,17 @@ def look_of(actor: Any) -> Any:
     """Return what decides which VDIs an actor shows."""
     several = actor.series or actor.vdi_set
     if several is None:
-        return actor.vdi, actor.opacity_multiplier
+        return actor.vdi
     classified_at = None if several.value_range is None else actor.GetProperty().GetMTime()
-    return several, len(several), actor.opacity_multiplier, classified_at  # sets may grow
-
-
-def _thinned(vdi: VDI, multiplier: float) -> VDI:
-    """Return a VDI with its optical depths multiplied."""
-    if multiplier == 1:
-        return vdi
-    names = ("camera", "window_size", "offsets", "front", "back", "color", "bounds")
-    same = {name: getattr(vdi, name) for name in (*names, "depth_origin", "metadata")}
-    return VDI(**same, optical_depth=vdi.optical_depth * np.float32(multiplier))
+    return several, len(several), classified_at  # sets may grow
 
 
 def _planes(actor: Any, missing: list[str]) -> list[list[float]]:
-    """Return the planes that an actor is clipped and cropped to, origin and normal, world."""
-    mapper, matrix = actor.GetMapper(), as_array(actor.GetMatrix())
-    clipping, cropping = mapper.GetClippingPlanes() or (), Cropping.from_any(mapper)
+    """Return the planes that an actor is clipped to, origin and normal, world."""
+    clipping = actor.GetMapper().GetClippingPlanes() or ()
     planes = [[*plane.GetOrigin(), *plane.GetNormal()] for plane in clipping]
-    if cropping is not None and cropping.regions != PRESETS["subvolume"]:
-        missing.append("cropping to other than a box")
-    elif cropping is not None:
-        for number, place in enumerate(cropping.planes):
-            normal = np.asarray(cropping.normals[number // 2])
-            point = matrix @ np.append(place * normal / (normal @ normal), 1.0)
-            inwards = (1 - 2 * (number % 2)) * normal @ np.linalg.inv(matrix[:3, :3])
-            planes.append([*point[:3].tolist(), *inwards.tolist()])
+    if actor.GetMapper().GetCropping():
+        missing.append("cropping")
     if len(planes) > MOST_PLANES:
         missing.append(f"{len(planes) - MOST_PLANES} of its clipping planes")
     return planes[:MOST_PLANES]
@@ -190,39 +161,36 @@ def _meshes(actor: Any, missing: list[str]) -> Iterator[dict[str, Any]]:
     kind = None if mapper is None else mapper.GetClassName()
     if kind not in ("vtkDataSetMapper", "vtkPolyDataMapper", "vtkOpenGLPolyDataMapper"):
         missing.append(f"what {kind} draws")
-        return
-    if actor.HasTranslucentPolygonalGeometry():
+    elif actor.HasTranslucentPolygonalGeometry():
         missing.append("what is translucent")
+    elif look.GetRepresentation() == 1:
+        missing.append("its wireframe")
+    if missing:
         return
-    looks = {
-        "edges": look.GetEdgeVisibility(),
-        "vertices": look.GetVertexVisibility(),
-        "a texture": actor.GetTexture() is not None,
-        "physically based shading": look.GetInterpolation() == 3,
-        "highlights and ambient light": look.GetSpecular() > 0 or look.GetAmbient() > 0,
-        "culling": look.GetFrontfaceCulling() or look.GetBackfaceCulling(),
-        "tubes and spheres": look.GetRenderLinesAsTubes() or look.GetRenderPointsAsSpheres(),
-    }
-    missing += [what for what, is_used in looks.items() if is_used]
 
-    # Take the surface to the world, clip it, and divide it into triangles, lines and points
+    # Take the surface to the world, and divide it into triangles, lines and points
     mapper.Update()
     transform, placed = vtk.vtkTransform(), vtk.vtkTransformFilter()
     transform.SetMatrix(actor.GetMatrix())
     placed.SetTransform(transform)
     poly = mapper.GetInputDataObject(0, 0)
-    steps = [] if isinstance(poly, vtk.vtkPolyData) else [vtk.vtkDataSetSurfaceFilter()]
-    steps.append(placed)
-    for plane in mapper.GetClippingPlanes() or ():
-        steps.append(vtk.vtkClipPolyData())
-        steps[-1].SetClipFunction(plane)
-    steps += [vtk.vtkExtractEdges()] if look.GetRepresentation() == 1 else []  # a wireframe
-    for step in [*steps, vtk.vtkTriangleFilter()]:
+    for step in (vtk.vtkDataSetSurfaceFilter(), placed, vtk.vtkTriangleFilter()):
         step.SetInputData(poly)
         step.Update()
         poly = step.GetOutput()
     if poly.GetNumberOfPoints() == 0:
         return
+    looks = {
+        "clipping planes": mapper.GetNumberOfClippingPlanes(),
+        "edges and vertices": look.GetEdgeVisibility() or look.GetVertexVisibility(),
+        "a texture": actor.GetTexture(),
+        "physically based shading": look.GetInterpolation() == 3,
+        "highlights and ambient light": look.GetSpecular() > 0 or look.GetAmbient() > 0,
+        "culling": look.GetFrontfaceCulling() or look.GetBackfaceCulling(),
+        "tubes and spheres": look.GetRenderLinesAsTubes() or look.GetRenderPointsAsSpheres(),
+        "the width of lines": look.GetLineWidth() > 1 and poly.GetNumberOfLines(),
+    }
+    missing += [what for what, is_used in looks.items() if is_used]
 
     # Have VTK colour points or cells
     points = vtk.vtk_to_numpy(poly.GetPoints().GetData()).astype(np.float64)
@@ -234,14 +202,11 @@ def _meshes(actor: Any, missing: list[str]) -> Iterator[dict[str, Any]]:
     colors = np.tile(np.rint(255 * np.array(look.GetDiffuseColor())), (len(points), 1))
     if mapped is not None:
         colors = vtk.vtk_to_numpy(mapped).reshape(mapped.GetNumberOfTuples(), -1)[:, :3]
-    colors = np.insert(colors.astype(np.uint8), 3, 255, axis=1)
     of_each_cell = mapped is not None and bool(int(of_cells))
     normals = poly.GetPointData().GetNormals() if look.GetInterpolation() > 0 else None
-    normals = None if normals is None else vtk.vtk_to_numpy(normals).astype(np.float32)
 
     # Send the points of each kind of cell about their middle, as browsers compute in float32
-    low, high, first = points.min(axis=0), points.max(axis=0), 0
-    middle = (low + high) / 2
+    first, middle = 0, poly.GetCenter()
     kinds = {"points": poly.GetVerts(), "lines": poly.GetLines(), "triangles": poly.GetPolys()}
     for corners, (kind, cells) in enumerate(kinds.items(), 1):
         used = vtk.vtk_to_numpy(cells.GetConnectivityArray())
@@ -249,93 +214,70 @@ def _meshes(actor: Any, missing: list[str]) -> Iterator[dict[str, Any]]:
         first += cells.GetNumberOfCells()
         if len(used) == 0:
             continue
-        shown = "points" if look.GetRepresentation() == 0 else kind
-        lit = shown == "triangles" and bool(look.GetLighting())
-        if shown == "lines" and look.GetLineWidth() > 1:
-            missing.append("the width of lines")
         yield {
-            "kind": shown,
-            "half": ((high - low) / 2).tolist(),
-            "origin": middle.tolist(),
+            "kind": kind if look.GetRepresentation() else "points",
+            "origin": middle,
+            "radius": poly.GetLength() / 2,
             "points": (points[used] - middle).astype(np.float32),
-            "colors": colors[owner if of_each_cell else used],
-            "normals": normals[used] if lit and normals is not None else None,
-            "lit": lit,
+            "colors": colors[owner if of_each_cell else used].astype(np.uint8),
+            "normals": None if normals is None else vtk.vtk_to_numpy(normals)[used].astype("f4"),
+            "lit": bool(look.GetLighting()),
             "size": look.GetPointSize(),
         }
 
 
-def _around(renderer: Any) -> list[Any]:
-    """Return the renderers that draw axes before a renderer, within its viewport."""
-    own = getattr(getattr(renderer, "parent", None), "renderers", ())
-    window = renderer.GetRenderWindow()
-    if not own or window is None:
-        return []
-    known = {*own, getattr(own, "border_overlay_renderer", None)}
-    low, high = np.reshape(renderer.GetViewport(), (2, 2))
+def _axes(renderer: Any) -> list[Any]:
+    """Return the renderers of axes in front of a renderer: VTK's own, within its viewport."""
     found = []
-    for other in window.GetRenderers():
-        middle = np.reshape(other.GetViewport(), (2, 2)).mean(axis=0)
-        inside = (low < middle).all() and (middle < high).all()
-        if other not in known and inside and other.GetLayer() > renderer.GetLayer():
-            found += [other] if other.GetDraw() and other.VisibleActorCount() else []
+    for other in renderer.GetRenderWindow().GetRenderers():
+        drawn = other.GetDraw() and other.VisibleActorCount() and not isinstance(other, pv.Renderer)
+        inside = renderer.IsInViewport(*map(int, other.GetCenter()))
+        if drawn and inside and other.GetLayer() > renderer.GetLayer():
+            found.append(other)
     return found
 
 
-def _picture(renderer: Any, props: list[Any], others: Sequence[Any] = ()) -> Any:
-    """Draw props, and what other renderers draw, alone; return the bytes of a PNG file."""
+def _picture(renderer: Any, flat: list[Any]) -> str | None:
+    """Draw what lies over a renderer's scene, and its axes, alone; return it as base64 PNG."""
     from PIL import Image
 
-    if not props and not others:
+    axes = _axes(renderer)
+    if not flat and not axes:
         return None
     # Lend them to a window of its own
-    window = vtk.vtkRenderWindow()
+    own, window = renderer.GetRenderWindow(), vtk.vtkRenderWindow()
     window.SetOffScreenRendering(1)
     window.AlphaBitPlanesOn()
-    window.SetNumberOfLayers(1 + len(others))
-    window.SetSize(*renderer.GetSize())
-    low, high = np.reshape(renderer.GetViewport(), (2, 2))
-    for layer, source in enumerate((renderer, *others)):
-        twin, camera = vtk.vtkRenderer(), vtk.vtkCamera()
-        camera.DeepCopy(source.GetActiveCamera())
-        twin.SetActiveCamera(camera)
+    window.SetNumberOfLayers(1 + len(axes))
+    window.SetSize(*own.GetSize())
+    for layer, source in enumerate((renderer, *axes)):
+        twin = vtk.vtkRenderer()
+        twin.SetActiveCamera(source.GetActiveCamera())
         twin.SetLayer(layer)
         twin.SetBackgroundAlpha(0)
-        place = (np.reshape(source.GetViewport(), (2, 2)) - low) / (high - low)
-        twin.SetViewport(*place.clip(0, 1).ravel())
-        for prop in props if layer == 0 else source.GetViewProps():
-            prop.ReleaseGraphicsResources(renderer.GetRenderWindow())
+        twin.SetViewport(source.GetViewport())
+        for prop in source.GetViewProps() if layer else flat:
+            prop.ReleaseGraphicsResources(own)
             twin.AddViewProp(prop)
         window.AddRenderer(twin)
     window.Render()
+    (left, bottom), (width, height) = renderer.GetOrigin(), renderer.GetSize()
     pixels = vtk.vtkUnsignedCharArray()
-    width, height = window.GetSize()
-    window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, pixels)
-    for twin in window.GetRenderers():
-        for prop in twin.GetViewProps():
-            prop.ReleaseGraphicsResources(window)
-        twin.RemoveAllViewProps()
-    window.Finalize()
+    window.GetRGBACharPixelData(left, bottom, left + width - 1, bottom + height - 1, 0, pixels)
+    window.Finalize()  # which frees what the props have there
     # Of premultiplied colours, the lowest row first
-    stream, data = io.BytesIO(), bytes(pixels)
-    image = Image.frombytes("RGBa", (width, height), data, "raw", "RGBa", 0, -1)
-    image.convert("RGBA").save(stream, format="png")
-    return np.frombuffer(stream.getvalue(), np.uint8)
+    image = Image.frombytes("RGBa", (width, height), bytes(pixels), "raw", "RGBa", 0, -1)
+    return png(np.asarray(image.convert("RGBA")))
 
 
 def _effects(renderer: Any) -> list[str]:
     """Name what changes a renderer's picture as a whole, and cannot be shown."""
-    window = renderer.GetRenderWindow()
-    behind = [other for other in window.GetRenderers() if other.GetLayer() < renderer.GetLayer()]
-    gradient = renderer.GetGradientBackground() and renderer.GetGradientMode() != 0
     effects = {
-        "its render pass": renderer.GetPass() is not None,
-        "enable_hidden_line_removal": renderer.GetUseHiddenLineRemoval(),
-        "enable_stereo_render": window.GetStereoRender(),
-        "enable_shadows": renderer.GetUseShadows(),
-        "add_background_image": any(other.VisibleActorCount() for other in behind),
+        "its render pass or shadows": renderer.GetPass() or renderer.GetUseShadows(),
+        "enable_stereo_render": renderer.GetRenderWindow().GetStereoRender(),
+        "add_background_image": renderer.GetLayer() > 0,  # its renderer is behind
         "the background's texture (set_environment_texture)": renderer.GetTexturedBackground(),
-        "a background's gradient other than from the bottom to the top": gradient,
+        "a background's gradient": renderer.GetGradientBackground() and renderer.GetGradientMode(),
     }
     return [name for name, is_used in effects.items() if is_used]
 
@@ -345,24 +287,6 @@ def _background(renderer: Any) -> str:
     colors = (renderer.GetBackground(), renderer.GetBackground2())
     low, high = ("rgb({:%} {:%} {:%})".format(*color) for color in colors)
     return f"linear-gradient(to top, {low}, {high})" if renderer.GetGradientBackground() else low
-
-
-def _packed(head: dict[str, Any]) -> bytes:
-    """Return the length of a JSON text, the text, and arrays one behind the other; deflated.
-
-    In the text arrays stand by their numbers.
-    """
-    arrays: list[list[Any]] = []  # of each its kind, where it begins, and its size
-    parts: list[bytes] = []
-
-    def kept(array: NDArray[Any]) -> int:
-        arrays.append([_KINDS[array.dtype.name], sum(map(len, parts)), array.size])
-        parts.append(array.tobytes() + b"\0" * (-array.nbytes % 4))
-        return len(parts) - 1
-
-    text = json.dumps(head, default=kept)[:-1] + f',"arrays":{json.dumps(arrays)}}}'
-    text += " " * (-len(text) % 4)
-    return zlib.compress(len(text).to_bytes(4, "little") + text.encode() + b"".join(parts), 6)
 
 
 def export_html(
@@ -376,8 +300,7 @@ def export_html(
 
     # Draw it, off-screen where it has not been shown
     window = plotter.render_window
-    if plotter._first_time:  # as Plotter.show begins
-        plotter._on_first_render_request()
+    plotter._on_first_render_request()  # as Plotter.show begins
     off_screen = window.GetOffScreenRendering()
     window.SetOffScreenRendering(off_screen or not window.GetMapped())
     try:
@@ -422,7 +345,6 @@ def export_html(
 
 def part_of(picture: Any, renderer: Any) -> Any:
     """Return the part of a window's picture that a renderer has drawn."""
-    left, bottom, right, top = renderer.GetViewport()
-    height, width = picture.shape[:2]
-    rows = slice(round(height * (1 - top)), round(height * (1 - bottom)))
-    return picture[rows, round(width * left) : round(width * right)]
+    (left, bottom), (width, height) = renderer.GetOrigin(), renderer.GetSize()
+    top = len(picture) - bottom - height
+    return picture[top : top + height, left : left + width]

@@ -136,6 +136,7 @@ def picture(
     background: Sequence[float] | None = None,
     clipping_planes: ArrayLike | None = None,
     placed: ArrayLike | None = None,
+    opacity_multiplier: float = 1.0,
 ) -> NDArray[np.uint8]:
     """Return what a viewer shows: uint8 (H, W, 3) RGB, or (H, W, 4) without a background.
 
@@ -143,7 +144,8 @@ def picture(
     """
     placed = vdi.camera.model_transform if placed is None else placed
     view = camera_of(camera).replace(model_transform=placed)
-    return to_bytes(render(vdi, view, window_size, clipping_planes=clipping_planes), background)
+    how: Any = {"clipping_planes": clipping_planes, "opacity_multiplier": opacity_multiplier}
+    return to_bytes(render(vdi, view, window_size, **how), background)
 
 
 def still(vdi: VDI, camera: Any = None, *, longest: int = 800, **how: Any) -> str | None:

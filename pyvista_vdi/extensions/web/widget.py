@@ -173,6 +173,7 @@ class VDIWidget(anywidget.AnyWidget):
 
     _esm = viewer_script("scene.js", module=True) + _RENDER
     _placed: Any = None  # where the model is in the world, where its VDI does not say it
+    _opacity_multiplier = 1.0
     _file = traitlets.Bytes().tag(sync=True)
     _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
     _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
@@ -289,8 +290,9 @@ class VDIWidget(anywidget.AnyWidget):
         seen = of_viewers.seen_of(self._vdi, **seen_by, **self._first_look)
         color = self.background
         rgb = None if color is None else [value / 255 for value in bytes.fromhex(color[1:])]
-        planes, placed = self.clipping_planes, self._placed
-        return seen, self.camera, {"background": rgb, "clipping_planes": planes, "placed": placed}
+        how = {"clipping_planes": self.clipping_planes, "placed": self._placed}
+        how["opacity_multiplier"] = self._opacity_multiplier
+        return seen, self.camera, {"background": rgb, **how}
 
     def _sent(self, shown: Any, *, coarse: bool = True) -> bytes:
         """Return the file that the browser is sent."""

@@ -47,7 +47,8 @@ export class GrowingBytes {
   }
 }
 
-function bytesOfBase64(text) {
+/** What a base64 text holds. */
+export function bytesOfBase64(text) {
   try {
     if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
     const letters = atob(text), bytes = new Uint8Array(letters.length);

@@ -1,6 +1,6 @@
-// What a plotter shows beside a VDI: plain meshes, other VDIs, and pictures that VTK has drawn of
+// What a plotter shows beside a VDI: plain meshes, other VDIs, and a picture that VTK has drawn of
 // texts, scalar bars and axes, as web/scene.py packs them.
-import { VDIFileError } from "./bytes.js";
+import { bytesOfBase64, VDIFileError } from "./bytes.js";
 import { emptyTexture, programOf } from "./graphics.js";
 import { load } from "./loader.js";
 import { Raycaster } from "./raycast.js";
@@ -14,16 +14,14 @@ const PLACES = ["position", "color", "normal"];
 
 // View coordinates are VTK's: x to the right, y up, z to the viewer.
 const MESH_VERTEX_SHADER = `#version 300 es
-in vec3 position, normal;
-in vec4 color;
+in vec3 position, color, normal;
 uniform mat3 axes;     // from the world to view coordinates
 uniform vec3 offset;   // of the mesh's origin, view coordinates
 uniform vec4 lens;     // half the width and height, and the window's centre
 uniform vec2 range;    // clip z: range.x * depth + range.y
 uniform bool parallel;
 uniform float size;    // of points, pixels
-out vec3 seenFrom, seenNormal;
-out vec4 tint;
+out vec3 seenFrom, seenNormal, tint;
 void main() {
   seenFrom = axes * position + offset;
   seenNormal = axes * normal;
@@ -35,15 +33,14 @@ void main() {
 
 const MESH_FRAGMENT_SHADER = `#version 300 es
 precision highp float;
-in vec3 seenFrom, seenNormal;
-in vec4 tint;
+in vec3 seenFrom, seenNormal, tint;
 uniform bool depths;   // view depths are written, in place of colours
 uniform bool lit, smoothed;
 out vec4 seen;
 void main() {
   vec3 normal = smoothed ? seenNormal : cross(dFdx(seenFrom), dFdy(seenFrom));
   float headlight = lit ? abs(normalize(normal).z) : 1.0;
-  seen = depths ? vec4(-seenFrom.z) : vec4(headlight * tint.rgb, 1.0);
+  seen = depths ? vec4(-seenFrom.z) : vec4(headlight * tint, 1.0);
 }`;
 
 
@@ -54,8 +51,8 @@ export class Scene {
   #drawn = null; // the view whose meshes they hold
   #meshes = [];
   #bodies = []; // VDIs; the first is the viewer's own
-  #pictures = []; // of all views, and of the view that the scene was made in
-  #annotated = new WeakMap(); // canvases, and what was drawn there
+  #picture = null;
+  #annotated = new WeakMap(); // canvases, and as how large it was drawn there
 
   /** The view that the scene begins in, if it says one; null before it is loaded. */
   camera = null;
@@ -68,7 +65,7 @@ export class Scene {
 
   /** @param {Uint8Array} bytes What web/scene.py makes. */
   constructor(bytes) {
-    /** Fulfilled when meshes and pictures are there. */
+    /** Fulfilled when meshes and the picture are there. */
     this.loaded = this.#load(bytes);
     /** Fulfilled when all can be drawn. */
     this.whole = this.loaded.then((others) => Promise.all(others)).then(() => {
@@ -80,21 +77,21 @@ export class Scene {
 
   // Returns promises of the VDIs that are in it.
   async #load(bytes) {
-    const { head, arrays } = await unpackedScene(bytes);
-    this.#pictures = await Promise.all(head.pictures.map((number) =>
-      number === null ? null : createImageBitmap(new Blob([arrays[number]]))));
+    const head = await unpackedScene(bytes);
+    const floats = (text) => new Float32Array(bytesOfBase64(text).buffer);
+    this.#picture = head.picture && await createImageBitmap(new Blob([bytesOfBase64(head.picture)]));
     this.#meshes = head.meshes.map(({ points, colors, normals, ...mesh }) => ({
-      ...mesh, attributes: [arrays[points], arrays[colors], arrays[normals]],
+      ...mesh, attributes: [floats(points), bytesOfBase64(colors), normals && floats(normals)],
     }));
-    this.#bodies = head.vdis.map(({ planes, matrix }) => ({
-      planes: planes.map((p) => ({ origin: p.slice(0, 3), normal: p.slice(3) })), matrix,
+    this.#bodies = head.vdis.map(({ planes, matrix, opacity }) => ({
+      planes: planes.map((p) => ({ origin: p.slice(0, 3), normal: p.slice(3) })), matrix, opacity,
       prepared: null, raycaster: null,
     }));
     this.head = head;
     this.camera = head.camera;
     this.changed();
     return head.vdis.map(({ file }, k) => file === null ? null
-      : load(arrays[file], { onLevel: (prepared) => this.#take(k, prepared) }));
+      : load(bytesOfBase64(file), { onLevel: (prepared) => this.#take(k, prepared) }));
   }
 
   #take(k, prepared) {
@@ -169,7 +166,7 @@ export class Scene {
 
   // The farthest first: by the middles of their boxes.
   #drawVDIs(raycaster, view) {
-    const { camera, clippingPlanes } = view;
+    const { camera, look, clippingPlanes } = view;
     const [, , forward] = cameraAxes(camera);
     const placed = this.#bodies.map((body, k) => ({ ...body, caster: k ? body.raycaster : raycaster }))
       .filter(({ caster }) => caster?.vdi).map((body) => {
@@ -178,9 +175,10 @@ export class Scene {
         const world = body.matrix.slice(0, 3).map((row) => dot(row, middle) + row[3]);
         return { ...body, depth: dot(forward, subtract(world, camera.position)) };
       });
-    for (const { caster, matrix, planes } of placed.sort((a, b) => b.depth - a.depth)) {
+    for (const { caster, matrix, opacity, planes } of placed.sort((a, b) => b.depth - a.depth)) {
       caster.draw({
         ...view, camera: { ...camera, model_transform: matrix },
+        look: { ...look, opacity: look.opacity * opacity },
         depthTexture: this.#meshes.length ? this.#buffers.depth : null,
         clippingPlanes: [...planes, ...clippingPlanes],
       });
@@ -194,9 +192,9 @@ export class Scene {
     const axes = cameraAxes(camera), parallel = isParallel(camera);
     axes[2] = axes[2].map((x) => -x);
     const from = (point) => axes.map((axis) => dot(axis, subtract(point, camera.position)));
-    const ends = this.#meshes.map(({ origin, half }) => {
-      const depth = -from(origin)[2], reach = dot(half, axes[2].map(Math.abs));
-      return [depth - reach, depth + reach];
+    const ends = this.#meshes.map(({ origin, radius }) => {
+      const depth = -from(origin)[2];
+      return [depth - radius, depth + radius];
     });
     const [least, most] = [Math.min(...ends.map(([a]) => a)), Math.max(...ends.map(([, b]) => b))];
     const room = 0.01 * (most - least) + 1e-6 * Math.abs(most) + 1e-18, far = most + room;
@@ -219,7 +217,7 @@ export class Scene {
       gl.uniform1i(u.depths, !pass);
       for (const { kind, origin, lit, size, attributes, drawn } of this.#meshes) {
         gl.uniform3f(u.offset, ...from(origin));
-        gl.uniform1i(u.lit, lit);
+        gl.uniform1i(u.lit, lit && kind === "triangles");
         gl.uniform1i(u.smoothed, Boolean(attributes[2]));
         gl.uniform1f(u.size, Math.max(1, size * density));
         gl.bindVertexArray(drawn.array);
@@ -233,30 +231,26 @@ export class Scene {
     gl.bindVertexArray(null);
   }
 
-  // -- pictures that VTK has drawn ---------------------------------------------------------------
+  // -- the picture that VTK has drawn ------------------------------------------------------------
 
-  /** Draw texts, scalar bars and axes into a canvas, made as large as the picture. */
-  annotate(canvas, camera, [width, height]) {
-    const { view, size } = this.head ?? {};
-    const begun = view && ["position", "focal_point", "view_up"].every((name) =>
-      Math.hypot(...subtract(view[name], camera[name])) <= 1e-6 * Math.hypot(...view[name]));
-    const shown = this.#pictures.filter((picture, k) => picture && (k === 0 || begun));
-    const key = JSON.stringify([width, height, shown.length, Boolean(begun)]);
+  /** Draw texts, scalar bars and axes into a canvas, made as large as the viewer's picture. */
+  annotate(canvas, [width, height]) {
+    const key = `${width} ${height} ${Boolean(this.#picture)}`;
     if (this.#annotated.get(canvas) === key) return;
     this.#annotated.set(canvas, key);
     [canvas.width, canvas.height] = [width, height]; // which clears it
-    for (const picture of shown) {
-      const scale = Math.min(width / size[0], height / size[1]);
-      const [wide, high] = size.map((edge) => edge * scale);
-      canvas.getContext("2d").drawImage(picture, (width - wide) / 2, (height - high) / 2, wide, high);
-    }
+    if (!this.#picture) return;
+    const size = [this.#picture.width, this.#picture.height];
+    const scale = Math.min(width / size[0], height / size[1]);
+    const [wide, high] = size.map((edge) => edge * scale);
+    canvas.getContext("2d").drawImage(this.#picture, (width - wide) / 2, (height - high) / 2, wide, high);
   }
 
   /** Lay them over a picture: premultiplied RGBA, top row first. */
-  layTexts(data, camera, size) {
-    if (!this.#pictures.some(Boolean)) return;
+  layTexts(data, size) {
+    if (!this.#picture) return;
     const canvas = new OffscreenCanvas(...size);
-    this.annotate(canvas, camera, size);
+    this.annotate(canvas, size);
     const { data: over } = canvas.getContext("2d").getImageData(0, 0, ...size);
     for (let k = 0; k < data.length; ++k) {
       const opacity = over[k | 3] / 255, straight = (k & 3) === 3 ? 255 : over[k];
@@ -305,16 +299,11 @@ export class Scene {
   }
 }
 
-// The head and the arrays of a packed scene.
+// What web/scene.py has packed; arrays are base64 texts.
 async function unpackedScene(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   try {
-    const buffer = await new Response(stream).arrayBuffer();
-    const length = new DataView(buffer).getUint32(0, true);
-    const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-    const kinds = { Float32Array, Uint8Array };
-    const arrays = head.arrays.map(([name, at, count]) => new kinds[name](buffer, 4 + length + at, count));
-    return { head, arrays };
+    return await new Response(stream).json();
   } catch {
     throw new VDIFileError("the scene beside the VDI is damaged: load it again, or export it anew");
   }
@@ -326,12 +315,12 @@ function uploaded(gl, attributes) {
   gl.bindVertexArray(array);
   for (const [place, data] of attributes.entries()) {
     if (!data) continue;
-    const [size, type] = data instanceof Uint8Array ? [4, gl.UNSIGNED_BYTE] : [3, gl.FLOAT];
+    const bytes = data instanceof Uint8Array;
     buffers.push(gl.createBuffer());
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.at(-1));
     gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
     gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, size, type, size === 4, 0, 0);
+    gl.vertexAttribPointer(place, 3, bytes ? gl.UNSIGNED_BYTE : gl.FLOAT, bytes, 0, 0);
   }
   gl.bindVertexArray(null);
   return { array, buffers };
@@ -353,7 +342,7 @@ function takeEmbedded() {
   for (const viewer of document.querySelectorAll("vdi-viewer")) {
     const script = viewer.querySelector(':scope > script[type="application/vdi-scene+base64"]');
     if (!script || viewer.scene) continue;
-    viewer.scene = new Scene(Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0)));
+    viewer.scene = new Scene(bytesOfBase64(script.textContent));
     if (viewer.dataset.link) turnTogether(viewer);
   }
 }
