@@ -76,7 +76,7 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     meshes: list[dict[str, Any]] = []
     vdis: list[dict[str, Any]] = []  # the first one is the viewer's own: a series or set if any is
     boxes: list[Any] = []
-    flat: list[Any] = []
+    flat, bound = list[Any](), list[Any]()  # in all views, and in the first alone
     actor: Any = None
     shown: Any = None
 
@@ -101,9 +101,9 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
             elif several is not None:
                 missing.append(f"all but one of {len(several)} VDIs")
         elif prop.IsA("vtkActor2D") or prop.IsA("vtkCubeAxesActor"):
-            flat.append(prop)
-            if not any(prop.IsA(kind) for kind in _FIXED):
-                missing.append("its place in other views than the first")
+            fixed = any(prop.IsA(kind) for kind in _FIXED)
+            (flat if fixed else bound).append(prop)
+            missing += ["its place in other views than the first"] * (not fixed)
         elif isinstance(prop, vtk.vtkActor):
             meshes += _meshes(prop, missing)
         else:
@@ -113,10 +113,11 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
         left_out += [f"{what} ({name})" for what in missing]
     if any((a[0] < b[1]).all() and (b[0] < a[1]).all() for a, b in combinations(boxes, 2)):
         left_out.append("the mixing of VDIs that overlap")
-    left_out += ["the turning of axes"] * bool(_axes(renderer))
+    left_out += ["axes in other views than the first"] * bool(_axes(renderer))
 
-    camera = None if follow else viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
-    head = {"camera": camera, "meshes": meshes, "picture": _picture(renderer, flat), "vdis": vdis}
+    view = viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
+    head = {"camera": None if follow else view, "view": view, "meshes": meshes, "vdis": vdis}
+    head["pictures"] = [_picture(renderer, flat, []), _picture(renderer, bound, _axes(renderer))]
     text = json.dumps(head, default=lambda numbers: b64encode(numbers).decode())
     data, planes = zlib.compress(text.encode(), 6), vdis[0]["planes"] if vdis else []
     return Scene(shown, actor, planes, data, _background(renderer), left_out)
@@ -237,11 +238,10 @@ def _axes(renderer: Any) -> list[Any]:
     return found
 
 
-def _picture(renderer: Any, flat: list[Any]) -> str | None:
+def _picture(renderer: Any, flat: list[Any], axes: list[Any]) -> str | None:
     """Draw what lies over a renderer's scene, and its axes, alone; return it as base64 PNG."""
     from PIL import Image
 
-    axes = _axes(renderer)
     if not flat and not axes:
         return None
     # Lend them to a window of its own

@@ -592,7 +592,7 @@ def test_what_is_set_before_the_module_has_come_is_taken(around):
 #: A scene with nothing in it, packed as scenes are, and one that is damaged.
 SCENES = """async () => {
   const { Scene } = await import("./scene.js");
-  const head = { camera: null, meshes: [], picture: null,
+  const head = { camera: null, view: null, meshes: [], pictures: [],
     vdis: [{ file: null, planes: [], opacity: 1,
       matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] }] };
   const stream = new Blob([JSON.stringify(head)]).stream();

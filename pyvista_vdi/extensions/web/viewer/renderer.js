@@ -160,7 +160,7 @@ export class Renderer {
         this.#give();
         const moving = performance.now() - this.#moved < REST;
         this.#asked = false;
-        const { prepared, scene } = this;
+        const { prepared, camera, scene } = this;
         const size = moving ? pacer.sizeFor(width, height) : [width, height];
         const full = size[0] === width && size[1] === height;
         const target = pacer.screen(width, height);
@@ -169,7 +169,7 @@ export class Renderer {
         if (this.#gl.isContextLost()) return;
         if (pacer !== this.#pacer || !done) continue;
         showPicture(target.framebuffer, size, this.#picture);
-        scene?.annotate(this.#over, [width, height]);
+        scene?.annotate(this.#over, this.fitted(camera, width, height), [width, height]);
         this.#host.drawn(full, prepared === this.prepared);
         if (this.#asked) continue;
         if (full) return;
@@ -231,7 +231,7 @@ export class Renderer {
       if (!good) throw new Error("A viewer whose graphics are lost, or off the page, has no picture.");
     };
     require(this.#viewer.isConnected && this.begin());
-    const gl = this.#gl, pacer = this.#pacer, { scene } = this;
+    const gl = this.#gl, pacer = this.#pacer, { scene, camera } = this;
     const largest = gl.getParameter(gl.MAX_RENDERBUFFER_SIZE);
     if (![width, height].every((edge) => Number.isInteger(edge) && edge > 0 && edge <= largest)) {
       throw new RangeError(`A screenshot is 1 to ${largest} pixels wide and high; ` +
@@ -249,7 +249,7 @@ export class Renderer {
       for (let y = 0; y < height; ++y) {
         data.set(upsideDown.subarray((height - 1 - y) * row, (height - y) * row), y * row);
       }
-      scene?.layTexts(data, [width, height]);
+      scene?.layTexts(data, this.fitted(camera, width, height), [width, height]);
       return { width, height, data };
     } finally {
       pacer.free(target);

@@ -51,7 +51,7 @@ export class Scene {
   #drawn = null; // the view whose meshes they hold
   #meshes = [];
   #bodies = []; // VDIs; the first is the viewer's own
-  #picture = null;
+  #pictures = []; // of all views, and of the view that the scene was made in
   #annotated = new WeakMap(); // canvases, and as how large it was drawn there
 
   /** The view that the scene begins in, if it says one; null before it is loaded. */
@@ -79,7 +79,8 @@ export class Scene {
   async #load(bytes) {
     const head = await unpackedScene(bytes);
     const floats = (text) => new Float32Array(bytesOfBase64(text).buffer);
-    this.#picture = head.picture && await createImageBitmap(new Blob([bytesOfBase64(head.picture)]));
+    this.#pictures = await Promise.all(head.pictures.map((text) =>
+      text && createImageBitmap(new Blob([bytesOfBase64(text)]))));
     this.#meshes = head.meshes.map(({ points, colors, normals, ...mesh }) => ({
       ...mesh, attributes: [floats(points), bytesOfBase64(colors), normals && floats(normals)],
     }));
@@ -234,23 +235,27 @@ export class Scene {
   // -- the picture that VTK has drawn ------------------------------------------------------------
 
   /** Draw texts, scalar bars and axes into a canvas, made as large as the viewer's picture. */
-  annotate(canvas, [width, height]) {
-    const key = `${width} ${height} ${Boolean(this.#picture)}`;
+  annotate(canvas, camera, [width, height]) {
+    const view = this.head?.view;
+    const begun = view && ["position", "focal_point", "view_up"].every((name) =>
+      Math.hypot(...subtract(view[name], camera[name])) <= 1e-6 * Math.hypot(...view[name]));
+    const shown = this.#pictures.filter((picture, k) => picture && (k === 0 || begun));
+    const key = `${width} ${height} ${shown.length} ${begun}`;
     if (this.#annotated.get(canvas) === key) return;
     this.#annotated.set(canvas, key);
     [canvas.width, canvas.height] = [width, height]; // which clears it
-    if (!this.#picture) return;
-    const size = [this.#picture.width, this.#picture.height];
-    const scale = Math.min(width / size[0], height / size[1]);
-    const [wide, high] = size.map((edge) => edge * scale);
-    canvas.getContext("2d").drawImage(this.#picture, (width - wide) / 2, (height - high) / 2, wide, high);
+    for (const picture of shown) {
+      const scale = Math.min(width / picture.width, height / picture.height);
+      const [wide, high] = [picture.width * scale, picture.height * scale];
+      canvas.getContext("2d").drawImage(picture, (width - wide) / 2, (height - high) / 2, wide, high);
+    }
   }
 
   /** Lay them over a picture: premultiplied RGBA, top row first. */
-  layTexts(data, size) {
-    if (!this.#picture) return;
+  layTexts(data, camera, size) {
+    if (!this.#pictures.some(Boolean)) return;
     const canvas = new OffscreenCanvas(...size);
-    this.annotate(canvas, size);
+    this.annotate(canvas, camera, size);
     const { data: over } = canvas.getContext("2d").getImageData(0, 0, ...size);
     for (let k = 0; k < data.length; ++k) {
       const opacity = over[k | 3] / 255, straight = (k & 3) === 3 ? 255 : over[k];
