@@ -30,8 +30,7 @@ def to_bytes(image: ArrayLike, background: Sequence[float] | None = None) -> NDA
         )
     color, alpha = pixels[..., :3].astype(np.float64), pixels[..., 3:].astype(np.float64)
     straight = np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0)
-    both = np.concatenate([straight, alpha], axis=2)
-    return np.rint(both.clip(0, 1) * 255).astype(np.uint8)
+    return np.rint(np.concatenate([straight, alpha], axis=2).clip(0, 1) * 255).astype(np.uint8)
 
 
 def write_png(pixels: NDArray[np.uint8], path: str | os.PathLike[str]) -> Path:
