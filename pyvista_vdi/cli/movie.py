@@ -38,7 +38,7 @@ def movie(options: argparse.Namespace) -> int:
 
     def views(first: Camera, steps: int | None) -> list[Camera]:
         if not (len(keys) > 1 or options.turn or steps):
-            raise InvalidArgumentError("nothing moves: give --path two views, --turn, or a series")
+            raise InvalidArgumentError("nothing moves: give --path two views or more, --turn")
         # A path takes four seconds from one of its views to the next
         frames = options.frames or steps or max(1, round(max(len(keys) - 1, 1) * 4 * options.fps))
         along, path = np.linspace(0, 1, frames), [first] * frames
