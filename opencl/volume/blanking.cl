@@ -1,5 +1,6 @@
-// What of a volume is left out though its grid has it: blank points, cells (docs/dev/conventions.md,
-// "From a volume to the medium"). Positions are the whole grid's: a part of a grid has none.
+// What of a volume is left out though its grid has it: blank points, cells
+// (docs/dev/conventions.md, "From a volume to the medium"). Positions are the whole grid's: a part
+// of a grid has none.
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

@@ -116,7 +116,7 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     left_out += ["axes in other views than the first"] * bool(_axes(renderer))
 
     view = viewer_camera(renderer.GetActiveCamera(), renderer.GetSize())
-    head = {"camera": None if follow else view, "view": view, "meshes": meshes, "vdis": vdis}
+    head: Any = {"camera": None if follow else view, "view": view, "meshes": meshes, "vdis": vdis}
     head["pictures"] = [_picture(renderer, flat, []), _picture(renderer, bound, _axes(renderer))]
     text = json.dumps(head, default=lambda numbers: b64encode(numbers).decode())
     data, planes = zlib.compress(text.encode(), 6), vdis[0]["planes"] if vdis else []
