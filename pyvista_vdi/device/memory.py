@@ -261,11 +261,10 @@ class Memory(Turns):
         cancelled: Callable[[], bool] = lambda: False,
         paused: Callable[[], bool] = lambda: False,
     ) -> Iterator[None]:
-        """Work inside the ``with`` block only when no frame is in progress, see `foreground`.
+        """Work as :meth:`Turns.background` has it, on a queue of the calling thread's own.
 
-        The calling thread gets a queue of its own. Its launches and copies are cut into pieces
-        that take no longer than a turn; each is finished when the call returns. ``cancelled`` is
-        asked between pieces: True ends the work with :class:`Cancelled`, from any method.
+        Its launches and copies are cut into pieces that take no longer than a turn; each is
+        finished when the call returns.
         """
         with self.queue_scope(), super().background(cancelled, paused):
             yield

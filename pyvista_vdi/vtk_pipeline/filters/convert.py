@@ -99,33 +99,7 @@ def _refusal(kind: type) -> UnsupportedError:
 
 
 def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
-    """Return a VTK image's scalars and geometry as a :class:`~pyvista_vdi.Volume`.
-
-    Parameters
-    ----------
-    image : vtkImageData or pyvista.ImageData
-        Origin, spacing, direction matrix and an extent that does not begin at 0 are honoured.
-    scalars : str, optional
-        Name of the array; the active scalars by default, else the only array there is.
-    preference : {"point", "cell"}
-        Which array, where points and cells both have one of that name.
-
-    Returns
-    -------
-    Volume
-        It shares memory with the point array where that is contiguous and of a type that the
-        kernels take; cell data become point data by ``vtkCellDataToPointData``, as
-        ``Plotter.add_volume`` does. What its ghost arrays mark (hidden and duplicate points and
-        cells, ``vtkUniformGrid``'s blanking) is blank, as VTK's GPU mapper draws it, and so is
-        what its point array ``blank octants`` marks.
-
-    Raises
-    ------
-    InvalidVolumeError
-        If there are no such scalars, or not a grid of at least 2 x 2 x 2 points.
-    UnsupportedError
-        If it is another kind of grid, or the scalars have several components.
-    """
+    """Return a VTK image's scalars and geometry: see :meth:`pyvista_vdi.Volume.from_vtk`."""
     image = require_image(image)
     array = scalars_of(image, scalars, preference)
     rgba = array.GetNumberOfComponents() == 4 and array.GetDataType() == vtk.VTK_UNSIGNED_CHAR
