@@ -31,7 +31,7 @@ def main() -> None:
         actor = plotter.add_vdi(
             brain, cmap="bone", quality=quality, draw="vdi", show_scalar_bar=False
         )
-        actor.show_status(plotter)
+        actor.show_status()
         plotter.camera.azimuth = 0
     plotter.show(auto_close=False, interactive=False)  # the VDIs are made in this view
     for column in range(3):

@@ -82,7 +82,7 @@ def main() -> None:
         regenerate=lambda status: status.angle > 30,
         draw="vdi",  # never the volume, so that one VDI is seen to follow the other
     )
-    text = actor.show_status(plotter)
+    text = actor.show_status()
     text.SetMaximumFontSize(11)
     plotter.camera_position = "xz"
     plotter.camera.zoom(1.35)

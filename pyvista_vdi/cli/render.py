@@ -120,7 +120,7 @@ def _show(plotter: Any, actor: Any, first: Camera, options: argparse.Namespace) 
     aim(plotter.camera, first)
     plotter.renderer.reset_camera_clipping_range()
     if options.status:
-        actor.show_status(plotter)
+        actor.show_status()
     if options.time is not None:
         actor.time = options.time
     if options.screenshot is not None:

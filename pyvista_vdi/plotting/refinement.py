@@ -101,7 +101,7 @@ class Refinement:
 
             self._worker.put(Job(read, device, wanted.level))
         # In each frame anew: the hand that turns the view has stopped it
-        self._timer.start(window.GetInteractor(), in_loop=True)
+        self._timer.start(window.GetInteractor())
 
     def _look(self) -> None:
         """Draw a level that was read, from the window's event loop."""

@@ -84,16 +84,6 @@ def cropped(s):
     s.mapper.SetCroppingRegionPlanes(4, 9, 4, 9, 4, 9)
 
 
-def chosen(s, array="w"):
-    by_name = isinstance(array, str)
-    s.mapper.SetScalarModeToUsePointFieldData()
-    if hasattr(s.mapper, "SetArrayName"):
-        (s.mapper.SetArrayName if by_name else s.mapper.SetArrayId)(array)
-    else:  # older VTKs
-        s.mapper.SelectScalarArray(array)
-    s.mapper.SetArrayAccessMode(int(by_name))
-
-
 def color_image(s):
     """Have the picture drawn into an image, and return it, RGB over black."""
     s.mapper.RenderToImageOn()
@@ -116,14 +106,12 @@ MAPPER = (
     Row("VoxelCroppingRegionPlanes", WITHOUT, _OF_PROXY),
     Row("FinalColorWindow FinalColorLevel", SAME, "", lambda s: (
         s.mapper.SetFinalColorWindow(0.6), s.mapper.SetFinalColorLevel(0.3))[:0]),
-    Row("ScalarMode ScalarModeToUsePointFieldData ArrayName ArrayAccessMode", SAME,
-        "arrays of points and cells alike; the VDI is regenerated", chosen),
-    Row("ArrayId", SAME, "", lambda s: chosen(s, 1)),
-    Row("SelectScalarArray", SAME, "", lambda s: (
-        s.mapper.SelectScalarArray("w"), s.mapper.SetScalarModeToUsePointFieldData())[:0]),
-    Row("ScalarModeToUseCellData ScalarModeToUseCellFieldData", REFUSED,
-        "values of cells are averaged at the points: choose the array by `SelectScalarArray`",
-        lambda s: s.mapper.SetScalarModeToUseCellFieldData(), "values at points.*SelectScalarArray"),
+    Row("ScalarMode ScalarModeToUsePointFieldData ScalarModeToUseCellData ScalarModeToUseCellFieldData "
+        "ArrayName ArrayId", REFUSED, "`VDISource.SetScalars` chooses the array, of points or cells",
+        lambda s: s.mapper.SetScalarModeToUsePointFieldData()),
+    Row("SelectScalarArray", REFUSED, "likewise", lambda s: s.mapper.SelectScalarArray("w")),
+    Row("ArrayAccessMode", WITHOUT, "of what is refused: arrays by the mapper",
+        lambda s: s.mapper.SetArrayAccessMode(1)),
     Row("BlendModeToComposite", SAME, "", lambda s: s.mapper.SetBlendModeToComposite()),
     Row("BlendMode", REFUSED, "others than composite: `render_volume(blending=)` has some",
         lambda s: s.mapper.SetBlendModeToAdditive()),
@@ -133,7 +121,7 @@ MAPPER = (
         "previews in windows, while a hand moves", lambda s: s.mapper.AutoAdjustSampleDistancesOn()),
     Row("MinimumImageSampleDistance", WITHOUT, "previews have as many rays as time allows",
         lambda s: s.mapper.SetMinimumImageSampleDistance(3.0)),
-    Row("LockSampleDistanceToInputSpacing", REFUSED, "`SetSampleDistance` says the step",
+    Row("LockSampleDistanceToInputSpacing", WITHOUT, "`VDISource.SetSampleDistance` says the step",
         lambda s: s.mapper.LockSampleDistanceToInputSpacingOn()),
     Row("UseJittering", WITHOUT, "noise that hides VTK's steps; a VDI's list has none to hide",
         lambda s: s.mapper.UseJitteringOn()),
@@ -143,9 +131,10 @@ MAPPER = (
         lambda s: s.mapper.GetInput().GetDimensions()),
     Row("InputData InputDataObject InputConnection", SAME,
         "a VDI, its canonical image or a `VDISource`'s port in the volume's place; port 0"),
-    Row("GetInputDataObject", WITHOUT, "returns the box that VTK draws in the VDI's stead, and warns"),
+    Row("GetInputDataObject", WITHOUT, "returns the box that VTK draws in the VDI's stead"),
     Row("RemoveInputConnection AllInputConnections AllInputs", SAME, "nothing is drawn any more"),
-    Row("AddInputConnection AddInputDataObject", REFUSED, "one VDI for each mapper",
+    Row("AddInputDataObject", WITHOUT, _OF_PROXY),
+    Row("AddInputConnection", REFUSED, "one VDI for each mapper",
         lambda s: s.mapper.AddInputConnection(0, s.source.GetOutputPort())),
     Row("InputCount Ports TransformedInput GetInputConnection InputAlgorithm InputExecutive "
         "InputInformation InputPortInformation InputPort NumberOfInputPorts InputConnections "
@@ -153,13 +142,11 @@ MAPPER = (
     Row("InputArrayToProcess InputArrayInformation InputArraySpecification ResetInputArraySpecifications",
         WITHOUT, "VTK's mapper does not ask for them, either"),
     Row("RenderToImage ColorImage ColorTexture", SAME, "", color_image),
-    Row("DepthImage", REFUSED, "`VDIActor.pick(x, y)` says what is seen where",
-        lambda s: s.mapper.GetDepthImage(vtkImageData())),
-    Row("DepthTexture", REFUSED, "likewise", lambda s: s.mapper.GetDepthTexture()),
-    Row("DepthImageScalarType", WITHOUT, f"{_OF_REFUSED}depth images"),
-    Row("ClampDepthToBackface", REFUSED, "it is of depth images", lambda s: s.mapper.ClampDepthToBackfaceOn()),
-    Row("UseDepthPass", REFUSED, "a VDI has no isosurfaces", lambda s: s.mapper.UseDepthPassOn()),
-    Row("DepthPassContourValues", WITHOUT, f"{_OF_REFUSED}`UseDepthPass`"),
+    Row("DepthImage DepthTexture DepthImageScalarType ClampDepthToBackface", WITHOUT,
+        "they are of the box; `VDIActor.pick(x, y)` says what is seen where",
+        lambda s: s.mapper.ClampDepthToBackfaceOn()),
+    Row("UseDepthPass DepthPassContourValues", WITHOUT, "a VDI has no isosurfaces",
+        lambda s: s.mapper.UseDepthPassOn()),
     Row("MaskInput", REFUSED, "hide points or cells, or write transparent values",
         lambda s: s.mapper.SetMaskInput(image_of(values().ravel().astype(np.uint8)))),
     Row("MaskType MaskBlendFactor", WITHOUT, f"{_OF_REFUSED}masks",
@@ -168,7 +155,7 @@ MAPPER = (
         lambda s: s.mapper.SetGlobalIlluminationReach(0.5)),
     Row("VolumetricScatteringBlending", REFUSED, "likewise",
         lambda s: s.mapper.SetVolumetricScatteringBlending(0.5)),
-    Row("ComputeNormalFromOpacity", REFUSED, "a VDI is shaded by its scalars' gradient",
+    Row("ComputeNormalFromOpacity", WITHOUT, "a VDI is shaded by its scalars' gradient",
         lambda s: s.mapper.ComputeNormalFromOpacityOn()),
     Row("ColorRangeType ScalarOpacityRangeType GradientOpacityRangeType", WITHOUT,
         "over what scalars VTK samples the functions; here they have as many entries as they need",
@@ -181,9 +168,7 @@ MAPPER = (
     Row("MaxMemoryInBytes MaxMemoryFraction ReductionRatio ReportProgress TimeToDraw", WITHOUT,
         "`VDISource.SetMemoryLimit` and `ProgressEvent` are in their place",
         lambda s: s.mapper.SetMaxMemoryInBytes(1000)),
-    Row("CreateCanonicalView", REFUSED, "take a picture by vtkWindowToImageFilter",
-        lambda s: s.mapper.CreateCanonicalView(
-            s.renderer, s.actor, vtkImageData(), 0, (0, 0, 1), (0, 1, 0))),
+    Row("CreateCanonicalView", WITHOUT, "take a picture by vtkWindowToImageFilter"),
     Row("ShallowCopy", SAME, "copies the clipping planes, as of every mapper"),
     Row("RenderSupported IsARayCastMapper IsARenderIntoImageMapper Scalars AbstractScalars GhostArray",
         SAME, "VTK's own"),
@@ -260,8 +245,7 @@ VOLUME = (
     Row("PokeMatrix", SAME, "", lambda s: s.actor.PokeMatrix(matrix())),
     Row("CoordinateSystem", REFUSED, "others than the world",
         lambda s: s.actor.SetCoordinateSystemToPhysical()),
-    Row("CoordinateSystemDevice", REFUSED, "", lambda s: s.actor.SetCoordinateSystemDevice(1)),
-    Row("CoordinateSystemRenderer", WITHOUT, f"{_OF_REFUSED}other coordinate systems"),
+    Row("CoordinateSystemDevice CoordinateSystemRenderer", WITHOUT, f"{_OF_REFUSED}other coordinate systems"),
     Row("Visibility", SAME, "", lambda s: s.actor.VisibilityOff()),
     Row("Pickable Dragable UseBounds SupportsSelection", SAME, "",
         lambda s: (s.actor.UseBoundsOff(), s.actor.PickableOff())[:0]),
@@ -273,10 +257,7 @@ VOLUME = (
         "property than that is warned of"),
     Row("ShaderProperty", REFUSED, "its shader shows the VDI",
         lambda s: s.actor.SetShaderProperty(vtkOpenGLShaderProperty())),
-    Row("GetShaderProperty", REFUSED, "and what is added to it by its methods",
-        lambda s: s.actor.GetShaderProperty().AddFragmentShaderReplacement(
-            "//VTK::Shading::Impl", True, "g_fragColor.g = 1.0;", False),
-        "AddFragmentShaderReplacement"),
+    Row("GetShaderProperty", SAME, "what is added to it may undo what shows the VDI"),
     Row("PropertyKeys Keys GeneralTextureTransform GeneralTextureUnit", SAME, "VTK's own"),
     Row("EstimatedRenderTime AllocatedRenderTime RenderTimeMultiplier RestoreEstimatedRenderTime", WITHOUT,
         "the window's desired update rate decides about previews",

@@ -116,41 +116,12 @@ def test_functions_may_be_filled_after_the_property_was_set(off_screen, set_befo
     assert likeness(*pictures) >= LEAST_SSIM
 
 
-@pytest.mark.parametrize("how", ["name", "id"])
-def test_an_array_may_be_chosen_before_there_is_an_input(off_screen, how):
-    pictures = []
-    for ours in (False, True):
-        scene = Scene(ours)
-        scene.mapper.RemoveAllInputs()
-        scene.mapper.SetScalarModeToUsePointFieldData()
-        scene.mapper.SelectScalarArray("w" if how == "name" else 1)
-        if ours:
-            scene.mapper.SetInputConnection(scene.source.GetOutputPort())
-        else:
-            scene.mapper.SetInputData(scene.image)
-        pictures.append(scene.picture())
-    assert likeness(*pictures) >= LEAST_SSIM
-    assert compare_images(pictures[1], Scene(True).picture()).ssim < LEAST_SSIM
-
-
 def test_without_its_input_nothing_is_drawn(off_screen):
     scene = Scene(True)
     scene.picture()
     scene.mapper.RemoveAllInputConnections(0)
     assert np.ptp(scene.picture()) == 0
     assert scene.actor.vdi is None
-
-
-def test_what_others_clear_of_the_shader_is_theirs(off_screen):
-    scene = Scene(True)
-    before = scene.picture()
-    shader = scene.actor.GetShaderProperty()
-    shader.ClearAllShaderReplacements()
-    shader.ClearAllFragmentShaderReplacements()
-    scene.window.SetSize(SIZE[0] + 2, SIZE[1])
-    scene.picture()
-    scene.window.SetSize(*SIZE)
-    np.testing.assert_array_equal(scene.picture(), before)
 
 
 def indexed():

@@ -101,10 +101,8 @@ def test_without_effect(off_screen, row):
 def test_what_turns_a_refused_thing_off_is_accepted(off_screen):
     scene = Scene(True)
     before = scene.picture()
-    for setter in ("BlendMode", "UseDepthPass", "GlobalIlluminationReach", "ClampDepthToBackface"):
+    for setter in ("BlendMode", "GlobalIlluminationReach", "ScalarMode"):
         getattr(scene.mapper, f"Set{setter}")(0)
     scene.mapper.SetMaskInput(None)
-    scene.mapper.UseDepthPassOff()
-    scene.mapper.ComputeNormalFromOpacityOff()
     scene.actor.SetCoordinateSystemToWorld()
     np.testing.assert_array_equal(scene.picture(), before)

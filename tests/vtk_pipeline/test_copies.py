@@ -108,7 +108,7 @@ def test_a_volume_of_vtks_with_the_mapper_of_an_actor_is_told_of_the_remedy(scen
     before = scene.picture() if drawn else None
     copy, elsewhere = vtkVolume(), Scene("vtk")
     copy.ShallowCopy(scene.actor)
-    with pytest.warns(VDIWarning, match=r"behind another volume: .*VDIActor\(\).ShallowCopy"):
+    with pytest.warns(VDIWarning, match=r"only behind .*VDIActor\(\).ShallowCopy"):
         assert is_blank(in_place_of(elsewhere, copy))
     elsewhere.close()
     if drawn:  # VTK 9.4 leaves one pixel of a corner black
@@ -135,9 +135,7 @@ def test_peeling_of_volumes_draws_a_vdi_as_without(opacities, way):
     scene.reset()
     wanted = scene.picture()
     scene.renderer.SetUseDepthPeelingForVolumes(1)
-    with pytest.warns(VDIWarning, match="UseDepthPeelingForVolumes.*VTK's own mapper") as said:
-        peeled = scene.picture()
-    assert len(said) == 1
+    peeled = scene.picture()
     assert np.abs(np.round(255 * (peeled - wanted))).max() <= 2  # bytes, rounded layer by layer
     np.testing.assert_array_equal(scene.picture(), peeled)
     scene.renderer.SetUseDepthPeelingForVolumes(0)

@@ -122,7 +122,7 @@ def test_auto_goes_by_what_frames_take(plotter, monkeypatch):
     monkeypatch.setattr(Costs, "took", slow)
     actor = watched(plotter, draw="auto")
     assert actor.vdi is not None
-    finish("stand-in")  # pictures of the volume tell what its rays take
+    finish()  # pictures of the volume tell what its rays take
     plotter.camera.azimuth = 60
     frame(plotter)
     frame(plotter)
@@ -140,7 +140,7 @@ def test_the_first_frame_of_a_volume_in_motion_is_no_slower_than_a_picture_has_t
         Costs, "took", lambda costs, way, angle, *_: took(costs, way, angle, 1.0, 1e-3)
     )
     actor = watched(plotter, draw="vdi")
-    finish("stand-in")
+    finish()
     actor.mapper.SetDraw("auto")
     plotter.camera.azimuth = 40
     frame(plotter, MOVING)

@@ -23,7 +23,7 @@ from pyvista_vdi.quality.costs import rise
 from pyvista_vdi.quality.rate import HEADROOM, reduced
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, sampled
-from pyvista_vdi.vtk_pipeline.interaction.window import Met, Window
+from pyvista_vdi.vtk_pipeline.interaction.window import Window
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkGenericRenderWindowInteractor,
@@ -337,15 +337,3 @@ def test_few_frames_are_late_where_some_take_longer(plotter, counted):
     frames(400, 0.0)
     assert aim() == pytest.approx(HEADROOM * 240)
     assert np.median(frames(20, 0.0)) == pytest.approx(1 / 240 / HEADROOM, rel=0.1)
-
-
-def test_another_renderer_at_the_address_of_one_that_is_gone_is_new():
-    class Here(vtkRenderer):
-        def GetAddressAsString(self, _):
-            return "here"
-
-    met, first = Met(), Here()
-    assert met.is_new(first)
-    assert not met.is_new(first)
-    del first
-    assert met.is_new(Here())

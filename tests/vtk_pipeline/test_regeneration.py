@@ -30,7 +30,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.drawing.background import Estimators
+from pyvista_vdi.vtk_pipeline.drawing.background import Estimator
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -219,7 +219,7 @@ def test_estimates_know_of_ambient_occlusion():
     """What is judged is the occluded VDI; so is then what it is judged by."""
     source = ready_source(AmbientOcclusion=pvdi.AmbientOcclusion(0.5, strength=1.0))
     vdi, request = source.GetVDI(), source.GetCurrentRequest()
-    error = Estimators().estimate(request, get_runtime(), vdi, request.screen, RenderOptions())
+    error = Estimator().estimate(request, get_runtime(), vdi, request.screen, RenderOptions())
     assert error.ssim > 0.9999
 
 
@@ -384,7 +384,7 @@ def in_the_middle():
     """A plotter for which a VDI is being made."""
     plotter = pv.Plotter(window_size=WINDOW)
     actor = watched(plotter, regenerate=beyond(10))
-    actor.show_status(plotter)
+    actor.show_status()
     turned(plotter, 30)
     assert actor.status.progress == 0.0
     assert len(threads()) == 1
@@ -414,7 +414,7 @@ def test_forgetting_a_scene_in_the_middle_leaves_no_thread(gate, no_leaks):
 def test_no_leaks_of_a_watched_scene(no_leaks):
     plotter = pv.Plotter(window_size=WINDOW)
     actor = watched(plotter, regenerate=beyond(10))
-    actor.show_status(plotter)
+    actor.show_status()
     turned(plotter, 30, MOVING)
     frames_until(plotter, lambda: actor.status.generation == 2)
     plotter.screenshot()

@@ -30,7 +30,7 @@ from watched_windows import (
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.drawing import driver
+from pyvista_vdi.vtk_pipeline.drawing import planner
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -120,7 +120,7 @@ def test_moves(plotter, coarsest):
 def test_no_vdi_is_made_while_a_hand_moves_and_what_serves_goes_on_at_rest(
     plotter, gate, no_estimates, monkeypatch
 ):
-    monkeypatch.setattr(driver, "SETTLED", LONG)  # however long a frame takes
+    monkeypatch.setattr(planner, "SETTLED", LONG)  # however long a frame takes
     actor = auto(plotter, draw="vdi")
     no_estimates.ssim = 0.5
     turned(plotter, 60)
@@ -366,8 +366,8 @@ DRIVES = ("time", "threading", "asyncio", "Worker", "weakref", "weakly", "vtkWea
 #: and a window; what VTK's objects, which observers and lights would keep in cycles, must not be
 #: kept alive by; and, of plotters, what they hold, their bar and the source that steps are read of.
 DRIVING = {
-    "vtk_pipeline/drawing": {"background", "driver", "mapper"},
-    "vtk_pipeline/interaction": {"browser", "status", "timer", "window"},
+    "vtk_pipeline/drawing": {"actor", "background", "driver", "planner"},
+    "vtk_pipeline/interaction": {"timer", "window"},
     "vtk_pipeline/filters": {"algorithm", "source", "source_settings", "temporal", "view"},
     "plotting": {
         "actor",

@@ -18,7 +18,6 @@ from pyvista_vdi.extensions.web.scene import Scene, look_of, part_of, scene_of, 
 from pyvista_vdi.extensions.web.shown import png, with_still
 from pyvista_vdi.extensions.web.widget import VDIWidget
 from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
-from pyvista_vdi.vtk_pipeline.interaction import browser
 
 #: Seconds without a turn from which a view rests.
 _REST = 0.2
@@ -55,7 +54,6 @@ class PlotterWidget(VDIWidget):
                 widget._follow()
 
         renderer.AddObserver("EndEvent", drawn)
-        browser.follow(self)
 
     @property
     def window(self) -> Any:

@@ -7,15 +7,19 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, warn_external
 from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
-from pyvista_vdi.vtk_pipeline.drawing.screen import VDIShaderProperty, show_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
-from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkCornerAnnotation,
+    vtkOpenGLShaderProperty,
+    vtkVolume,
+    weakly,
+)
 
 
 @refusing(OF_ACTORS)
@@ -24,8 +28,9 @@ class VDIActorMethods:
 
     def _become_vdi_actor(self: Any) -> None:
         """Install a shader of its own."""
-        super().SetShaderProperty(VDIShaderProperty())  # type: ignore[misc]
+        super().SetShaderProperty(vtkOpenGLShaderProperty())  # type: ignore[misc]
         show_image(self)
+        place_image(self, 0, (0, 0), (1, 1))
 
     def SetMapper(self: Any, mapper: Any) -> None:
         """Set the mapper, which must be a :class:`VDIMapper` of its own.
@@ -124,12 +129,26 @@ class VDIActorMethods:
 
         Another one that is set is shown from the next frame on.
         """
-        mapper = self.GetMapper()
-        return None if mapper is None else mapper.GetVDISet()
+        return self._collection(times=False)
 
     @vdi_set.setter
     def vdi_set(self: Any, vdi_set: VDICollection) -> None:
-        self._mapper_for(" that could show a set").SetVDISet(vdi_set)
+        self._show(vdi_set, "vdi_set", times=False)
+
+    def _collection(self: Any, *, times: bool) -> VDICollection | None:
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.driver.input
+        shown = None if source is None else source.collection
+        return shown if shown is not None and (shown.times is not None) == times else None
+
+    def _show(self: Any, given: VDICollection, name: str, *, times: bool) -> None:
+        if not isinstance(given, VDICollection) or (given.times is not None) != times:
+            kind = "VDISeries" if times else "VDISet"
+            raise InvalidArgumentError(
+                f"actor.{name} is a {kind}; got {type(given).__name__}: {kind}(vdis) makes one of "
+                "several VDIs"
+            )
+        self._mapper_for(" that could show it").SetInputData(given)
 
     def _mapper_for(self: Any, what: str) -> Any:
         """Return the mapper; without one, say what there cannot be."""
@@ -154,25 +173,13 @@ class VDIActorMethods:
     def opacity_multiplier(self: Any, multiplier: float) -> None:
         self._mapper_for(" whose opacity could be set").SetOpacityMultiplier(multiplier)
 
-    @property
-    def transmittance_cutoff(self: Any) -> float:
-        """Light below which rays end: see :meth:`VDIMapper.SetTransmittanceCutoff`."""
-        mapper = self.GetMapper()
-        return TRANSMITTANCE_CUTOFF if mapper is None else mapper.GetTransmittanceCutoff()
-
-    @transmittance_cutoff.setter
-    def transmittance_cutoff(self: Any, cutoff: float) -> None:
-        self._mapper_for(" whose rays could be ended").SetTransmittanceCutoff(cutoff)
-
-    def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
-        """Show :attr:`status` as a text in a corner, written anew in each frame.
+    def show_status(self: Any, corner: str = "upper left") -> Any:
+        """Show :attr:`status`, as it was after the frame before, as a text in a corner.
 
         Parameters
         ----------
-        renderer : vtkRenderer or pyvista.Plotter, optional
-            Where; by default the renderer that shows the actor.
         corner : {"lower left", "lower right", "upper left", "upper right"}
-            Which corner.
+            Which corner of the renderer that shows the actor.
 
         Returns
         -------
@@ -184,15 +191,27 @@ class VDIActorMethods:
         InvalidArgumentError
             If there is no such corner, or no renderer shows the actor.
         """
-        mapper = self.GetMapper()
-        if renderer is None and mapper is not None:
-            renderer = mapper.driver.renderer()
-        renderer = getattr(renderer, "renderer", renderer)  # a plotter's active one
-        if mapper is None or renderer is None:
-            raise InvalidArgumentError(
-                "nothing shows this actor yet: add it to a renderer first, or pass the renderer"
-            )
-        return mapper.driver.texts.add(renderer, corner)
+        mapper, place = self.GetMapper(), corner.title().replace(" ", "")
+        if corner not in ("lower left", "lower right", "upper left", "upper right"):
+            raise InvalidArgumentError(f"corner must be 'upper left' or the like; got {corner!r}")
+        renderer = None if mapper is None else mapper.driver.renderer()
+        if renderer is None:
+            raise InvalidArgumentError("nothing shows this actor yet: add it to a renderer first")
+        annotation, actor = vtkCornerAnnotation(), weakly(self)
+        annotation.SetMaximumFontSize(14)
+        look = annotation.GetTextProperty()  # white on a shade: legible on any background
+        look.SetColor(1.0, 1.0, 1.0)
+        look.SetBackgroundColor(0.0, 0.0, 0.0)
+        look.SetBackgroundOpacity(0.5)
+        renderer.AddViewProp(annotation)
+
+        def write(*_: Any) -> None:
+            if actor() is not None:
+                lines = str(actor().status).replace(", ", "\n")
+                annotation.SetText(getattr(annotation, place), lines)
+
+        renderer.AddObserver("StartEvent", write)
+        return annotation
 
     def pick(self: Any, x: float, y: float, *, renderer: Any = None) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
@@ -210,8 +229,8 @@ class VDIActorMethods:
         Pick or None
             The first supersegment that reaches the opacity set by
             ``GetMapper().SetPickingOpacity(...)``, and where the ray enters it, in world
-            coordinates. ``None`` where nothing of the VDI is hit, where something else that can
-            be picked is in front of the hit, and where the actor is invisible or not pickable.
+            coordinates. ``None`` where nothing of the VDI is hit, where something opaque hid the
+            hit in the last frame, and where the actor is invisible or not pickable.
 
         Raises
         ------
@@ -228,7 +247,7 @@ class VDIActorMethods:
         if renderer is not None:
             shown = [r for r in shown if r is getattr(renderer, "renderer", renderer)]
         there = [r for r in shown if r.IsInViewport(int(x), int(y))]
-        return mapper.driver.pick(self, there[0], x, y) if there else None
+        return mapper.driver.pick(there[0], x, y) if there else None
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.
@@ -286,14 +305,12 @@ class VDIActorMethods:
 
         Another one that is set is shown from the next frame on, at the step nearest in time.
         """
-        mapper = self.GetMapper()
-        return None if mapper is None else mapper.GetSeries()
+        return self._collection(times=True)
 
     @series.setter
     def series(self: Any, series: VDICollection) -> None:
-        mapper = self._mapper_for(" that could show a series")
-        before = None if mapper.GetSeries() is None else self.time
-        mapper.SetSeries(series)
+        before = None if self.series is None else self.time
+        self._show(series, "series", times=True)
         if before is not None:
             self.time = before
 

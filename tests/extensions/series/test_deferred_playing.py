@@ -64,6 +64,6 @@ def test_what_has_no_look_yet_is_refused(plotter, saved):
         plotter.add_vdi(str(saved), max_supersegments=4)
     actor = pvdi.VDIActor()
     actor.SetMapper(pvdi.VDIMapper())
-    actor.GetMapper().SetSeries(pvdi.read(saved))
+    actor.GetMapper().SetVDI(pvdi.read(saved))
     with pytest.raises(InvalidVDIError, match="no colours yet"):
         actor.GetMapper().GetVDI()
