@@ -1,4 +1,4 @@
-"""Make the pictures of the README and of the pages *Presets*, *Recipes* and tutorials, small enough to commit.
+"""Make the pictures of README, *Presets*, *Recipes* and the tutorials, small enough to commit.
 
     python docs/make_pictures.py [NAME ...]
 
