@@ -360,7 +360,7 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
         else:
             raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
     vdi = VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
-    return vdi if kept is None else DeferredVDI.of_lists(vdi, kept)
+    return vdi if kept is None else DeferredVDI(vdi, kept)
 
 
 def view_of_image(image: vtk.vtkImageData) -> dict[str, Any]:
