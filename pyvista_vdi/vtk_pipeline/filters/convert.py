@@ -17,7 +17,6 @@ from pyvista_vdi.errors import (
     InvalidVolumeTypeError,
     UnknownArrayError,
     UnsupportedError,
-    with_article,
 )
 from pyvista_vdi.io.vdi_file.description import plain_number
 from pyvista_vdi.model.camera import Camera
@@ -89,7 +88,7 @@ def require_image_port(port: Any) -> None:
 
 
 def _refusal(kind: type) -> UnsupportedError:
-    named = f"{with_article(kind.__name__)} is not a uniform grid"
+    named = f"{kind.__name__} is not a uniform grid"
     for name, remedy in _REMEDIES.items():
         if issubclass(kind, getattr(vtk.vtkCommonDataModel, name)):
             return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")

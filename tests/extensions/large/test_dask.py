@@ -146,7 +146,7 @@ def _left(dask_scheduler):
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
-        ("cluster", InvalidArgumentTypeError, r"a LocalCluster: give distributed.Client\(cluster"),
+        ("cluster", InvalidArgumentTypeError, r"LocalCluster: give distributed.Client\(cluster"),
         (7, InvalidArgumentTypeError, "an? int"),
         ("tcp://127.0.0.1:1", InvalidArgumentError, "no Dask scheduler answers at 'tcp://127"),
     ],
