@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIError, with_article
+from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import is_vdi_file, read
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.io.stores import StoredVolume
@@ -67,7 +67,7 @@ def _mask(mask: Any, grid: Any, stored: StoredVolume | None) -> Any:
         )
     if isinstance(mask, np.ndarray):
         return mask
-    named = repr(mask) if isinstance(mask, str | os.PathLike) else with_article(type(mask).__name__)
+    named = repr(mask) if isinstance(mask, str | os.PathLike) else type(mask).__name__
     try:
         if isinstance(mask, str | os.PathLike):
             mask = read_volume(mask)

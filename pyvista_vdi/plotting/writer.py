@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.errors import InvalidVDIError, with_article
+from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.io import write
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 
@@ -33,7 +33,7 @@ def write_vdi(dataset: Any, path: str, **options: Any) -> None:
     """
     if not is_vdi_image(dataset):
         raise InvalidVDIError(
-            f"{with_article(type(dataset).__name__)} that holds no VDI cannot be written "
+            f"{type(dataset).__name__} that holds no VDI cannot be written "
             f"to {path}: generate one of it by dataset.vdi.generate(camera, window_size), and save "
             "that"
         )

@@ -15,7 +15,6 @@ from pyvista_vdi.errors import (
     InvalidArgumentTypeError,
     naming,
     warn_external,
-    with_article,
 )
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces
@@ -206,7 +205,7 @@ def _steps(
     ):
         raise InvalidArgumentTypeError(
             f"volumes must be an iterable of volumes, or a function; got "
-            f"{with_article(type(volumes).__name__)}: pass a list of them, or call generate"
+            f"{type(volumes).__name__}: pass a list of them, or call generate"
         )
     if known is not None and isinstance(volumes, Sized) and len(volumes) != len(known):
         raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")

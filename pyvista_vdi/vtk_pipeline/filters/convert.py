@@ -17,7 +17,6 @@ from pyvista_vdi.errors import (
     InvalidVolumeTypeError,
     UnknownArrayError,
     UnsupportedError,
-    with_article,
 )
 from pyvista_vdi.io.vdi_file.description import plain_number
 from pyvista_vdi.model.camera import Camera
@@ -89,7 +88,7 @@ def require_image_port(port: Any) -> None:
 
 
 def _refusal(kind: type) -> UnsupportedError:
-    named = f"{with_article(kind.__name__)} is not a uniform grid"
+    named = f"{kind.__name__} is not a uniform grid"
     for name, remedy in _REMEDIES.items():
         if issubclass(kind, getattr(vtk.vtkCommonDataModel, name)):
             return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")
@@ -360,7 +359,7 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
         else:
             raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
     vdi = VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
-    return vdi if kept is None else DeferredVDI.of_lists(vdi, kept)
+    return vdi if kept is None else DeferredVDI(vdi, kept)
 
 
 def view_of_image(image: vtk.vtkImageData) -> dict[str, Any]:
