@@ -29,7 +29,7 @@ LARGEST_FILE = 100 * 1024
 LARGEST_PHOTO = 150 * 1024
 
 #: Examples whose pictures are on the site, those that hold text wide.
-SHOWN = ("occlusion", "overlap", "picking", "tradeoff", "transfer_function")
+SHOWN = ("overlap", "picking", "tradeoff", "transfer_function")
 WIDE = ("tradeoff",)
 
 COMPARISON = ("brain", "steep", "320x180")

@@ -39,7 +39,6 @@ ARGUMENTS = {
     "files.py": ["picture.png"],
     "interactive.py": [],
     "large_volume.py": ["picture.png"],
-    "occlusion.py": [],
     "overlap.py": [],
     "picking.py": ["picture.png"],
     "pipeline.py": ["picture.png"],
@@ -92,7 +91,7 @@ def run_example(name, folder):
         *(
             pytest.param(f"{name}.py", marks=pytest.mark.slow)
             for name in (
-                *("files", "overlap", "picking", "occlusion", "large_volume"),
+                *("files", "overlap", "picking", "large_volume"),
                 "transfer_function",
             )
         ),
