@@ -8,8 +8,7 @@ from numpy.typing import (NDArray)
 from pyvista_vdi.api import (Settings)
 from pyvista_vdi.model.types import (
     AnyVolume, Blending, CameraLike, ColorMapLike, DeviceLike, Draw, Interpolation, MatrixLike,
-    OcclusionLike, OpacityLike, Policy, Precision, Preference, Quality, RangeLike, ScalarsLike,
-    VolumeLike, When,
+    OpacityLike, Policy, Precision, Preference, Quality, RangeLike, ScalarsLike, VolumeLike, When,
 )
 from pyvista_vdi.plotting.actor import (PlotterVDIActor)
 from pyvista_vdi.plotting.add_transfer_function_editor import (AddTransferFunctionEditor)
@@ -35,10 +34,9 @@ class Plotter(pv.Plotter):
         None = None, log_scale: bool = False, *, interpolation: Interpolation = 'nearest', resample:
         str | Sequence[int] | None = None, mask: VolumeLike | NDArray[Any] | None = None, camera:
         CameraLike | None = None, device: DeviceLike | None = None, progress_bar: bool |
-        Callable[[float], object] | None = None, ambient_occlusion: OcclusionLike | None = None,
-        max_supersegments: int = 20, precision: Precision = 'exact', quality: Quality | None = None,
-        target_ssim: float | None = None, full_fps: float | None = None, max_bytes: float | None =
-        None, classification: When = 'baked', value_range: RangeLike | None = None, target_fps:
-        float | None = 30.0, regenerate: Policy = 'auto', draw: Draw = 'auto', settings: Settings |
-        None = None,
+        Callable[[float], object] | None = None, max_supersegments: int = 20, precision: Precision =
+        'exact', quality: Quality | None = None, target_ssim: float | None = None, full_fps: float |
+        None = None, max_bytes: float | None = None, classification: When = 'baked', value_range:
+        RangeLike | None = None, target_fps: float | None = 30.0, regenerate: Policy = 'auto', draw:
+        Draw = 'auto', settings: Settings | None = None,
     ) -> PlotterVDIActor | list[Any]: ...

@@ -28,7 +28,6 @@ HOMES = (collections.abc, typing, npt, types)
 CLASSES = {
     "AddTransferFunctionEditor": "plotting.add_transfer_function_editor",
     "AddVDIClipPlane": "plotting.clip_plane",
-    "AmbientOcclusion": "model.ambient_occlusion",
     "DeferredVDI": "model.deferred",
     "Estimate": "generation.slices",
     "Pick": "raycasting.picking",

@@ -25,7 +25,6 @@ def without_vtk(folder: Path) -> pvdi.VDI:
         max_supersegments=10,
         settings=pvdi.Settings(tolerance=0.01, memory_limit="1 GiB"),
         lights=[pvdi.Light()],
-        ambient_occlusion=True,
         progress=print,
         transfer_function=table,
     )
@@ -63,7 +62,7 @@ def of_several(folder: Path, volumes: list[pvdi.Volume], camera: pvdi.Camera) ->
     series = pvdi.generate_series(volumes, camera, (64, 48), cmap="bone", quality="high")
     with pvdi.SeriesWriter(folder / "a.vdis", camera, (64, 48), level=3, clim=(0, 9)) as out:
         out.append(volumes[0], 0.5)
-    views = pvdi.generate_set(volumes[0], [camera], lists=0.5, ambient_occlusion=True)
+    views = pvdi.generate_set(volumes[0], [camera], lists=0.5)
     assert len(series) == len(views)
 
 
