@@ -53,7 +53,7 @@ ARGUMENTS = {
 }
 
 #: Those that serve, which write no picture: tests/extensions/web/test_served_examples.py runs them.
-SERVING = ["serve.py", "trame_app.py"]
+SERVING = ["serve.py"]
 #: Those for several processes: tests/extensions/insitu/test_mpi.py runs them.
 PARALLEL = ["insitu.py"]
 
