@@ -1,9 +1,8 @@
 """Choose a volume's opacities and colours over its picture, by the mouse.
 
 What one should see: a brain, and in the upper right corner its values' histogram, with the opacity
-curve over it. Drag its points; click to add one, right-click a point to delete it; drag with the
-right button, to the right and left to move the window, up and down to widen it. With the mouse over
-the editor, ``c`` takes the next colour map.
+curve over it. Double-click it; then drag its points, click to add one, press Delete to delete one.
+A double-click beside it gives the mouse back to the camera.
 
 Off-screen (with a file name as argument, or PYVISTA_OFF_SCREEN=true) the same is done by program,
 and a picture is written: white matter, bright, within a translucent brain.
@@ -25,7 +24,7 @@ def main() -> None:
     plotter = pv.Plotter(off_screen=off_screen, window_size=(640, 480))
     volume = pvdi.examples.load_brain()
     brain = plotter.add_vdi(volume, cmap="bone", opacity="sigmoid_10", show_scalar_bar=False)
-    editor = plotter.add_transfer_function_editor(brain, cmap=["bone", "inferno", "viridis"])
+    editor = plotter.vdi.add_transfer_function_editor(brain)
     plotter.camera_position = [(-90, 550, 340), (70, 108, 105), (0, 0, 1)]
     if not off_screen:
         plotter.show()
@@ -34,7 +33,7 @@ def main() -> None:
     editor.apply_cmap("inferno")
     plotter.show(auto_close=False)
     plotter.screenshot(target)
-    print(f"range {editor.clim}\n{brain.vdi}\nwritten: {target}")
+    print(f"{brain.vdi}\nwritten: {target}")
     plotter.close()
 
 

@@ -46,7 +46,6 @@ ARGUMENTS = {
     "interpolation": ({"interpolation": "cubic"}, "'nearest' or 'linear'"),
     "occlusion": ({"ambient_occlusion": "strong"}, "must be True, a radius.*got 'strong'"),
     "occlusion's radius": ({"ambient_occlusion": 0.0}, "radius of ambient occlusion.*got 0"),
-    "culling": ({"culling": "sideways"}, "culling must be False or one of.*got 'sideways'"),
     "mapper": ({"mapper": "cpu"}, "mapper='cpu' is none of"),
     "no supersegments": ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
     "too many": ({"max_supersegments": 4097}, "1 to 4096; got 4097"),
@@ -296,8 +295,6 @@ def test_errors_are_those_of_add_volume_too(plotter, arguments):
 def test_what_is_refused_is_named_as_it_was_given(plotter):
     with pytest.raises(errors.InvalidArgumentTypeError, match="array of numbers; got None"):
         plotter.add_vdi(VOLUME, opacity=None)
-    with pytest.raises(errors.InvalidArgumentTypeError, match="scalar_bar_args must.*'bar'"):
-        plotter.add_vdi(VOLUME, scalar_bar_args="bar")
     assert not plotter.renderer.actors
 
 
