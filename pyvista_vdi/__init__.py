@@ -23,7 +23,6 @@ _HOMES = {
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
-    "Plotter": "plotting.plotter",
     "Report": "device.report",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
