@@ -31,19 +31,6 @@ def slabs(thin=0.02, solid=30.0, edge=8, camera=FACING):
     )
 
 
-def view(position, transform=None):
-    """A perspective view of the cube."""
-    return pvdi.Camera(position, (0, 0, 0), (0, 1, 0.1), model_transform=transform)
-
-
-def ray(camera, pixel, size):
-    """Eye and unit direction in the world of the ray through a pixel's centre."""
-    half_width, half_height = camera.half_extent(size)
-    u, v = (2 * pixel[0] + 1) / size[0] - 1, (2 * pixel[1] + 1) / size[1] - 1
-    direction = np.array([u * half_width, v * half_height, 1.0]) @ camera.axes
-    return np.array(camera.position), direction / np.linalg.norm(direction)
-
-
 @pytest.mark.parametrize(
     ("pixel", "options", "message"),
     [

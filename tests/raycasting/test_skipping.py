@@ -11,7 +11,6 @@ import math
 
 import numpy as np
 import pytest
-import strategies
 from drawing import render_vdi
 from ray_scenes import generating_view
 
@@ -34,15 +33,17 @@ def _skipping_is_forced(monkeypatch):
 
 
 #: Generating views, where the VDI counts its depths from, in near depths of the bounds (others than
-#: 1 are for VDIs that another program made), a new view and how rays are followed.
+#: 1 are for VDIs that another program made), a new view and how rays are followed. The view is
+#: turned by degrees, or one of :func:`beside`: along a border between two rows of lists; along one
+#: of tiles, by pixels two tiles high; and the middle column of rays through corners of lists.
 SCENES = [
-    ("perspective", 1.0, "30 degrees", "blocks"),
-    ("parallel", 1.0, "along list borders", "one by one"),
-    ("parallel", 1.0, "across corners", "packets"),
-    ("long lens", 1e-3, "other matrix", "blocks"),
-    ("very long lens", 1.0, "90 degrees", "one by one"),
-    ("inside", 0.0, "180 degrees", "packets"),
-    ("perspective", 30.0, "along tile borders", "one by one"),
+    ("perspective", 1.0, 30, "blocks"),
+    ("parallel", 1.0, ((0, 0, -1), (0, 1, 0), (96, 80)), "one by one"),
+    ("parallel", 1.0, ((math.sqrt(0.5), -math.sqrt(0.5), 0), (0, 0, 1), (95, 75)), "packets"),
+    ("long lens", 1e-3, 60, "blocks"),
+    ("very long lens", 1.0, 90, "one by one"),
+    ("inside", 0.0, 180, "packets"),
+    ("perspective", 30.0, ((0, 0, 1), (0, 1, 0), (96, 160 // (2 * STACK))), "one by one"),
 ]
 
 
@@ -138,34 +139,11 @@ def beside(vdi, right, up, size=SIZE):
     return camera, size
 
 
-C = math.sqrt(0.5)
-NEW_VIEWS = {
-    "30 degrees": lambda rng, vdi: (vdi.camera.azimuth(30), SIZE),
-    "90 degrees": lambda rng, vdi: (vdi.camera.azimuth(90), SIZE),
-    "180 degrees": lambda rng, vdi: (vdi.camera.azimuth(180), SIZE),
-    # The model is mirrored, and elsewhere in its world than when the VDI was made
-    "other matrix": lambda rng, vdi: (
-        strategies.camera_around(
-            rng, vdi.bounds, strategies.random_transform(rng, "mirror"), parallel=False
-        ),
-        SIZE,
-    ),
-    # From a parallel V_O: along a border between two rows of lists; of tiles, by pixels two tiles
-    # high; and the middle column of rays through corners of lists
-    "along list borders": lambda rng, vdi: beside(
-        vdi, (0, 0, -1), (0, 1, 0), (SIZE[0], WINDOW[1] // 2)
-    ),
-    "along tile borders": lambda rng, vdi: beside(
-        vdi, (0, 0, 1), (0, 1, 0), (SIZE[0], WINDOW[1] // (2 * STACK))
-    ),
-    "across corners": lambda rng, vdi: beside(vdi, (C, -C, 0), (0, 0, 1), (95, 75)),
-}
-
-
-@pytest.mark.parametrize(("kind", "origin", "name", "dealt"), SCENES, indirect=["dealt"])
-def test_sparse_vdis(runtime, kind, origin, name, dealt):
+@pytest.mark.parametrize(("kind", "origin", "new", "dealt"), SCENES, indirect=["dealt"])
+def test_sparse_vdis(runtime, kind, origin, new, dealt):
     vdi = scene(kind, origin)
-    camera, size = NEW_VIEWS[name](np.random.default_rng([len(name), 600]), vdi)
+    turn = np.isscalar(new)
+    camera, size = (vdi.camera.azimuth(new), SIZE) if turn else beside(vdi, *new)
     plain, image = (
         render_vdi(vdi, camera, size, skip_empty=skip, device=runtime) for skip in (False, True)
     )
