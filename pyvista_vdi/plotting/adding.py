@@ -47,7 +47,7 @@ from pyvista_vdi.plotting.volumes import as_grid, held, require_grid
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
@@ -363,8 +363,7 @@ def _deferred(volume: Any, asked: Addition) -> _Shown:
     read = source.GetVolume()
     ends, _ = kept_range(read, asked.options, asked.deferral)
     plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
-    values = LateValues(source)
-    return _values_shown(values, plain, ends, read.default_unit_distance, read.name)
+    return _values_shown(source, plain, ends, read.default_unit_distance, read.name)
 
 
 def _refuse_of_values(look: Looks) -> None:
@@ -381,7 +380,7 @@ def _refuse_of_values(look: Looks) -> None:
 
 
 def _values_shown(
-    values: DeferredVDI | LateValues,
+    values: DeferredVDI | VDISource,
     asked: Addition,
     value_range: tuple[float, float],
     unit_distance: float,

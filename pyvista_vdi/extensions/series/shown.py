@@ -162,7 +162,7 @@ class SeriesInput(Input):
         self.device = device
 
     @property
-    def busy(self) -> bool:
+    def busy(self) -> bool:  # type: ignore[override]
         """Whether it plays."""
         return self.playing
 
