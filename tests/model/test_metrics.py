@@ -49,8 +49,6 @@ def test_ssim_is_that_of_wang_et_al():
     assert compare_images(a, b).ssim == pytest.approx(ssim[5:-5, 5:-5].mean(), abs=1e-9)
 
 
-
-
 @given(
     edges=st.tuples(*[st.floats(1e-3, 1e3)] * 3),
     centre=st.tuples(*[st.floats(-1e3, 1e3)] * 3),
