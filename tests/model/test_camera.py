@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import pickle
-import re
 
 import numpy as np
 import pytest
@@ -194,13 +193,12 @@ def test_a_camera_survives_its_description_pickling_and_comparison(rng):
 
 def test_a_camera_cannot_be_changed_and_says_its_lens():
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), view_angle=42)
-    with pytest.raises(AttributeError, match=re.escape("use replace()")):
+    with pytest.raises(AttributeError, match="view_angle"):
         camera.view_angle = 3
     for array in (camera.model_transform, camera.axes):
         with pytest.raises(ValueError, match="read-only"):
             array[0, 0] = 2
     assert "view_angle=42" in repr(camera)
-    assert "parallel_scale=1" in repr(camera.replace(parallel_projection=True))
 
 
 @pytest.mark.parametrize("size", [(1, 1), (MAX_WINDOW_EDGE, 1), (np.int64(7), 3.0), [4, 5]])
