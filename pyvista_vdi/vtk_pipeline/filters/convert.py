@@ -316,7 +316,7 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
     size = image.GetDimensions()[:2]
     vdi = VDI(camera=view, window_size=size, offsets=offsets, **arrays, **entries)
     kept = about.get("deferred")
-    return vdi if kept is None else DeferredVDI.of_lists(vdi, kept)
+    return vdi if kept is None else DeferredVDI(vdi, kept)
 
 
 def _counts_of(image: vtk.vtkImageData) -> NDArray[Any]:
