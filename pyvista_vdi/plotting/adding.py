@@ -307,7 +307,7 @@ def _of_values(shown: DeferredVDI, asked: Addition) -> _Shown:
     """Return a deferred VDI with the property that classifies it."""
     asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
     title = str(shown.metadata.get("scalars") or "Data")
-    return _classified(shown, asked, shown.value_range, shown.unit_distance, title)
+    return _values_shown(shown, asked, shown.value_range, shown.unit_distance, title)
 
 
 def _of_late_values(volume: Any, asked: Addition) -> _Shown:
@@ -328,7 +328,7 @@ def _of_late_values(volume: Any, asked: Addition) -> _Shown:
     volume = source.GetVolume()
     ends, _ = kept_range(volume, asked.options, asked.deferral)
     plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
-    return _classified(source, plain, ends, volume.default_unit_distance, volume.name)
+    return _values_shown(source, plain, ends, volume.default_unit_distance, volume.name)
 
 
 def _refuse_of_values(look: Looks) -> None:
@@ -344,7 +344,7 @@ def _refuse_of_values(look: Looks) -> None:
             )
 
 
-def _classified(
+def _values_shown(
     values: DeferredVDI | VDISource,
     asked: Addition,
     value_range: tuple[float, float],
