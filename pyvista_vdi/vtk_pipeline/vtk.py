@@ -38,7 +38,7 @@ vtkRenderingUI vtkInteractionStyle vtkRenderingAnnotation vtkRenderingImage vtkR
 vtkRenderingLabel vtkFiltersGeneral vtkFiltersGeometry vtkFiltersHybrid vtkFiltersSources
 vtkImagingCore vtkImagingGeneral vtkImagingHybrid vtkImagingSources vtkIOImage vtkIOXML vtkIOXdmf2
 vtkViewsContext2D vtkChartsCore
-""".split()
+"""
 
 
 def _chosen() -> str:
@@ -69,7 +69,7 @@ def __getattr__(name: str) -> Any:
     if not name.startswith(("vtk", "VTK", "numpy_to", "mutable", "reference", "calldata")):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        value = import_module(f"{BACKEND}.{name}") if name in _MODULES else _found(name)
+        value = import_module(f"{BACKEND}.{name}") if name in _MODULES.split() else _found(name)
     except ImportError as error:
         raise explain_import_error(error) from error
     globals()[name] = value
@@ -79,7 +79,7 @@ def __getattr__(name: str) -> Any:
 def _found(name: str) -> Any:
     """Return what has a name in one of VTK's modules, or raise ImportError."""
     first: ImportError | None = None
-    for home in _MODULES:
+    for home in _MODULES.split():
         try:
             module = import_module(f"{BACKEND}.{home}")
         except ImportError as error:  # a build may lack some
