@@ -62,7 +62,7 @@ def points(actor):
 @pytest.mark.parametrize("draw", ["auto", "volume", "vdi"])
 def test_a_nearer_view_is_drawn_of_a_finer_level(store, plotter, draw, caplog):
     caplog.set_level("INFO", "pyvista_vdi")
-    actor = plotter.add_vdi(pvdi.open_volume(store), draw=draw, **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store), draw=draw, **LOOK)
     assert (actor.level, points(actor)) == (2, N // 4)
     assert "level 2 of 3" in caplog.text
     picture(plotter)
@@ -74,7 +74,7 @@ def test_a_nearer_view_is_drawn_of_a_finer_level(store, plotter, draw, caplog):
     assert f"level {actor.level} of 3" in str(actor.status)
     other = pv.Plotter(off_screen=True, window_size=(40, 30))
     look_from(other, 120)
-    again = other.add_vdi(pvdi.open_volume(store), draw=draw, **LOOK)
+    again = other.add_vdi(pvdi.read_volume(store), draw=draw, **LOOK)
     assert again.level == actor.level
     straight = picture(other)
     other.close()
@@ -87,20 +87,20 @@ def test_a_nearer_view_is_drawn_of_a_finer_level(store, plotter, draw, caplog):
 
 
 def test_a_level_that_is_asked_for_stays(store, plotter):
-    actor = plotter.add_vdi(pvdi.open_volume(store, level=1), **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store, level=1), **LOOK)
     look_from(plotter, 60)
     picture(plotter)
     assert (actor.level, points(actor)) == (1, N // 2)
 
 
 def test_levels_have_the_finest_ones_opacity(store, plotter):
-    finest = pvdi.open_volume(store)
+    finest = pvdi.read_volume(store)
     actor = plotter.add_vdi(finest, **LOOK)
     assert actor.prop.GetScalarOpacityUnitDistance() == pytest.approx(finest.default_unit_distance)
 
 
 def test_a_level_that_cannot_be_read_leaves_the_picture_and_is_said_once(store, plotter):
-    actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store), **LOOK)
     picture(plotter)
     for chunk in (store / "0").rglob("*"):
         if chunk.is_file() and not chunk.name.startswith("."):
@@ -114,7 +114,7 @@ def test_a_level_that_cannot_be_read_leaves_the_picture_and_is_said_once(store, 
 
 
 def test_what_memory_cannot_hold_is_not_read(store, plotter, monkeypatch):
-    actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store), **LOOK)
 
     def refuse(nbytes, what, remedy, free):
         raise pvdi.DeviceMemoryError(f"{what} needs {nbytes} bytes: {remedy}")
@@ -127,8 +127,8 @@ def test_what_memory_cannot_hold_is_not_read(store, plotter, monkeypatch):
 
 
 def test_a_removed_actor_reads_nothing_and_other_data_stay(store, plotter, monkeypatch):
-    actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
-    removed = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store), **LOOK)
+    removed = plotter.add_vdi(pvdi.read_volume(store), **LOOK)
     plotter.remove_actor(removed)
     actor.mapper.dataset = pv.ImageData(dimensions=(5, 5, 5))
     actor.mapper.dataset["values"] = np.arange(125.0)
@@ -140,7 +140,7 @@ def test_a_removed_actor_reads_nothing_and_other_data_stay(store, plotter, monke
 
 
 def test_an_actor_whose_mapper_is_taken_away_reads_nothing(store, plotter, monkeypatch):
-    actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store), **LOOK)
     found = actor._refinement
     monkeypatch.setattr(refinement, "load", lambda _: pytest.fail("a level was read"))
     actor.SetMapper(None)
@@ -149,7 +149,7 @@ def test_an_actor_whose_mapper_is_taken_away_reads_nothing(store, plotter, monke
 
 
 def test_in_a_window_a_thread_reads_and_frames_go_on(store, plotter, monkeypatch):
-    actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store), **LOOK)
     picture(plotter)
     go_on, found = threading.Event(), actor._refinement
     load = refinement.load
@@ -172,7 +172,7 @@ def test_in_a_window_a_thread_reads_and_frames_go_on(store, plotter, monkeypatch
 
 def test_the_end_of_a_plotter_ends_the_reading(store):
     plotter = pv.Plotter(off_screen=True, window_size=(40, 30))
-    actor = plotter.add_vdi(pvdi.open_volume(store), **LOOK)
+    actor = plotter.add_vdi(pvdi.read_volume(store), **LOOK)
     found = actor._refinement
     plotter.close()
     assert found._observer == 0
@@ -184,22 +184,22 @@ def test_the_end_of_a_plotter_ends_the_reading(store):
 def test_the_dial_and_series_take_the_level_that_the_view_requires(store):
     far = pvdi.Camera(position=(31.5, 31.5, 900), focal_point=(31.5, 31.5, 31.5), view_up=(0, 1, 0))
     size, look = (40, 30), {"clim": (0, 255)}
-    chosen = pvdi.open_volume(store, camera=far, window_size=size)
+    chosen = pvdi.read_volume(store).in_view(far, window_size=size)
     assert chosen.level == 2
-    dialled = pvdi.generate(pvdi.open_volume(store), far, size, quality="fast", **look)
+    dialled = pvdi.generate(pvdi.read_volume(store), far, size, quality="fast", **look)
     assert dialled.metadata["dial"]["chosen"]
     assert dialled.bounds == chosen.bounds
-    series = pvdi.generate_series([pvdi.open_volume(store)], far, size, **look)
+    series = pvdi.generate_series([pvdi.read_volume(store)], far, size, **look)
     assert series[0].bounds == chosen.bounds
-    asked = pvdi.generate_series([pvdi.open_volume(store, level=0)], far, size, **look)
-    assert asked[0].bounds == pvdi.open_volume(store).bounds != chosen.bounds
+    asked = pvdi.generate_series([pvdi.read_volume(store, level=0)], far, size, **look)
+    assert asked[0].bounds == pvdi.read_volume(store).bounds != chosen.bounds
 
 
 @pytest.mark.extension("sets")
 def test_a_set_takes_the_finest_level_that_a_view_requires(store):
     at = {"focal_point": (31.5, 31.5, 31.5), "view_up": (0, 1, 0)}
     near, far = (pvdi.Camera(position=(31.5, 31.5, 31.5 + d), **at) for d in (300, 900))
-    volume = pvdi.open_volume(store)
+    volume = pvdi.read_volume(store)
     wanted = volume.in_view(far, near, window_size=(40, 30))
     assert wanted.level == 1
     made = pvdi.generate_set(

@@ -362,7 +362,7 @@ def a_finer_level_comes_by_itself():
         plotter = pv.Plotter(off_screen=False, window_size=(121, 103))
         plotter.camera_position = ((31.5, 31.5, 4000), middle, (0, 1, 0))
         looks = {"clim": (0, 255), "cmap": "viridis", "show_scalar_bar": False, "draw": "volume"}
-        actor = plotter.add_vdi(pvdi.open_volume(store(folder)), **looks)
+        actor = plotter.add_vdi(pvdi.read_volume(store(folder)), **looks)
         plotter.show(interactive_update=True, auto_close=False)
         assert (actor.level, plotter.render_window.GetShowWindow()) == (2, 1)
         refinement.load = held
@@ -381,7 +381,7 @@ def a_finer_level_comes_by_itself():
         assert np.abs(fine - coarse).mean() > 5, np.abs(fine - coarse).mean()
         other = pv.Plotter(off_screen=True, window_size=(121, 103))
         other.camera = plotter.camera.copy()
-        other.add_vdi(pvdi.open_volume(folder), **looks)
+        other.add_vdi(pvdi.read_volume(folder), **looks)
         again = other.screenshot(return_img=True).astype(int)[::-1].reshape(-1, 3)
         assert np.abs(again - fine).max() <= 2, np.abs(again - fine).max()
         other.close()

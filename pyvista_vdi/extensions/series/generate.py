@@ -60,7 +60,7 @@ def generate_series(
         The steps: each what :func:`pyvista_vdi.generate` takes, or an array indexed [z, y, x],
         for which ``spacing`` is given, so that a NumPy or Dask array indexed [step, z, y, x] will
         do. They are taken one by one. Or a function that returns step i; or a VTK or PyVista
-        source that has time steps; or what :func:`pyvista_vdi.open_volume` returned for a store
+        source that has time steps; or what :func:`pyvista_vdi.read_volume` returned for a store
         that has. Of a multi-scale store, steps are of the level that the view requires, unless
         another was asked for.
     camera : pyvista.Camera or vtkCamera or Camera
