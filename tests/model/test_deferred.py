@@ -246,8 +246,8 @@ def test_packed_values_are_within_their_bounds():
 @pytest.mark.parametrize(
     ("key", "value", "says"),
     [
-        ("version", 2, "version 2; this is pyvista-vdi.*upgrade"),
-        ("version", "1", "version of its values is '1'"),
+        ("version", 2, "version 2, .*upgrade"),
+        ("version", "1", "values are of version '1'"),
         ("value_range", [1], "value_range must be"),
         ("unit_distance", None, "unit_distance must be"),
         ("importance", "x", "importance must be"),

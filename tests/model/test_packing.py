@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from oracle import assert_explained, total
 
 from pyvista_vdi import VDI, Camera, render
-from pyvista_vdi.io.vdi_file.codes import packed_of_stored, stored_rows
+from pyvista_vdi.io.vdi_file.reader import packed_of_stored
+from pyvista_vdi.io.vdi_file.writer import stored_rows
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 

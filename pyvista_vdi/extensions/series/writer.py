@@ -16,7 +16,7 @@ from pyvista_vdi.extensions.series.files import times_of
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import check_range, checked_time
 from pyvista_vdi.io import check_write_options
-from pyvista_vdi.io.vdi_file.description import to_json
+from pyvista_vdi.io.vdi_file.layout import to_json
 from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
