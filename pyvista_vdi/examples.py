@@ -233,7 +233,7 @@ def load_data(name: str, *, as_volume: bool = False) -> pv.ImageData | Volume:
     volume.name = VOLUMES[name].quantity
     if as_volume:
         return volume
-    from pyvista_vdi.plotting.convert import to_image_data
+    from pyvista_vdi.plotting.volumes import to_image_data
 
     return to_image_data(volume, VOLUMES[name].quantity)
 

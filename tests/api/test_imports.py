@@ -34,7 +34,6 @@ OWNERS = {
     "paraview": ("extensions.paraview",),
     "pyopencl": ("device",),
     "pyvista": ("plotting", "examples", "extensions.web", "measure", "cli"),
-    "trame": ("extensions.web",),
     "traitlets": ("extensions.web",),
     "vtk": (),
     "vtkmodules": ("vtk_pipeline", "extensions.paraview"),

@@ -46,7 +46,6 @@ def test_it_makes_what_generate_makes():
         "tolerance": 0.01,
         "view_cone": 20.0,
         "memory_limit": 2**30,
-        "ambient_occlusion": pvdi.AmbientOcclusion(0.5, strength=1.0),
     }
     names = {name: name.title().replace("_", "") for name in settings}
     source = ready_source(**{names[name]: value for name, value in settings.items()})
@@ -59,15 +58,10 @@ def test_it_makes_what_generate_makes():
         **with_settings(**settings),
     )
     assert source.GetVDI().equals(expected)
-    assert source.GetVDI().metadata["ambient_occlusion"]["radius"] == 0.5
     assert vdi_from_image(source.GetOutputDataObject(0)).equals(expected)
     assert source.GetOutputDataObject(0).GetDimensions() == (*SIZE, 1)
     assert {name: getattr(source, f"Get{names[name]}")() for name in names} == settings
     assert source.GetWindowSize() == SIZE
-    source.SetAmbientOcclusion(None)
-    plain = source.GetVDI()
-    assert "ambient_occlusion" not in plain.metadata
-    assert expected.color.mean() < 0.8 * plain.color.mean()
     source.SetMetadata({"patient": "knee"})
     assert source.GetVDI().metadata["patient"] == "knee"
 
@@ -83,7 +77,6 @@ def test_it_executes_only_when_something_has_changed():
     for name, value in (
         ("Camera", camera_at(5, 4, 3)),
         ("MaxSupersegments", 20),
-        ("AmbientOcclusion", False),
         ("Lights", other),
         ("Metadata", {"a": 1}),
         ("SampleDistance", None),
@@ -106,8 +99,6 @@ def test_it_executes_only_when_something_has_changed():
         lambda: prop.SetScalarOpacityUnitDistance(0.3),
         lambda: source.SetCamera(camera_at(5, 5, 5)),
         lambda: source.SetMaxSupersegments(5),
-        lambda: source.SetAmbientOcclusion(True),
-        lambda: source.SetAmbientOcclusion(pvdi.AmbientOcclusion(0.3, strength=0.5)),
         lambda: volume.GetPointData().GetScalars().Modified(),
     ]
     for count, change in enumerate(changes, start=2):

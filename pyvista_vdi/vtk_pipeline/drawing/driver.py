@@ -88,7 +88,6 @@ class Driver:
         self.device: Any = None
         self.input: Input | None = None
         self.box, self.texts = Box(), CornerTexts()
-        self.level: tuple[int, int] | None = None  # of a store, and of how many
         self._actor: Callable[[], Any] = lambda: None
         self._window: Callable[[], Window | None] = lambda: None  # of the last frame
         self._active = vtkWeakReference()  # which renderer is between its start and its end
@@ -832,7 +831,6 @@ class Driver:
             stand_in=self._stand_in,
             drawn=last.way,
             time=None if player is None else player.time,
-            level=self.level,
         )
 
     def vdi_asked_for(self) -> VDI | None:

@@ -43,8 +43,8 @@ FORM_VERSION = 2
 _RAGGED = {"front": 1, "back": 1, "color": 3, "optical_depth": 1}
 
 _RESAMPLE = (
-    'resample it: add_vdi(grid, resample="auto"), pyvista.ImageData(...).sample(grid), or '
-    "vtkResampleToImage (in ParaView the filter Resample To Image)"
+    "resample it: pyvista.ImageData(...).sample(grid), or vtkResampleToImage (in ParaView the "
+    "filter Resample To Image)"
 )
 
 #: What to do with data sets that are not uniform grids.
