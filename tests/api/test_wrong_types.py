@@ -119,7 +119,7 @@ ENTRIES = {
     "depth": lambda vdi: (pvdi.render_depth, {"vdi": vdi, "camera": CAMERA}, None),
     "pick": lambda vdi: (pvdi.pick, {"vdi": vdi, "camera": CAMERA, "pixel": (3, 3)}, None),
     "read": lambda vdi: (pvdi.read, {"path": "none.vdi"}, ["progress", "camera"]),
-    "open_volume": lambda vdi: (pvdi.open_volume, {"path": "s.h5"}, None),
+    "read_volume": lambda vdi: (pvdi.read_volume, {"path": "s.h5"}, None),
     "compare_images": lambda vdi: (
         pvdi.compare_images,
         {"image": np.zeros((20, 20, 4), "f4"), "reference": np.zeros((20, 20, 4), "f4")},
@@ -223,7 +223,7 @@ def vdi(default_runtime, tmp_path, monkeypatch):
     ],
 )
 def test_only_errors_of_the_package_come_out(entry, vdi, tmp_path):
-    if entry == "open_volume":
+    if entry == "read_volume":
         with pytest.importorskip("h5py").File(tmp_path / "s.h5", "w") as file:
             file["x"] = ARRAY
     if entry == "looks":

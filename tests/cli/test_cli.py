@@ -136,7 +136,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
             "the same point",
         ),
         ("render a.vdi -o a.png --view-angle -1.8e-15", "view_angle must lie .*; got -1.8e-15"),
-        ("generate v.nrrd -o b.vti", "VTK writes its own files, .*; name a .vdi file here"),
+        ("generate v.nrrd -o b.vti", "cannot be written as a VDI: the name must end in .vdi"),
         (
             "generate v.nrrd -o b.vdi --transfer-function tf.json --cmap bone",
             "transfer_function stands in place of cmap",

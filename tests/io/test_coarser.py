@@ -9,7 +9,7 @@ from ray_scenes import rebuilt
 from reference.raycast import centre_ray_scale
 
 from pyvista_vdi import VDI, Camera
-from pyvista_vdi.io.vdi_file.coarse import coarser
+from pyvista_vdi.io.vdi_file.writer import coarser
 
 BOUNDS = (-1, 1, -1, 1, -1, 1)
 STRETCHED = np.diag([1.0, 2.0, 3.0, 1.0])

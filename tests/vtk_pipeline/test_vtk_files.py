@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, VDIFileError
+from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline import (
     vdi_from_image,
@@ -128,16 +128,6 @@ def test_files_of_vtk_and_pyvista_keep_every_bit(kind, mode, compressor, tmp_pat
 def test_any_vdi_in_its_form(seed):
     vdi = some_vdi(seed, max_window=(9, 7))
     assert_same(vdi_from_image(vdi_to_image(vdi)), vdi)
-
-
-def test_our_reading_and_saving_name_vtks(tmp_path):
-    path = tmp_path / "v.vti"
-    with pytest.raises(VDIFileError, match=r"wrap\(.*vdi_to_image\(vdi\)\)\.save"):
-        some_vdi().save(path)
-    assert not list(tmp_path.iterdir())
-    pv.wrap(vdi_to_image(some_vdi())).save(path)
-    with pytest.raises(VDIFileError, match=r"vdi_from_image\(pyvista\.read\(path\)\)"):
-        pvdi.read(path)
 
 
 def test_an_image_outlives_the_vdi_whose_memory_it_shares():
