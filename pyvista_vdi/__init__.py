@@ -24,7 +24,6 @@ _HOMES = {
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
     "Plotter": "plotting.plotter",
-    "Report": "device.report",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",
