@@ -34,7 +34,6 @@ from pyvista_vdi.model.presets import presets as presets
 from pyvista_vdi.model.transfer_function import TransferFunction as TransferFunction
 from pyvista_vdi.model.vdi import VDI as VDI
 from pyvista_vdi.model.volume import Volume as Volume
-from pyvista_vdi.plotting.plotter import Plotter as Plotter
 from pyvista_vdi.raycasting.picking import Pick as Pick
 from pyvista_vdi.vtk_pipeline import VDIActor as VDIActor
 from pyvista_vdi.vtk_pipeline import VDIMapper as VDIMapper

@@ -263,7 +263,7 @@ def test_volumes_without_something_to_render(camera):
     ):
         with pytest.raises(InvalidVolumeError, match=message):
             api.generate(grid, camera, SIZE, cmap="bone")
-    with pytest.raises(UnsupportedError, match="not a uniform grid.*voxelise it"):
+    with pytest.raises(UnsupportedError, match="not a uniform grid.*voxelise"):
         api.generate(pv.Sphere(), camera, SIZE)
 
 

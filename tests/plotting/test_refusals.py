@@ -293,8 +293,6 @@ def test_errors_are_those_of_add_volume_too(plotter, arguments):
 def test_what_is_refused_is_named_as_it_was_given(plotter):
     with pytest.raises(errors.InvalidArgumentTypeError, match="array of numbers; got None"):
         plotter.add_vdi(VOLUME, opacity=None)
-    with pytest.raises(errors.InvalidArgumentTypeError, match="scalar_bar_args must.*'bar'"):
-        plotter.add_vdi(VOLUME, scalar_bar_args="bar")
     assert not plotter.renderer.actors
 
 

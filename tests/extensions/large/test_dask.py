@@ -138,7 +138,7 @@ def _left(dask_scheduler):
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
-        ("cluster", InvalidArgumentTypeError, r"a LocalCluster: give distributed.Client\(cluster"),
+        ("cluster", InvalidArgumentTypeError, r"LocalCluster: give distributed.Client\(cluster"),
         (7, InvalidArgumentTypeError, "an? int"),
         ("tcp://127.0.0.1:1", InvalidArgumentError, "no Dask scheduler answers at 'tcp://127"),
     ],
@@ -226,30 +226,19 @@ def in_folders(client, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(not Path("/proc/self/cwd").exists(), reason="a path that differs by process")
 @pytest.mark.parametrize("kind", [*STORES, "dask"])
-@pytest.mark.parametrize(
-    ("where", "said"), [("none", "cannot be read there"), ("other", "another file")]
-)
-def test_a_worker_that_has_not_the_same_store_is_named(
-    client, scene, in_folders, where, said, kind
-):
+def test_a_worker_that_has_not_the_store_is_named(client, scene, in_folders, kind):
     (_, *rest), options = scene
-    array, here = volume_of("uint8").array, in_folders("here", where)
-    make = STORES["zarr" if kind == "dask" else kind]
-    make(here, array)
-    if where != "none":
-        make(here.parent / where, array // 2)
+    STORES["zarr" if kind == "dask" else kind](in_folders("here", "none"), volume_of("uint8").array)
     path = "/proc/self/cwd/s"  # as of a mount that is not the same on all machines
     opened = Volume(da.from_zarr(path)) if kind == "dask" else open_volume(path)
     bad = list(client.nthreads())[1]
-    with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.*{said}"):
+    with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.* cannot be read there"):
         generate_in_blocks(opened, *rest, client=client, **options)
 
 
 @pytest.mark.every(9)
 @pytest.mark.parametrize("kind", STORES)
-def test_relative_paths_are_this_process_s_and_changes_are_seen_while_it_is_open(
-    client, scene, in_folders, kind, default_runtime
-):
+def test_relative_paths_are_this_process_s(client, scene, in_folders, kind, default_runtime):
     (_, *rest), options = scene
     array, here = volume_of("uint8").array, in_folders("none", "none")
     STORES[kind](here, array)

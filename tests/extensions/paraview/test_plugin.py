@@ -389,7 +389,7 @@ def test_mistakes_are_said_and_nothing_breaks(paraview, tmp_path):
     assert "VDIToImage: this vtkImageData is not a VDI" in said
     assert f"VDIReader: {tmp_path}/absent.vdi cannot be read" in said
     assert f"VDIWriter: {tmp_path}/no folder/x.vdi cannot be written" in said
-    assert "VDISource: a vtkUnstructuredGrid is not a uniform grid" in said
+    assert "VDISource: vtkUnstructuredGrid is not a uniform grid" in said
     assert "Resample To Image" in said
     assert len(said.splitlines()) == 5
 
