@@ -23,7 +23,6 @@ _HOMES = {
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
-    "Report": "device.report",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",

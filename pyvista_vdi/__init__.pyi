@@ -13,7 +13,6 @@ from pyvista_vdi.api import render_depth as render_depth
 from pyvista_vdi.api import render_volume as render_volume
 from pyvista_vdi.device import describe_devices as describe_devices
 from pyvista_vdi.device import list_devices as list_devices
-from pyvista_vdi.device.report import Report as Report
 from pyvista_vdi.errors import *
 from pyvista_vdi.extensions.series.generate import generate_series as generate_series
 from pyvista_vdi.extensions.series.series import VDISeries as VDISeries

@@ -28,7 +28,7 @@ def test_sum_product_and_quotient(call):
     a, b = value(first), value(second)
     sums, products, quotients, less = call(
         FILE, "arithmetic", n, first, second, call.empty(n, 2), call.empty(n, 2),
-        call.empty(n, 2), call.empty(n, dtype=np.int32), DOUBLE_FLOAT_RAYS=None,
+        call.empty(n, 2), call.empty(n, dtype=np.int32), DOUBLE_FLOAT_RAYS=1,
     )  # fmt: skip
     larger = np.maximum(np.abs(a), np.abs(b))
     assert (np.abs(value(sums) - (a + b)) <= 2.0**-46 * larger).all()
@@ -45,7 +45,7 @@ def test_a_quotient_beyond_float32_is_infinite_and_no_nan(call):
     b = np.array([[1e-30, 0], [1e-30, 0], [-1e-38, 0]], np.float32)
     found = call(
         FILE, "arithmetic", 3, a, b, call.empty(3, 2), call.empty(3, 2), call.empty(3, 2),
-        call.empty(3, dtype=np.int32), DOUBLE_FLOAT_RAYS=None,
+        call.empty(3, dtype=np.int32), DOUBLE_FLOAT_RAYS=1,
     )[2]  # fmt: skip
     np.testing.assert_array_equal(found, [[np.inf, 0], [-np.inf, 0], [-np.inf, 0]])
 
@@ -64,7 +64,7 @@ def test_entries_that_are_far_away(call, far):
     packed = np.concatenate([pairs(forms)[..., 0], pairs(forms)[..., 1]], axis=-1)
     entry, rest, left = call(
         FILE, "entries", n, packed, np.int32(2), offsets, np.float32(np.inf), call.empty(n, 2),
-        call.empty(n, 2), call.empty(n, dtype=np.int32), DOUBLE_FLOAT_RAYS=None,
+        call.empty(n, 2), call.empty(n, dtype=np.int32), DOUBLE_FLOAT_RAYS=1,
     )  # fmt: skip
     assert left.all()
     pixel = np.column_stack([np.ones(n), offsets.astype(np.float64)])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import devices, programs
+from pyvista_vdi.device import KernelDeclaration, devices, programs
 from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import Cancelled
@@ -234,13 +234,6 @@ __kernel void chase(__global const uint *next, __global uint *end, const uint st
 """
 
 
-def declared(path, name):
-    """The kernel ``index`` or ``chase`` of a file."""
-    index = {"x": "uint*", "wide": "uint"}
-    chase = {"next": "uint*", "end": "uint*", "steps": "uint"}
-    return ocl.KernelDeclaration(path, name, **(index if name == "index" else chase))
-
-
 @pytest.fixture
 def kernels(tmp_path):
     path = tmp_path / "kernels.cl"
@@ -260,7 +253,7 @@ def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch,
     with runtime.buffer((n,), np.uint32) as x:
         with runtime.background():
             runtime.fill(x, 0)
-            runtime.bind(declared(kernels, "index"), x=x, wide=size[0])(size, group)
+            runtime.bind(KernelDeclaration(kernels, "index"), x=x, wide=size[0])(size, group)
         np.testing.assert_array_equal(runtime.download(x), np.arange(1, n + 1))
     assert sum(pieces) == n
     assert n <= 4096 or len(pieces) > 1
@@ -297,7 +290,7 @@ def test_copies_in_pieces(runtime):
 
 
 def test_every_use_of_the_device_asks_whether_the_work_is_wanted(runtime, kernels):
-    launch = runtime.bind(declared(kernels, "index"), wide=64)
+    launch = runtime.bind(KernelDeclaration(kernels, "index"), wide=64)
     array = np.zeros(2**21, np.uint32)
     unwanted = threading.Event()
     with runtime.background(unwanted.is_set), runtime.buffer(array.shape, np.uint32) as x:
@@ -332,7 +325,7 @@ def test_compiling_lets_frames_go_on(runtime, kernels, monkeypatch):
     monkeypatch.setattr(programs, "build", build_beside_a_frame)
     kernels.write_text(KERNELS + "// not compiled before\n")
     with runtime.background():
-        runtime.kernel(kernels, "index")
+        runtime.kernel(KernelDeclaration(kernels, "index"), {})
     assert frames == ["drawn"]
 
 
@@ -352,7 +345,8 @@ def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, o
         runtime.queue_scope() if own_queue else contextlib.nullcontext(),
     ):
         shared = runtime.upload(array)
-        launch = runtime.bind(declared(kernels, "chase"), next=shared, end=end, steps=steps)
+        chase = KernelDeclaration(kernels, "chase")
+        launch = runtime.bind(chase, next=shared, end=end, steps=steps)
         launch(64, 64)
         InThread(shared.release).value()
         array[...] = 0  # in place of freeing it, which would crash some time later, or not
@@ -394,7 +388,7 @@ def test_a_thread_waits_for_its_own_queue_only(runtime, finished):
 def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime, kernels, finished):
     with runtime.queue_scope():
         buffer = runtime.result((64,), np.uint32)
-        runtime.bind(declared(kernels, "index"), x=buffer, wide=64)(64, 64)
+        runtime.bind(KernelDeclaration(kernels, "index"), x=buffer, wide=64)(64, 64)
         runtime.finish()
         before = sum(finished)
         buffer.release()

@@ -8,7 +8,7 @@ from recorded_runs import EXTREMES, as_runs, random_records
 
 from pyvista_vdi import Volume
 from pyvista_vdi.device.constants import GROUP, block_items
-from pyvista_vdi.generation.kernels import RECORDING, SHORTEN_LISTS
+from pyvista_vdi.generation.kernels import SHORTEN_LISTS
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.volume.rays import GridRays
 
@@ -62,7 +62,7 @@ def shortened(runtime, lanes, records, limit, exactly, *, hidden_weight=0.25, re
             {"DOUBLE_FLOAT_RAYS": 0, "LANES": lanes},
             view=grid.view(WINDOW, 0, window),
             forms=rays,
-            recording=RECORDING(**numbers, reference_length=reference, hidden_weight=hidden_weight),
+            recording={**numbers, "reference_length": reference, "hidden_weight": hidden_weight},
             exactly=exactly,
             thresholds=of_items,
             records=all_records,

@@ -1,31 +1,14 @@
-"""``pvdi.Report()``, and how a VDI shows itself."""
+"""How a VDI shows itself."""
 
 from __future__ import annotations
-
-from importlib import metadata
 
 import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.device import report
-from pyvista_vdi.errors import NoDeviceError
 from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (64, 48)
-
-
-def test_a_report_names_versions_and_devices(default_runtime, monkeypatch):
-    said = repr(pvdi.Report())
-    assert f"numpy {metadata.version('numpy')}" in said
-    assert default_runtime.info.name in said
-    assert "<pre>" in pvdi.Report()._repr_html_()
-
-    def none():
-        raise NoDeviceError("no device")
-
-    monkeypatch.setattr(report, "describe_devices", none)
-    assert "no device" in repr(pvdi.Report())
 
 
 @pytest.fixture(scope="module")
