@@ -19,8 +19,8 @@ from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError
-from pyvista_vdi.extensions.web.shown import camera_of, viewer_camera
 from pyvista_vdi.extensions.web.notebook import mime_bundle, show_plotter
+from pyvista_vdi.extensions.web.shown import camera_of, viewer_camera
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 anywidget = pytest.importorskip("anywidget", reason="needs the extra notebook")
