@@ -70,7 +70,7 @@ LEVELS = (
 LEVELS_WITHIN = {
     "io": (
         ("progress",),
-        ("png", "time_steps", "vdi_file", "axes"),
+        ("png", "vdi_file", "axes"),
         ("stores",),
         ("volumes",),
         ("files",),

@@ -211,7 +211,7 @@ class SeriesInput(SeveralInput):
         self.device = device
 
     @property
-    def busy(self) -> bool:
+    def busy(self) -> bool:  # type: ignore[override]
         """Whether it plays."""
         return self.playing
 

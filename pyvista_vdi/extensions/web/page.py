@@ -24,7 +24,6 @@ from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.metrics import check_background, over_background
 from pyvista_vdi.model.vdi import VDI
@@ -265,7 +264,7 @@ def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:
     tau = np.minimum(vdi.optical_depth, 100.0).astype(np.float64)
     sums = np.concatenate([[0.0], np.cumsum(tau)])
     before = sums[:-1] - np.repeat(sums[vdi.offsets.view(np.int64)[:-1]], counts)
-    share = transmittance(np.maximum(before, 0.0)) * opacity(tau)
+    share = np.exp(-np.maximum(before, 0.0)) * -np.expm1(-tau)
     own = np.repeat(np.arange(len(counts)), counts)
     channels = [*(share * vdi.color.T.astype(np.float64)), share]
     picture = np.empty((*vdi.window_size[::-1], 4))

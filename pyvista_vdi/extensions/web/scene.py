@@ -287,7 +287,7 @@ def _background(renderer: Any) -> str:
 
 
 def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
-    """Write a page of a plotter's scene: see ``plotting.pages.PlotterVDIs.export_html``.
+    """Write a page of a plotter's scene: see ``plotting.component.PlotterVDIs.export_html``.
 
     It is drawn, and VDIs that are missing are made.
     """
