@@ -5,6 +5,7 @@ import base64
 import importlib.metadata
 import io
 import json
+import subprocess
 import sys
 import types
 import warnings
@@ -484,3 +485,24 @@ def test_axe_finds_nothing_in_our_part_of_an_output(open_widget, series):
     page.page.get_by_label("Settings", exact=True).first.click()
     page.wait_for("viewers.every(({ series }) => series.complete)")
     assert_axe_finds_nothing(page, "viewers[0]")
+
+
+@pytest.mark.slow
+def test_nbconvert_s_page_of_an_executed_notebook_shows_the_picture_offline(
+    chromium, vdi, tmp_path
+):
+    for needed in ("nbconvert", "ipykernel"):
+        pytest.importorskip(needed)
+    nbformat = pytest.importorskip("nbformat")
+    vdi.save(tmp_path / "ball.vdi")
+    code = 'import pyvista_vdi as pvdi\npvdi.read("ball.vdi")'
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    nbformat.write(book, tmp_path / "book.ipynb")
+    command = ["nbconvert", "--execute", "--to", "html", "book.ipynb"]
+    subprocess.run([sys.executable, "-m", *command], cwd=tmp_path, check=True, timeout=300)
+    context = chromium.new_context(offline=True)
+    page = context.new_page()
+    page.goto((tmp_path / "book.html").as_uri(), wait_until="domcontentloaded")
+    [seen] = [image for image in page.locator("img").all() if image.is_visible()]
+    assert seen.evaluate("(it) => it.decode().then(() => it.naturalWidth)") == SIZE[0]
+    context.close()

@@ -1,8 +1,5 @@
 """``plotter.vdi.export_html``: series and sets in a page; PyVista is not patched."""
 
-import types
-from pathlib import Path
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -10,7 +7,6 @@ from browsers import picture
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.extensions.sets.generate import orbit, spread
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -123,17 +119,6 @@ def test_of_a_set_the_page_draws_the_nearest(plotter, from_disk, vdi_set, tmp_pa
     assert len(again) == len(vdi_set)
 
 
-def test_of_several_series_those_that_do_not_play_are_named(plotter, series, vdi_set):
-    for name, more in (("first", series), ("second", series[:2]), ("third", vdi_set)):
-        plotter.add_vdi(more, name=name, **AS_IT_IS)
-    with pytest.warns(VDIWarning, match="all but one of") as warned:
-        plotter.vdi.export_html(None)
-    words = str(warned[0].message)
-    assert "2 VDIs (second)" in words
-    assert "6 VDIs (third)" in words
-    assert "first" not in words
-
-
 def test_subplots_are_refused(tmp_path):
     plotter = pv.Plotter(off_screen=True, shape=(1, 2), window_size=SIZE)
     with pytest.raises(pvdi.InvalidArgumentError, match="one renderer, and this plotter has 2"):
@@ -151,12 +136,3 @@ def test_a_scene_without_vdis_is_a_page_too(plotter, from_disk):
     page = from_disk(plotter)
     page.ready()
     assert_as_plotter(page, plotter)
-
-
-def test_nothing_of_pyvista_is_patched():
-    """Its classes have this package's components, and functions of its own."""
-    ours = str(Path(pvdi.__file__).parent)
-    for kind in (pv.Plotter, pv.BasePlotter, pv.DataSet, pv.ImageData):
-        functions = [one for one in vars(kind).values() if isinstance(one, types.FunctionType)]
-        assert functions
-        assert [one for one in functions if one.__code__.co_filename.startswith(ours)] == []

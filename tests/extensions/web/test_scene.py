@@ -7,7 +7,8 @@ import warnings
 import numpy as np
 import pytest
 import pyvista as pv
-from browsers import COUNTING, in_base64, picture, show_scene
+from browsers import picture, show_scene
+from PIL import Image
 from plugin_scenes import soft_ball
 from skimage.metrics import structural_similarity
 
@@ -108,20 +109,6 @@ def meshes(plotter):
     plotter.add_mesh(pv.Cube(center=(-1, 1, 0)).extract_all_edges(), color="k")
 
 
-def clipped_and_moved(plotter):
-    actor, plane = ball(plotter), vtkPlane()
-    plane.SetOrigin(0, 0, 0.1)
-    plane.SetNormal(0.3, 0, -1)
-    actor.mapper.AddClippingPlane(plane)
-    sphere = plotter.add_mesh(pv.Sphere(radius=0.8), color="g")
-    plotter.show(auto_close=False)
-    for moved in (actor, sphere):
-        moved.rotate_z(30)
-        moved.position = (0.4, 0, 0)
-        moved.scale = (1, 1.4, 1)
-    actor.opacity_multiplier = 2
-
-
 def apart(plotter):
     """VDIs that a plane separates, and a mesh between them."""
     ball(plotter, at=(0.9, 1.1, 0.7), cmap="hot", opacity=[0, 0.6, 0.9])
@@ -132,7 +119,6 @@ def apart(plotter):
 slow = pytest.mark.slow
 SCENES = [
     meshes,
-    pytest.param(clipped_and_moved, marks=slow),
     pytest.param(apart, marks=slow),
 ]
 
@@ -233,30 +219,6 @@ def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_
     assert pvdi.read(path).equals(vdi.with_precision("8-byte"))
 
 
-@slow
-def test_scenes_that_follow_each_other_leave_nothing_behind(plotter, open_page):
-    meshes(plotter)
-    ball(plotter, at=(9, 0, 0))
-    plotter.add_text("text")
-    page = open_page(SMALL, before=COUNTING)
-    alive = page.evaluate(
-        """async (text) => {
-          const packed = bytesOf(text);
-          const { Scene } = await import("./scene.js"), alive = [];
-          for (let k = 0; k < 4; ++k) {
-            const next = new Scene(packed);
-            viewer.scene = next;
-            await next.whole;
-            await viewer.screenshot({ width: 32, height: 18 });
-            alive.push(JSON.stringify(window.alive));
-          }
-          return alive;
-        }""",
-        in_base64(give(page, plotter).data),
-    )
-    assert len(set(alive[1:])) == 1, alive
-
-
 def test_without_a_name_the_page_is_returned(plotter):
     ball(plotter)
     stream = plotter.vdi.export_html(None)
@@ -288,3 +250,19 @@ def test_what_is_not_shown_is_named_in_one_warning(plotter):
         "its place in other views than the first (CubeAxesActor)",
     ):
         assert what in words
+
+
+def test_a_page_has_the_plotters_background(plotter, from_disk, tmp_path):
+    """One that is not from the bottom to the top is named."""
+    ball(plotter)
+    plotter.set_background("y", top="b")
+    plotter.vdi.export_html(tmp_path / "scene.html")
+    page = from_disk(tmp_path / "scene.html")
+    page.ready()
+    page.evaluate("new Promise(requestAnimationFrame).then(() => true)")
+    got = np.asarray(Image.open(io.BytesIO(page.page.screenshot())).convert("RGB"), float)
+    want = plotter.screenshot(return_img=True)[..., :3].astype(float)
+    assert np.abs(got - want).mean() <= MEAN
+    plotter.set_background("y", side="b")
+    with pytest.warns(VDIWarning, match="a background's gradient"):
+        scene_of(plotter, "the page")
