@@ -13,9 +13,9 @@ import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import slabs_vdi
+from reference.compositing import composite
 
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.options import CRITERIA
 
 WINDOW = (12, 9)

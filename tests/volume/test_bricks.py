@@ -294,12 +294,6 @@ def test_too_little_even_for_one_brick(runtime, scene, limit):
         make(runtime, Volume(volume.array, name="density"), camera, function, memory_limit=limit)
 
 
-def test_ambient_occlusion_needs_the_volume_in_one_piece(runtime, scene):
-    message = r"ambient occlusion needs .* in one piece, 1\.86 MiB .*raise"
-    with pytest.raises(DeviceMemoryError, match=message):
-        make(runtime, *scene, ambient_occlusion=40.0, memory_limit=3.6 * 2**20)
-
-
 @pytest.mark.parametrize(
     ("text", "nbytes"),
     [

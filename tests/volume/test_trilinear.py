@@ -7,10 +7,10 @@ import pytest
 import reference
 import strategies
 from drawing import raycast_volume
+from reference.compositing import composite
 from reference.generate import classify
 
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 

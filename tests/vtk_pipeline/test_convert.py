@@ -59,10 +59,10 @@ def test_points_are_where_vtk_has_them_and_memory_is_shared():
     ("grid", "error", "message"),
     [
         (pv.ImageData(dimensions=(4, 3, 5)), InvalidVolumeError, "there is nothing to render"),
-        (some_grid(v=np.zeros((60, 3))), UnsupportedError, "3 components.*pass one component"),
-        (some_grid(v=np.zeros((60, 4), np.uint16)), UnsupportedError, "are not RGBA of type"),
-        (some_grid().cast_to_structured_grid(), UnsupportedError, "uniform grid.*resample it"),
-        (pv.Sphere(), UnsupportedError, "not a uniform grid.*voxelise it"),
+        (some_grid(v=np.zeros((60, 3))), UnsupportedError, "3 components.*one scalar per point"),
+        (some_grid(v=np.zeros((60, 4), np.uint16)), UnsupportedError, "4 components.*or from RGBA"),
+        (some_grid().cast_to_structured_grid(), UnsupportedError, "uniform grid.*resample a"),
+        (pv.Sphere(), UnsupportedError, "not a uniform grid.*voxelise a surface"),
         (pv.MultiBlock([some_grid()]), UnsupportedError, "not a uniform grid.*one by one"),
     ],
 )

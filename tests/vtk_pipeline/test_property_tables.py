@@ -8,7 +8,7 @@ from vtk_sources import camera_at
 from watched_windows import on_screen
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
@@ -168,24 +168,22 @@ def test_pictures_are_vtks(name):
 
 
 @pytest.mark.parametrize(
-    ("space", "beyond", "scale", "lone"),
+    ("space", "beyond", "lone"),
     [
-        *((space, {}, 0, False) for space in range(6)),
-        *((1, beyond, scale, False) for beyond in (BEYOND, {"Clamping": 0}) for scale in (0, 1)),
-        *((1, beyond, 0, True) for beyond in (BEYOND, {"Clamping": 0})),
+        *((space, {}, False) for space in range(6)),
+        *((1, beyond, lone) for beyond in (BEYOND, {"Clamping": 0}) for lone in (False, True)),
     ],
 )
-def test_tables_are_getcolor_s(space, beyond, scale, lone):
+def test_tables_are_getcolor_s(space, beyond, lone):
     nodes = CURVED[2:3] if lone else CURVED[1:-1]
-    color = colors_of(*nodes, **beyond, ColorSpace=space, Scale=scale)
+    color = colors_of(*nodes, **beyond, ColorSpace=space)
     volume = pvdi.Volume(np.arange(240, dtype=np.uint8).reshape(4, 6, 10))
     prop = property_of(color, function_of((0, 0.5), (0.7, 0.6), (255, 1)), InterpolationType=0)
     table = transfer_function_from_property(prop, volume)
     low, high = table.scalar_range
     assert len(table.colors) == high - low + 1
     some = range(max(int(low), 1), int(high), 11 if space != 4 else 60)
-    # A logarithm rounds the steps that are at nodes
-    for scalar in {*some, *(int(x) for x, *_ in nodes if not scale)}:
+    for scalar in {*some, *(int(x) for x, *_ in nodes)}:
         expected = color.GetColor(scalar)
         # LabCIEDE2000 goes from byte to byte, and GetColor has a node itself
         away = 0.03 if space == 4 else 2e-3
@@ -222,15 +220,7 @@ def test_each_of_thousands_of_labels_has_its_colour(dtype, steps, n):
     assert nearest.max() <= 1 / 255
 
 
-def test_what_no_table_resolves_is_said():
-    volume = ball()
-    opacity = function_of(*((100 + k * 1e-4, k % 2) for k in range(20)), (100.01, 0), (255, 0.3))
-    with pytest.warns(VDIWarning, match="opacity function has nodes closer together than 1/65536"):
-        transfer_function_from_property(property_of(opacity=opacity), volume)
-    crowd = function_of((-1e30, 0), (0, 0.1), (99, 0.3), (255, 0.6), (1e30, 1))
-    outlier = pvdi.Volume(np.where(volume.array == 0, 1e20, volume.array))
-    with pytest.warns(VDIWarning, match="opacity function has nodes closer"):
-        transfer_function_from_property(property_of(colors_of((0, 1, 1, 1)), crowd), outlier)
-    steep = property_of(gradient=function_of((0, 0), (20, 2)))
-    with pytest.warns(VDIWarning, match="gradient opacity above 1"):
-        transfer_function_from_property(steep, volume)
+def test_a_logarithmic_scale_of_colours_is_refused():
+    prop = property_of(colors_of(*CURVED[1:-1], Scale=1))
+    with pytest.raises(UnsupportedError, match="logarithmic scale.*SetScaleToLinear"):
+        transfer_function_from_property(prop, ball())
