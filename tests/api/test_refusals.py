@@ -23,23 +23,19 @@ EDGES = "between 1 and 65536 pixels along each edge; got"
 #: Options, a value of each that is wrong, and what is said.
 WRONG = [
     ("window_size", (0, 9), f"{EDGES} 0 x 9"),
-    ("window_size", (65537, 9), f"{EDGES} 65537 x 9"),
     ("window_size", (12.5, 9), r"two whole numbers of pixels; got \(12.5, 9\)"),
     ("window_size", "ab", "two whole numbers of pixels; got 'ab'"),
     ("camera", "xyz", "expected a pyvista_vdi.Camera, a vtkCamera"),
     ("blending", "mip", "one of composite, maximum, .* got 'mip'"),
     ("preference", "row", "preference must be 'point' or 'cell'"),
     ("clim", (2, 1), "clim must be two finite numbers, the smaller first"),
-    ("clim", 10**400, "clim must be two finite numbers"),
     ("n_colors", 0, "n_colors must be a whole number from 1 to 16384; got 0"),
     ("cmap", "viridys", "cmap='viridys'.*did you mean 'viridis'"),
-    ("opacity", "sigmoid_99x", "opacity='sigmoid_99x'"),
     ("opacity", [-1e308, 1e308], "stretched to that range, .* different values"),
     ("opacity_unit_distance", "x", "opacity_unit_distance must be a positive .* got 'x'"),
     ("interpolation", "cubic", "must be 'nearest' or 'linear'"),
     ("transfer_function", "bone", "must be a pyvista_vdi.TransferF"),
     ("max_supersegments", 4097, "1 to 4096; got 4097"),
-    ("max_supersegments", 1.5, "whole number.*got 1.5"),
     ("precision", "half", "precision must be .*'half'"),
     ("quality", "best", "quality must be .*'best'"),
     (
@@ -47,9 +43,7 @@ WRONG = [
         np.ones(SIZE),
         r"must have shape \(height, width\) = \(9, 12\); got \(12, 9\)",
     ),
-    ("opaque_depth", np.full((9, 12), np.nan), "opaque_depth holds NaN: use inf where nothing"),
     ("opaque_depth", "near", "opaque_depth must have shape.*'near'"),
-    ("clipping_planes", np.ones((2, 4)), rf"{PLANES}.*got shape \(2, 4\)"),
     ("clipping_planes", [[0, 0, 0, 0, np.nan, 1]], PLANES),
     ("clipping_planes", [[0, 0, 0, 0, 0, 0]], "a clipping plane's normal is zero"),
     ("clipping_planes", "x < 0", rf"{PLANES}.*'x < 0'"),
@@ -62,7 +56,6 @@ WRONG = [
     ("tolerance", -1, "tolerance.*got -1"),
     ("view_cone", 91, "view_cone.*got 91"),
     ("memory_limit", "lots", "memory_limit.*got 'lots'"),
-    ("coverage", "all", "coverage.*got 'all'"),
     ("regenerate_below", 1.5, "must be an SSIM .*got 1.5"),
     ("transmittance_cutoff", 1, "got 1"),
     ("target_fps", -1, "number of frames per second, .*got -1"),
@@ -178,14 +171,3 @@ def test_what_is_no_volume(given, message, default_runtime):
         for _ in range(2):  # nothing of the first is remembered as good
             with pytest.raises(pvdi.InvalidVolumeError, match=message):
                 function(given, CAMERA, SIZE, cmap="bone")
-
-
-def test_what_is_no_vdi():
-    for given, message in (
-        ("knee.vdi", r"got the path 'knee.vdi': read it by pyvista_vdi.read\(path\)"),
-        (None, "expected a VDI or its VTK form"),
-    ):
-        with pytest.raises(pvdi.InvalidVDIError, match=message):
-            pvdi.render(given, CAMERA)
-    with pytest.raises(TypeError, match="'cmap': this VDI's colours are fixed: .*deferred"):
-        pvdi.render(VDI, CAMERA, cmap="bone")
