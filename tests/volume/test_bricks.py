@@ -10,11 +10,10 @@ import pytest
 from drawing import generate_vdi, raycast_volume
 from runtimes import fresh_runtime, let_lack
 
-from pyvista_vdi import Camera, Light, TransferFunction, Volume
+from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.model.checks import memory_limit_bytes
-from pyvista_vdi.model.lighting import Shading
 from pyvista_vdi.volume.bricks import BrickLayout, DeviceBricks
 
 WINDOW = (20, 13)
@@ -24,7 +23,6 @@ RNG = np.random.default_rng(7)
 _K, _J, _I = np.meshgrid(*(np.arange(n) / 60 for n in (71, 150, 183)), indexing="ij")
 #: Waves, and noise at every voxel, 0 to 1, with a transparent half; nowhere a multiple of a brick.
 FIELD = np.clip(0.45 * np.sin(3 * _I * _J) * np.cos(4 * _K) + 0.25 * RNG.random(_I.shape), 0, 1)
-SHADES = Shading(ambient=0.2, diffuse=0.7, specular=0.4, specular_power=8.0)
 CENTRE = np.array([91.0, 75.0, 35.0])
 
 
@@ -122,37 +120,6 @@ def test_same_bytes_as_in_one_piece(runtime, used, same, name, dtype, interpolat
     assert np.array_equal(limited, image)
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("shift", [3, 4, 5, 6])
-@pytest.mark.parametrize("slots", [1, 2, 7])
-def test_same_bytes_whatever_the_bricks(same, scene, monkeypatch, shift, slots):
-    layout = BrickLayout.of(scene[0].dimensions, shift, False, 1)
-    monkeypatch.setattr(
-        "pyvista_vdi.volume.classified_volume.fitting_layout", lambda *args: (layout, slots)
-    )
-    assert same(*scene, sample_distance=0.5).copied >= min(slots, layout.n_bricks)
-
-
-@pytest.mark.parametrize(
-    ("looks", "interpolation"),
-    [
-        ({"shading": SHADES, "gradient_opacities": [0.2, 1], "gradient_range": (0, 30)}, "linear"),
-        pytest.param(
-            {"gradient_opacities": np.linspace(0, 1, 5), "gradient_range": (0, 40)},
-            "nearest",
-            marks=pytest.mark.slow,
-        ),
-    ],
-    ids=["shaded", "gradient opacity"],
-)
-def test_gradients_see_beyond_their_brick(same, looks, interpolation):
-    volume = volume_of(np.uint8)
-    lamp = Light("scene", (200, 300, 100), tuple(CENTRE), positional=True, cone_angle=120.0)
-    lights = [Light("camera", (1, 0.5, 0.2)), lamp]
-    function = transfer_for(volume, interpolation, **looks)
-    assert same(volume, VIEWS["perspective"], function, lights=lights).layout.gradients
-
-
 def colours_of_their_own():
     rgba = RNG.integers(0, 256, (*FIELD.shape[:2], 100, 4), dtype=np.uint8)
     rgba[..., 3] = FIELD[..., :100] * 255
@@ -182,15 +149,6 @@ def test_same_bytes_of_other_scalars(same, kind):
     same(volume, VIEWS["perspective"], function, unseen=Volume(volume.array))
 
 
-def test_a_file_larger_than_the_bricks(same, scene, tmp_path):
-    volume, camera, function = scene
-    array = np.memmap(tmp_path / "voxels", np.uint8, "w+", shape=volume.array.shape)
-    array[...] = volume.array
-    mapped = Volume(array)
-    assert np.shares_memory(mapped.array, array)
-    same(volume, camera, function, unseen=mapped)
-
-
 def test_pictures_with_all_that_ends_a_ray(runtime, used, scene):
     volume, camera, function = scene
     depth = np.full(WINDOW[::-1], np.inf)
@@ -208,19 +166,6 @@ def test_pictures_with_all_that_ends_a_ray(runtime, used, scene):
     limited = raycast_volume(volume, camera, WINDOW, function, memory_limit=LIMIT * 0.8, **options)
     assert used
     assert np.array_equal(limited, image)
-
-
-def test_transparent_bricks_stay_where_they_are(runtime, used):
-    array = np.zeros((97, 97, 97), np.uint8)
-    array[41:47, 73:87, 73:87] = 200  # inside 1 x 2 x 2 blocks of 8 cells, whatever the bricks
-    function = TransferFunction(np.eye(3), [0, 0.2, 0.4], (0, 200))
-    camera = Camera((48, 48, 300), (48, 48, 48), (0, 1, 0))
-    vdi = make(runtime, Volume(array), camera, function, memory_limit=2.4 * 2**20)
-    assert vdi.n_supersegments
-    (held,) = used
-    cells = np.stack(np.meshgrid([72, 87], [72, 87], [40, 47]), axis=-1).reshape(-1, 3)
-    x, y, _ = held.layout.counts
-    assert held.copied == len(set((cells >> held.layout.shift) @ [1, x, x * y]))
 
 
 def test_what_was_used_longest_ago_makes_room(runtime):
@@ -292,24 +237,6 @@ def test_too_little_even_for_one_brick(runtime, scene, limit):
     )
     with pytest.raises(DeviceMemoryError, match=message):
         make(runtime, Volume(volume.array, name="density"), camera, function, memory_limit=limit)
-
-
-def test_ambient_occlusion_needs_the_volume_in_one_piece(runtime, scene):
-    message = r"ambient occlusion needs .* in one piece, 1\.86 MiB .*raise"
-    with pytest.raises(DeviceMemoryError, match=message):
-        make(runtime, *scene, ambient_occlusion=40.0, memory_limit=3.6 * 2**20)
-
-
-@pytest.mark.parametrize(
-    ("text", "nbytes"),
-    [
-        (None, None), (4096, 4096), (2.5e9, 2500000000), (np.int64(7), 7), ("123", 123),
-        ("2 GiB", 2**31), ("2gib", 2**31), (" 1.5 MB ", 1500000), ("3 KiB", 3072),
-        ("1TiB", 2**40), ("12 b", 12),
-    ],
-)  # fmt: skip
-def test_sizes(text, nbytes):
-    assert memory_limit_bytes(text) == nbytes
 
 
 @pytest.mark.parametrize(

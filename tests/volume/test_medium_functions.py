@@ -75,13 +75,6 @@ def test_nan_is_transparent(call):
         np.testing.assert_array_equal(found, [[0] * 4, [0] * 4, [1] * 4])
 
 
-@pytest.mark.parametrize("span", [(0.0, 1.0), (0.5, 0.5)])
-def test_one_entry_is_constant(call, span):
-    table = np.float32([[0.25, 0.5, 0.75, 0.125]])
-    found = classified(call, [-np.inf, -1e30, 0, 0.5, 1, 1e30, np.inf], table, *span)
-    np.testing.assert_array_equal(found, np.broadcast_to(table, (7, 4)))
-
-
 def test_step_optical_depth(call):
     rng = np.random.default_rng(7)
     below_one = 1 - 2.0**-24
