@@ -26,8 +26,9 @@ def random_table(rng, entries):
     return rng.random((entries, 4)).astype(np.float32)
 
 
-@pytest.mark.parametrize("entries", [2, 3, 256, 4096])
-@pytest.mark.parametrize("span", [(0.0, 255.0), (-1000.0, 3095.0), (0.25, 0.75), (-1e-20, 1e20)])
+@pytest.mark.parametrize(
+    ("entries", "span"), [(2, (0.0, 255.0)), (256, (-1000.0, 3095.0)), (4096, (-1e-20, 1e20))]
+)
 def test_linear_between_entries_and_clamped_outside(call, entries, span):
     rng = np.random.default_rng(entries)
     low, high = np.float32(span)

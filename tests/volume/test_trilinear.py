@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import reference
 import strategies
-from reference.generate import classify
 
 from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -49,15 +48,3 @@ def test_the_reference_image_is_the_formula_s(seed):
             np.testing.assert_allclose(ray.length[:-1], 0.4, rtol=1e-9)
             assert 0 < ray.length[-1] <= 0.4 * (1 + 1e-9)
             np.testing.assert_array_equal(ray.end[:-1], ray.begin[1:])
-
-
-def test_classification_is_linear_between_nodes_and_constant_beyond():
-    table = TransferFunction([[0, 0, 0], [1, 0, 0.5], [0, 1, 0.5]], [0, 0.5, 0.25], (10, 20))
-    color, opacity = classify(table, np.array([-5.0, 10, 12.5, 15, 17.5, 20, 99, np.nan]))
-    np.testing.assert_array_equal(opacity, [0, 0, 0.25, 0.5, 0.375, 0.25, 0.25, 0])
-    np.testing.assert_array_equal(color[:, 0], [0, 0, 0.5, 1, 0.5, 0, 0, 0])
-    # A range of one scalar steps above it, and one entry serves every scalar
-    table = TransferFunction([[0, 0, 0], [1, 1, 1]], [0.25, 0.75], (5, 5))
-    np.testing.assert_array_equal(classify(table, np.array([4.0, 5, 5.1]))[1], [0.25, 0.25, 0.75])
-    table = TransferFunction([[0.5, 0, 0]], [0.5], (0, 1))
-    np.testing.assert_array_equal(classify(table, np.array([-1.0, 0, 7]))[1], [0.5] * 3)
