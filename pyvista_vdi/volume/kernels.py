@@ -2,7 +2,7 @@
 
 from pyvista_vdi.device import KernelDeclaration, Struct
 
-#: The numbers of a volume, its classification, its ambient occlusion, and the part that is there.
+#: The numbers of a volume, its classification, and the part that is there.
 CLASSIFIED = Struct(
     "Classified",
     size="int4",
@@ -11,8 +11,6 @@ CLASSIFIED = Struct(
     part_first="int4",
     part_lower="float4",
     part_upper="float4",
-    nodes="int4",
-    to_nodes="float4",
     entries="int",
     low="float",
     per_scalar="float",
@@ -35,9 +33,7 @@ RAYS = Struct(
 #: How a volume is cut into bricks.
 BRICKS = Struct("Bricks", counts="int4", shift="int", points="int", margin="int")
 
-_BRICKS, _MACROCELLS, _OCCLUSION = (
-    f"volume/{name}.cl" for name in ("bricks", "macrocells", "ambient_occlusion")
-)
+_BRICKS, _MACROCELLS = "volume/bricks.cl", "volume/macrocells.cl"
 RENDER_VOLUME = KernelDeclaration("volume/render_volume.cl", "render_volume", CLASSIFIED, RAYS)
 PROJECT = KernelDeclaration("volume/project.cl", "project", CLASSIFIED, RAYS)
 WANT_BRICKS = KernelDeclaration(_BRICKS, "want_bricks", CLASSIFIED, RAYS, BRICKS)
@@ -46,5 +42,3 @@ MACROCELL_RANGES = KernelDeclaration(_MACROCELLS, "macrocell_ranges")
 MACROCELL_DISTANCES = KernelDeclaration(_MACROCELLS, "macrocell_distances")
 MACROCELL_VISIBILITY = KernelDeclaration(_MACROCELLS, "macrocell_visibility")
 SCALAR_MEDIA = KernelDeclaration("volume/scalar_media.cl", "scalar_media")
-STEP_OPACITIES = KernelDeclaration(_OCCLUSION, "step_opacities", CLASSIFIED)
-AMBIENT_TRANSMITTANCES = KernelDeclaration(_OCCLUSION, "ambient_transmittances")

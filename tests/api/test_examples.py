@@ -63,7 +63,7 @@ def test_checksum_is_the_one_in_the_provenance(name):
     ],
 )
 def test_shipped_volumes(name, shape, dtype, spacing, quantity, ends):
-    volume = getattr(examples, f"load_{name}")(as_volume=True)
+    volume = examples.load_data(name, as_volume=True)
     assert volume.array.shape == shape
     assert volume.array.dtype == dtype
     assert spacing in (None, volume.spacing)
@@ -72,7 +72,7 @@ def test_shipped_volumes(name, shape, dtype, spacing, quantity, ends):
 
 
 def test_the_fluids_meet_along_z():
-    array = examples.load_rayleigh_taylor(as_volume=True).array
+    array = examples.load_data("rayleigh_taylor", as_volume=True).array
     means = [[np.take(array, end, axis).mean() for end in (0, -1)] for axis in range(3)]
     z, y, x = (abs(first - last) for first, last in means)
     assert z > 200, means
@@ -80,7 +80,7 @@ def test_the_fluids_meet_along_z():
 
 
 def test_ct_is_in_hounsfield_units():
-    array = examples.load_ct(as_volume=True).array
+    array = examples.load_data("ct", as_volume=True).array
     pins = {  # row, column: air, PMP, LDPE, polystyrene, acrylic, Delrin, Teflon
         (325, 206): -1000,
         (102, 146): -200,

@@ -34,7 +34,6 @@ OWNERS = {
     "paraview": ("extensions.paraview",),
     "pyopencl": ("device",),
     "pyvista": ("plotting", "examples", "extensions.web", "measure", "cli"),
-    "trame": ("extensions.web",),
     "traitlets": ("extensions.web",),
     "vtk": (),
     "vtkmodules": ("vtk_pipeline", "extensions.paraview"),
@@ -71,7 +70,7 @@ LEVELS = (
 LEVELS_WITHIN = {
     "io": (
         ("progress",),
-        ("png", "time_steps", "vdi_file", "axes"),
+        ("png", "vdi_file", "axes"),
         ("stores",),
         ("volumes",),
         ("files",),

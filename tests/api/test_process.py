@@ -58,7 +58,7 @@ FIRST_USES = {
     "a plotter's component": (PLOTTERS, "pv.Plotter.add_vdi.__name__"),
     "a component that is less used": (
         PLOTTERS,
-        "pv.Plotter(off_screen=True).add_vdi_clip_plane is not None",
+        "pv.Plotter(off_screen=True).vdi is not None",
     ),
     "a data set's accessor": (
         PLOTTERS,

@@ -42,9 +42,8 @@ def surface():
             ours = [base for base in thing.__mro__ if base.__module__.startswith("pyvista_vdi")]
             members = {key for base in ours for key in vars(base) if not key.startswith("_")}
             yield f"{name}({_parameters(thing)}): {' '.join(sorted(members))}"
-    for name in ("add_vdi", "add_vdi_clip_plane", "add_transfer_function_editor"):
-        found = getattr(pv.Plotter, name)
-        yield f"Plotter.{name}({_parameters(vars(found).get('__call__', found))})"
+    yield f"Plotter.add_vdi({_parameters(pv.Plotter.add_vdi.__call__)})"
+    yield f"Plotter.vdi: {' '.join(name for name in dir(pv.Plotter.vdi) if name[0] != '_')}"
     overview = _help()
     yield " ".join(verbs := re.findall(r"^    ([a-z]+)\b", overview, re.MULTILINE))
     for verb in verbs:

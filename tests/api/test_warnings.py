@@ -12,7 +12,6 @@ import pyvista as pv
 from PIL import Image
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import with_article
 from pyvista_vdi.io.volumes import read_volume
 
 pytestmark = pytest.mark.gl
@@ -111,23 +110,3 @@ def test_no_module_warns_by_itself_or_changes_the_filters():
     forbidden = re.compile(r"(?<![\w.])warnings\.(warn|catch_warnings|(simple)?filter\w*)\(")
     found = [path for path in package.rglob("*.py") if forbidden.search(path.read_text("utf-8"))]
     assert {path.relative_to(package).parts[0] for path in found} <= {"cli"}, found
-
-
-@pytest.mark.parametrize(
-    ("name", "named"),
-    [
-        ("ImageData", "an ImageData"),
-        ("UnstructuredGrid", "an UnstructuredGrid"),
-        ("UniformGrid", "a UniformGrid"),
-        ("PolyData", "a PolyData"),
-        ("uint8", "a uint8"),
-        ("int", "an int"),
-    ],
-)
-def test_articles_go_by_how_names_are_spoken(name, named):
-    assert with_article(name) == named
-
-
-def test_what_is_no_uniform_grid_is_refused_in_english(plotter):
-    with pytest.raises(pvdi.UnsupportedError, match="an UnstructuredGrid is not a uniform grid"):
-        pvdi.generate(pv.UnstructuredGrid(), pv.Camera(), (8, 8), cmap="bone")

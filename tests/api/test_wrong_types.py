@@ -98,14 +98,14 @@ ENTRIES = {
     "estimate": lambda vdi: (
         pvdi.estimate,
         {"volume": VOLUME, "window_size": SIZE, "transfer_function": TABLE},
-        ["max_supersegments", "ambient_occlusion", "settings", "device"],
+        ["max_supersegments", "settings", "device"],
     ),
     "render_volume": lambda vdi: (
         pvdi.render_volume,
         TABLED,
         [
             *("opaque_depth", "clipping_planes", "cropping", "lights"),
-            *("early_termination", "ambient_occlusion", "opacity_multiplier", "settings"),
+            *("early_termination", "opacity_multiplier", "settings"),
         ],
     ),
     "Settings": lambda vdi: (pvdi.Settings, {}, None),
@@ -163,7 +163,7 @@ ENTRIES = {
     "Cropping": lambda vdi: (pvdi.Cropping, {"planes": (0, 1, 0, 1, 0, 1)}, None),
     **{
         name: lambda vdi, name=name: (getattr(pvdi, name), {}, None)
-        for name in ("Light", "Lights", "Shading", "AmbientOcclusion")
+        for name in ("Light", "Lights", "Shading")
     },
     "VDISeries": lambda vdi: (pvdi.VDISeries, {"steps": [vdi], "times": [0]}, None),
     "VDISeries.nearest": lambda vdi: (series_of(vdi).nearest, {"time": 0}, None),

@@ -25,7 +25,6 @@ def without_vtk(folder: Path) -> pvdi.VDI:
         max_supersegments=10,
         settings=pvdi.Settings(tolerance=0.01, memory_limit="1 GiB"),
         lights=[pvdi.Light()],
-        ambient_occlusion=True,
         progress=print,
         transfer_function=table,
     )
@@ -46,15 +45,13 @@ def without_vtk(folder: Path) -> pvdi.VDI:
     return vdi
 
 
-def with_pyvista(plotter: pvdi.Plotter, grid: pv.ImageData) -> pvdi.VDI:
-    """Make VDIs as ``add_volume`` is called, and show them."""
+def with_pyvista(plotter: pv.Plotter, grid: pv.ImageData) -> pvdi.VDI:
+    """Make VDIs with the arguments of ``add_volume``."""
     vdi = pvdi.generate(grid, plotter.camera, (64, 48), cmap="bone", opacity="sigmoid_5")
     pvdi.generate(grid, plotter.camera, [64, 48], quality="high", opacity=[0.0, 0.5], clim=(0, 9))
     pvdi.render_volume(grid, plotter.camera, (64, 48), cmap=["red", "blue"], shade=True)
     needed = pvdi.estimate(grid, (64, 48), cmap="bone")
     assert needed.total > 0
-    plotter.add_vdi(grid, cmap="bone", opacity=0.5, quality="balanced", regenerate="never")
-    plotter.add_vdi(vdi, show_scalar_bar=False)
     return vdi
 
 
@@ -63,16 +60,15 @@ def of_several(folder: Path, volumes: list[pvdi.Volume], camera: pvdi.Camera) ->
     series = pvdi.generate_series(volumes, camera, (64, 48), cmap="bone", quality="high")
     with pvdi.SeriesWriter(folder / "a.vdis", camera, (64, 48), level=3, clim=(0, 9)) as out:
         out.append(volumes[0], 0.5)
-    views = pvdi.generate_set(volumes[0], [camera], lists=0.5, ambient_occlusion=True)
+    views = pvdi.generate_set(volumes[0], [camera], lists=0.5)
     assert len(series) == len(views)
 
 
-def mistakes(grid: pv.ImageData, camera: pvdi.Camera, plotter: pvdi.Plotter) -> None:
+def mistakes(grid: pv.ImageData, camera: pvdi.Camera) -> None:
     """Make mistakes that a checker of types finds: each is silenced, and would be useless else."""
     pvdi.generate(grid, camera, (64, 48), max_supersegments="many")  # type: ignore[call-overload]
     pvdi.generate(grid, camera, (64, 48), colour_map="bone")  # type: ignore[call-overload]
     pvdi.generate(grid, 5, (64, 48))  # type: ignore[call-overload]
     pvdi.render("a.vdi", camera)  # type: ignore[arg-type]
-    plotter.add_vdi(grid, precision="half")  # type: ignore[arg-type]
     pvdi.generate_series([grid], 5, (64, 48))  # type: ignore[arg-type]
     pvdi.generate_set(grid, half_angle="wide")  # type: ignore[arg-type]

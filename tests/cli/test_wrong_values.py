@@ -84,8 +84,6 @@ WRONG = {
     "--memory-limit": (*NOT_ABOVE_0, "5parsecs"),
     "--n-colors": NO_COUNT,
     "--name": ("a/b",),
-    "--occlusion-radius": NOT_ABOVE_0,
-    "--occlusion-strength": (*BELOW_0, "1.5"),
     "--opacity": ("nothing", "''", "0,x", "0,nan", "0,1e999"),
     "--opacity-unit-distance": NOT_ABOVE_0,
     "--origin": NO_XYZ,

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 import psutil
 from fuzz.choices import JUNK, NUMBERS, Choices
-from strategies import random_vdi
+from strategies import kept_values, random_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import VDI, Camera, DeferredVDI, TransferFunction, Volume, cli, io
@@ -169,16 +169,9 @@ def base_deferred(index: int = 0) -> DeferredVDI:
     """The same lists with values in place of colours."""
     lists = base_vdi(index)
     mean, spread, share = lists.color.T
-    return DeferredVDI(
-        *(lists.camera, lists.window_size, lists.offsets, lists.front, lists.back),
-        *(mean, spread / 2, share, lists.bounds),
-        value_range=(-1000, 3000),
-        unit_distance=1.5,
-        sample_distance=0.5,
-        importance=[(-1000, 0), (3000, 1)] if index % 2 else None,
-        depth_origin=lists.depth_origin,
-        metadata=lists.metadata,
-    )
+    importance = [(-1000, 0), (3000, 1)] if index % 2 else None
+    about = {"value_range": (-1000, 3000), "unit_distance": 1.5, "importance": importance}
+    return kept_values(lists, mean, spread / 2, share, **about)
 
 
 @cache

@@ -25,10 +25,9 @@ from recorded_runs import (
     random_records,
     random_segments,
 )
+from reference import compositing
+from reference.compositing import Segment
 from reference.shading import cut_where_unlike
-
-from pyvista_vdi.model import compositing
-from pyvista_vdi.model.compositing import Segment
 
 FILE = "record_functions.cl"
 #: Ways of shortening a record.

@@ -298,29 +298,6 @@ def test_hdf5(tmp_path):
     assert (again.time, again.spacing, again.why) == (1, labelled.spacing, labelled.why)
 
 
-@pytest.mark.parametrize("name", ["x.zarr", "x.h5"])
-def test_a_store_that_is_written_anew_must_be_opened_again(name, tmp_path):
-    zarr, h5py = pytest.importorskip("zarr"), pytest.importorskip("h5py")
-
-    def write(values):
-        if name == "x.zarr":
-            shutil.rmtree(tmp_path / name, ignore_errors=True)
-            zarr.save_array(str(tmp_path / name), values)
-        else:
-            (tmp_path / name).unlink(missing_ok=True)
-            with h5py.File(tmp_path / name, "w") as file:
-                file["v"] = values
-
-    write(VALUES[0, 0])
-    volume = pvdi.open_volume(tmp_path / name)
-    assert volume.finite_range() == (VALUES[0, 0].min(), VALUES[0, 0].max())
-    write(VALUES[0, 0, 1:])
-    with pytest.raises(InvalidVolumeError, match=r"written anew.*open it again"):
-        volume.load()
-    again = pvdi.open_volume(tmp_path / name)
-    np.testing.assert_array_equal(again.load().array, VALUES[0, 0, 1:])
-
-
 @pytest.mark.parametrize(("name", "library"), [("x.zarr", "zarr"), ("x.h5", "h5py")])
 def test_an_absent_library_is_named(name, library, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, library, None)

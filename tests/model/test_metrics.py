@@ -9,12 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pyvista_vdi import Camera, InvalidArgumentError
 from pyvista_vdi.model.metrics import (
-    ListEdges,
     compare_images,
-    list_edges,
-    list_places,
 )
 from pyvista_vdi.model.standard_cases import filling_camera
 
@@ -51,60 +47,6 @@ def test_ssim_is_that_of_wang_et_al():
         (mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2)
     )
     assert compare_images(a, b).ssim == pytest.approx(ssim[5:-5, 5:-5].mean(), abs=1e-9)
-
-
-@pytest.mark.parametrize("pixels", [2, 3, 4, 8])
-def test_squares_on_a_ramp_have_edges_of_their_pixels_less_one(pixels):
-    # A step of the ramp is 1, one from list to list n: the error steps by 1 within, n - 1 across
-    across, down = np.meshgrid(np.arange(48), np.arange(48))
-    reference = np.repeat(((across + 2 * down) / 150)[..., None], 3, axis=2)
-    lists = np.arange(48) // pixels
-    middle = lists * pixels + pixels // 2
-    image = reference[np.ix_(middle, middle)]
-    edges = list_edges(image, reference, lists, lists)
-    assert edges.ratio == pytest.approx(pixels - 1)
-    # Means over borders of both directions, of which the steeper has 2 / 150
-    assert edges.within == pytest.approx(1.5 / 150)
-    over_it = np.concatenate([image, np.ones((48, 48, 1))], axis=2)
-    assert list_edges(over_it, reference, lists, lists, (1, 1, 1)) == edges
-    # An error that knows no lists has none of their edges: 480 steps or more, whose mean has a
-    # standard error of .75 / sqrt(480)
-    noise = np.random.default_rng(4).uniform(0, 0.02, (48, 48, 1))
-    assert list_edges(reference + noise, reference, lists, lists).ratio == pytest.approx(
-        1, abs=0.15
-    )
-
-
-def test_pictures_without_an_error_or_with_a_list_per_pixel_have_no_squares():
-    lists = np.arange(32)
-    assert list_edges(picture(), picture(), lists // 2, lists[:24] // 2).ratio == 0
-    assert list_edges(picture(1), picture(), lists, lists[:24]).ratio == 0
-    assert ListEdges(0.1, 0.0).ratio == math.inf
-    with pytest.raises(InvalidArgumentError, match="of different sizes: .* 32 rows of 24 pixels"):
-        list_edges(picture(), picture(), lists[:24], lists)
-
-
-@pytest.mark.parametrize("kind", ["perspective", "parallel", "horizontal"])
-def test_places_among_lists_are_list_coordinates(kind):
-    """Where V_O's own matrix projects the points that a picture's pixels see; aspects differ."""
-    camera = Camera(
-        (1, -9, 2),
-        (0, 0, 0),
-        (0, 0, 1),
-        window_center=(0.3, -0.2),
-        parallel_projection=kind == "parallel",
-        parallel_scale=3.0,
-        use_horizontal_view_angle=kind == "horizontal",
-    )
-    size, lists = (40, 31), (13, 9)
-    columns, rows = list_places(camera, size, lists)
-    origin, direction = camera.ray_coefficients(size)
-    for x, y in ((0, 0), (39, 30), (17, 5)):
-        pixel = np.array([1, (2 * x + 1) / 40 - 1, 1 - (2 * y + 1) / 31])
-        seen = pixel @ origin + 5 * (pixel @ direction)
-        u, v, _, d = camera.viewport_matrix(lists) @ [*seen, 1]
-        assert columns[x] == pytest.approx((u / d + 1) / 2 * 13, abs=1e-9)
-        assert rows[y] == pytest.approx((1 - v / d) / 2 * 9, abs=1e-9)
 
 
 @given(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from extreme_scenes import slabs_vdi
+from strategies import kept_values
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import InvalidArgumentError
@@ -50,20 +51,8 @@ def test_a_deferred_vdi_says_the_value_that_is_hit():
     slabs_of_values = slabs()
     n = slabs_of_values.n_supersegments
     rng = np.random.default_rng(3)
-    kept = pvdi.DeferredVDI(
-        slabs_of_values.camera,
-        slabs_of_values.window_size,
-        slabs_of_values.offsets,
-        slabs_of_values.front,
-        slabs_of_values.back,
-        rng.uniform(0, 1, n),
-        np.zeros(n),
-        np.ones(n),
-        slabs_of_values.bounds,
-        value_range=(100, 300),
-        unit_distance=1.0,
-        sample_distance=0.01,
-    )
+    values = rng.uniform(0, 1, n), np.zeros(n), np.ones(n)
+    kept = kept_values(slabs_of_values, *values, unit_distance=1.0, sample_distance=0.01)
     # What is below 200 is transparent, and left out: the lists that are shown have other numbers
     look = pvdi.TransferFunction([[1, 1, 1]] * 3, [0, 0, 1], (100, 300))
     values = set()

@@ -6,10 +6,10 @@ import pickle
 
 import numpy as np
 import pytest
-from strategies import random_vdi
+from strategies import kept_values, random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import DeferredVDI, TransferFunction
+from pyvista_vdi import TransferFunction
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
 
@@ -19,21 +19,7 @@ COLORS = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 def kept(seed, precision="exact"):
     lists = random_vdi(np.random.default_rng(seed), max_supersegments=5)
     mean, spread, share = lists.color.T
-    return DeferredVDI(
-        lists.camera,
-        lists.window_size,
-        lists.offsets,
-        lists.front,
-        lists.back,
-        mean,
-        spread / 8,
-        share,
-        lists.bounds,
-        value_range=(100, 300),
-        unit_distance=2.0,
-        sample_distance=0.5,
-        depth_origin=lists.depth_origin,
-    ).with_precision(precision)
+    return kept_values(lists, mean, spread / 8, share).with_precision(precision)
 
 
 @pytest.mark.parametrize("opacities", [[0.1, 0.8, 0.3], [0, 0, 0, 0.9]])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import reference
 import strategies
+from reference.compositing import composite
 
-from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 

@@ -164,7 +164,7 @@ MAPPER = (
         lambda s: s.mapper.SetMaskInput(image_of(values().ravel().astype(np.uint8)))),
     Row("MaskType MaskBlendFactor", WITHOUT, f"{_OF_REFUSED}masks",
         lambda s: s.mapper.SetMaskTypeToLabelMap()),
-    Row("GlobalIlluminationReach", REFUSED, "`VDISource.SetAmbientOcclusion` darkens what is hidden",
+    Row("GlobalIlluminationReach", REFUSED, "a VDI is lit when it is generated, by `shade` and lights",
         lambda s: s.mapper.SetGlobalIlluminationReach(0.5)),
     Row("VolumetricScatteringBlending", REFUSED, "likewise",
         lambda s: s.mapper.SetVolumetricScatteringBlending(0.5)),

@@ -120,15 +120,18 @@ REFUSED = {
     "plane of cells": (plane("cell", 4, 3, 1), _PLANE),
     "plane along x": (plane("point", 1, 3, 4), _PLANE),
     "cells along x": (plane("cell", 1, 3, 4), _PLANE),
-    "vectors": (some_grid(v=np.zeros((60, 3))), "'v' have 3 components.*pass one component"),
+    "vectors": (some_grid(v=np.zeros((60, 3))), "'v' have 3 components.*one scalar per point"),
     "rgba": (
         some_grid(v=np.zeros((60, 4), np.uint16)),
-        "'v' have 4 components, but are not RGBA of type unsigned char",
+        "'v' have 4 components.*or from RGBA of type unsigned char",
     ),
-    "rectilinear": (pv.RectilinearGrid([0.0, 1, 3], [0.0, 1], [0.0, 1]), _NO_GRID + "resample it"),
-    "structured": (some_grid().cast_to_structured_grid(), _NO_GRID + "resample it"),
-    "unstructured": (some_grid().cast_to_unstructured_grid(), _NO_GRID + "resample it"),
-    "surface": (pv.Sphere(), _NO_GRID + "voxelise it"),
+    "rectilinear": (
+        pv.RectilinearGrid([0.0, 1, 3], [0.0, 1], [0.0, 1]),
+        _NO_GRID + "resample a",
+    ),
+    "structured": (some_grid().cast_to_structured_grid(), _NO_GRID + "resample a"),
+    "unstructured": (some_grid().cast_to_unstructured_grid(), _NO_GRID + "resample a"),
+    "surface": (pv.Sphere(), _NO_GRID + "voxelise a surface"),
     "blocks": (pv.MultiBlock([some_grid()]), _NO_GRID + "one by one"),
 }
 
@@ -141,8 +144,8 @@ def test_what_is_no_volume_is_refused_with_the_remedy(grid, message):
 
 
 def test_unknown_array_names_the_nearest():
-    with pytest.raises(InvalidVolumeError, match=r"no array 'V': did you mean 'v'\? .*\['v'\]"):
-        volume_from_vtk(some_grid(), "V")
+    with pytest.raises(InvalidVolumeError, match=r"no array 'vv': did you mean 'v'\? .*\['v'\]"):
+        volume_from_vtk(some_grid(), "vv")
 
 
 def function_of(*nodes):

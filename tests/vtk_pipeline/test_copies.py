@@ -89,10 +89,6 @@ def test_a_copy_of_a_plotter_s_actor_has_its_colours():
     np.testing.assert_array_equal(plotter.screenshot(return_img=True), before)
 
 
-def test_instances_of_a_source_are_sources():
-    assert type(pvdi.VDISource().NewInstance()) is pvdi.VDISource
-
-
 def test_copies_of_volumes_that_are_no_vdis_are_refused(scene):
     volume = vtkVolume()
     volume.SetMapper(vtkGPUVolumeRayCastMapper())

@@ -10,7 +10,7 @@ from vtk_sources import camera_at
 from watched_windows import on_screen
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import VDIWarning
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
@@ -200,19 +200,17 @@ def test_pictures_are_vtks(name):
 
 @pytest.mark.parametrize("space", range(6))
 @pytest.mark.parametrize("beyond", [{}, BEYOND, {"Clamping": 0}], ids=["", "beyond", "ends"])
-@pytest.mark.parametrize("scale", [0, 1], ids=["linear", "logarithmic"])
 @pytest.mark.parametrize("lone", [False, True], ids=["nodes", "one node"])
-def test_tables_are_getcolor_s(space, beyond, scale, lone):
+def test_tables_are_getcolor_s(space, beyond, lone):
     nodes = CURVED[2:3] if lone else CURVED[1:-1]
-    color = colors_of(*nodes, **beyond, ColorSpace=space, Scale=scale)
+    color = colors_of(*nodes, **beyond, ColorSpace=space)
     volume = pvdi.Volume(np.arange(240, dtype=np.uint8).reshape(4, 6, 10))
     prop = property_of(color, function_of((0, 0.5), (0.7, 0.6), (255, 1)), InterpolationType=0)
     table = transfer_function_from_property(prop, volume)
     low, high = table.scalar_range
     assert len(table.colors) == high - low + 1
     some = range(max(int(low), 1), int(high), 11 if space != 4 else 60)
-    # A logarithm rounds the steps that are at nodes
-    for scalar in {*some, *(int(x) for x, *_ in nodes if not scale)}:
+    for scalar in {*some, *(int(x) for x, *_ in nodes)}:
         expected = color.GetColor(scalar)
         # LabCIEDE2000 goes from byte to byte, and GetColor has a node itself
         away = 0.03 if space == 4 else 2e-3
@@ -276,18 +274,10 @@ def test_each_of_thousands_of_labels_has_its_colour(dtype, steps, n):
     assert nearest.max() <= 1 / 255
 
 
-def test_what_no_table_resolves_is_said():
-    volume = ball()
-    opacity = function_of(*((100 + k * 1e-4, k % 2) for k in range(20)), (100.01, 0), (255, 0.3))
-    with pytest.warns(VDIWarning, match="opacity function has nodes closer together than 1/65536"):
-        transfer_function_from_property(property_of(opacity=opacity), volume)
-    crowd = function_of((-1e30, 0), (0, 0.1), (99, 0.3), (255, 0.6), (1e30, 1))
-    outlier = pvdi.Volume(np.where(volume.array == 0, 1e20, volume.array))
-    with pytest.warns(VDIWarning, match="opacity function has nodes closer"):
-        transfer_function_from_property(property_of(colors_of((0, 1, 1, 1)), crowd), outlier)
-    steep = property_of(gradient=function_of((0, 0), (20, 2)))
-    with pytest.warns(VDIWarning, match="gradient opacity above 1"):
-        transfer_function_from_property(steep, volume)
+def test_a_logarithmic_scale_of_colours_is_refused():
+    prop = property_of(colors_of(*CURVED[1:-1], Scale=1))
+    with pytest.raises(UnsupportedError, match="logarithmic scale.*SetScaleToLinear"):
+        transfer_function_from_property(prop, ball())
 
 
 def test_gradients_beyond_the_nodes_are_as_vtk_has_them():
@@ -317,19 +307,6 @@ def test_every_volume_has_the_table_of_its_own_scalars(kind):
         alone = pvdi.generate(volume, **view, volume_property=prop)
         assert vdi.metadata["transfer_function"] == alone.metadata["transfer_function"]
     assert made[0].counts.max() > 0
-
-
-def test_chunks_are_read_for_their_range_only_where_the_table_needs_it():
-    da = pytest.importorskip("dask.array")
-    read = []
-    lazy = da.from_array(ball().array, chunks=11)
-    counted = lazy.map_blocks(lambda part: read.append(1) or part, meta=lazy._meta)
-    volume = pvdi.Volume(counted)
-    smooth = function_of((-1e6, 0), (0, 0), (100.3, 0.2), (255, 0.5), (1e6, 0.5))
-    transfer_function_from_property(property_of(opacity=smooth), volume)
-    assert not read
-    transfer_function_from_property(property_of(opacity=function_of(*PEAK, (1e6, 1))), volume)
-    assert read
 
 
 def test_thousands_of_colours_by_name():

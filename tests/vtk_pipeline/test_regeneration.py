@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import CLASSIFICATION, LOOKS, soft_ball
-from vtk_sources import ready_source
 from watched_windows import (
     LONG,
     MOVING,
@@ -26,11 +25,8 @@ from watched_windows import (
 )
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceError, VDIWarning
-from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.drawing.background import Estimators
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -213,14 +209,6 @@ def test_auto_with_the_real_estimate(plotter):
     plotter.camera.Azimuth(60)
     frames_until(plotter, lambda: actor.vdi is not old)
     np.testing.assert_array_equal(frame(plotter), picture_of(actor.vdi, plotter))
-
-
-def test_estimates_know_of_ambient_occlusion():
-    """What is judged is the occluded VDI; so is then what it is judged by."""
-    source = ready_source(AmbientOcclusion=pvdi.AmbientOcclusion(0.5, strength=1.0))
-    vdi, request = source.GetVDI(), source.GetCurrentRequest()
-    error = Estimators().estimate(request, get_runtime(), vdi, request.screen, RenderOptions())
-    assert error.ssim > 0.9999
 
 
 def test_what_is_made_for_a_view_that_was_left_is_given_up(plotter, gate):

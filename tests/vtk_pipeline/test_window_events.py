@@ -371,10 +371,9 @@ DRIVING = {
     "vtk_pipeline/filters": {"algorithm", "source", "source_settings", "temporal", "view"},
     "plotting": {
         "actor",
-        "add_transfer_function_editor",
         "component",
+        "editor",
         "progress",
-        "refinement",
         "registration",
     },
 }

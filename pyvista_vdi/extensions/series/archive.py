@@ -83,17 +83,13 @@ class Archive(Sequence[Any]):
         try:
             stream = opened(self.path)
             weakref.finalize(self, stream.close)
-            begin = stream.read(8)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
-        if not begin.startswith(b"PK"):
-            kind = f"not a {self._kind.holds} of VDIs, or of an earlier format"
-            raise VDIFileError(f"{self.path} is {kind}: it begins with {begin!r}; make it anew")
         try:
             archive = zipfile.ZipFile(stream)
         except reader.ARCHIVE_ERRORS as error:
-            self.refuse(f"it is truncated, or no whole ZIP ({error})")
+            self.refuse(f"it is truncated, or no {self._kind.holds} of VDIs ({error})")
         # The directory at the end of a file that was cut off is that of a .vdi file within
         if not archive.infolist() or archive.infolist()[0].header_offset:
             self.refuse("it is truncated")

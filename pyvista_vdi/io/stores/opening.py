@@ -11,13 +11,14 @@ import numpy as np
 
 from pyvista_vdi import registry
 from pyvista_vdi.io.stores.hdf5 import open_hdf5
-from pyvista_vdi.io.stores.record import StoredVolume, chosen_level
+from pyvista_vdi.io.stores.record import Store, StoredVolume, chosen_level
 from pyvista_vdi.io.stores.zarr import open_zarr
-from pyvista_vdi.model.store_identity import ZARR_FILES
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.model.whole_file import as_path
 
 _HDF5 = (".h5", ".hdf5", ".he5")
+#: Metadata of a group or an array of zarr: a folder that has one belongs to a store.
+_ZARR_FILES = ("zarr.json", ".zgroup", ".zarray", ".zattrs")
 
 
 def is_store(path: str | os.PathLike[str]) -> bool:
@@ -26,7 +27,7 @@ def is_store(path: str | os.PathLike[str]) -> bool:
     if inner or outer.rstrip("/\\").lower().endswith((".zarr", *_HDF5)):
         return True
     return os.path.isdir(outer) and any(  # noqa: PTH112 - pathlib's raises for too long names
-        (Path(outer) / name).is_file() for name in ZARR_FILES
+        (Path(outer) / name).is_file() for name in _ZARR_FILES
     )
 
 
@@ -95,17 +96,22 @@ def open_store(
     time: int = 0,
     channel: int | str = 0,
 ) -> StoredVolume:
-    """Open a store; arguments as of :func:`open_volume`."""
-    outer, inner = _parts(path)
-    named = outer.rstrip("/\\").lower()
-    hdf5 = named.endswith(_HDF5) or (os.path.isfile(outer) and not named.endswith(".zarr"))  # noqa: PTH113
-    store = open_hdf5(outer, inner) if hdf5 else open_zarr(outer, inner)
+    """Open a level of a store; arguments as of :func:`open_volume`."""
+    store = store_at(path)
     number, why = chosen_level(store, level, camera, window_size)
     # Of four axes without names the first may be time or channel, whatever else time is
     either = "t" in store.axes and "c" not in store.axes and not store.named
     if either and np.array_equal(time, 0) and not isinstance(channel, str):
         time, channel = channel, 0
     return StoredVolume(store, number, why, time, channel)
+
+
+def store_at(path: str | os.PathLike[str]) -> Store:
+    """Return what the metadata of a store say."""
+    outer, inner = _parts(path)
+    named = outer.rstrip("/\\").lower()
+    hdf5 = named.endswith(_HDF5) or (os.path.isfile(outer) and not named.endswith(".zarr"))  # noqa: PTH113
+    return open_hdf5(outer, inner) if hdf5 else open_zarr(outer, inner)
 
 
 def _parts(path: str | os.PathLike[str]) -> tuple[str, str]:

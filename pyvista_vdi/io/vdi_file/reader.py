@@ -180,7 +180,7 @@ class _OpenFile:
             vdi = VDI(info.camera, info.window_size, *arrays, info.bounds, **about)
             if packing is not None:
                 vdi = with_arrays(vdi, replace(packing, offsets=vdi.offsets))
-            return vdi if info.deferred is None else DeferredVDI.of_lists(vdi, info.deferred)
+            return vdi if info.deferred is None else DeferredVDI(vdi, info.deferred)
         except DamagedChunkError as error:
             self._refuse(str(error))
         except OSError as error:

@@ -16,7 +16,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIError,
 )
-from pyvista_vdi.io.stores import names_in, open_store
+from pyvista_vdi.io.stores import names_in, open_store, store_at
 from pyvista_vdi.io.volumes.formats import VolumeFormat, format_of
 from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, chosen, placed, volume_of
 from pyvista_vdi.model.volume import Volume
@@ -108,7 +108,7 @@ def list_volumes(path: str | os.PathLike[str]) -> list[VolumeInFile]:
             return volumes_in(file)
     inside = [f"{file}::{name}" for name in names_in(path)] if file.is_file() else [path]
     found = []
-    for store in (open_store(each).store for each in inside):
+    for store in map(store_at, inside):
         axes = "".join(axis[:1] for axis in store.axes)
         for level in store.levels:
             known = (level.grid.index_to_model, level.path, store.unit, store.channels)

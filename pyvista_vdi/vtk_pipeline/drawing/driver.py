@@ -88,7 +88,6 @@ class Driver:
         self.device: Any = None
         self.input: Input | None = None
         self.box, self.texts = Box(), CornerTexts()
-        self.level: tuple[int, int] | None = None  # of a store, and of how many
         self._actor: Callable[[], Any] = lambda: None
         self._window: Callable[[], Window | None] = lambda: None  # of the last frame
         self._active = vtkWeakReference()  # which renderer is between its start and its end
@@ -422,7 +421,6 @@ class Driver:
                     seen = replace(seen, first_look=False, **known)
         except Cancelled as error:
             if self._volume is None and source.last() is None:
-                source.forget_view()
                 raise
             self._complain(error)
             planned, sighted, shown = Plan("vdi"), None, self._volume or source.last()
@@ -602,11 +600,8 @@ class Driver:
         """Make the VDI of the source now; what fails is not repeated until something changes."""
         try:
             source.vdi()
-        except Cancelled:  # of one execution
+        except (Cancelled, InvalidVolumeError):  # of one execution, or soon found again
             raise
-        except InvalidVolumeError:  # soon found again
-            if not source.has_what_it_had():
-                raise  # else as VTK's mappers, which draw the data that are there
         except BaseException:
             self._failed = (*self._failed[-1:], source.stamp())
             raise
@@ -832,7 +827,6 @@ class Driver:
             stand_in=self._stand_in,
             drawn=last.way,
             time=None if player is None else player.time,
-            level=self.level,
         )
 
     def vdi_asked_for(self) -> VDI | None:

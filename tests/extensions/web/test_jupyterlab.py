@@ -18,7 +18,7 @@ from PIL import Image
 from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
+from pyvista_vdi.extensions.web.shown import camera_of, viewer_camera
 
 MISSING = [
     name
@@ -45,7 +45,7 @@ import json
 import numpy as np
 import pyvista as pv
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.web.camera import viewer_camera
+from pyvista_vdi.extensions.web.shown import viewer_camera
 from pyvista_vdi.extensions.web import VDIWidget
 vdi = pvdi.read("ball.vdi")
 widget = VDIWidget(vdi, background="white")

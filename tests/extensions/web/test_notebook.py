@@ -19,8 +19,8 @@ from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError
-from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.extensions.web.notebook import mime_bundle, show_plotter
+from pyvista_vdi.extensions.web.shown import camera_of, viewer_camera
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 anywidget = pytest.importorskip("anywidget", reason="needs the extra notebook")
@@ -98,7 +98,6 @@ def test_a_horizontal_angle_becomes_the_vertical_one_and_other_entries_are_refus
 
 def test_the_widget_holds_a_file_of_the_vdi(widget, vdi, tmp_path):
     assert sent(widget, tmp_path).equals(vdi.with_precision("8-byte"))
-    assert sent(VDIWidget(vdi, precision="exact"), tmp_path).equals(vdi)
 
 
 def test_any_camera_can_be_set_and_none_that_shows_nothing(widget, vdi):
@@ -186,11 +185,9 @@ def test_without_anywidget_there_is_a_picture_and_the_extra_is_named(
     vdi, without_anywidget, monkeypatch
 ):
     data = vdi._repr_mimebundle_()
-    assert set(data) == {"text/plain", "text/html", "image/png"}
-    for kind in ("text/plain", "text/html"):
-        assert "pyvista-vdi[notebook]" in data[kind]
+    assert set(data) == {"text/plain", "image/png"}
+    assert "pyvista-vdi[notebook]" in data["text/plain"]
     assert repr(vdi) in data["text/plain"]
-    assert data["image/png"] in data["text/html"]
     monkeypatch.setattr("pyvista_vdi.extensions.web.notebook.still", lambda _vdi: None)
     assert set(vdi._repr_mimebundle_()) == {"text/plain"}
 
@@ -295,31 +292,6 @@ def test_what_the_viewer_leaves_out_is_named(plotter):
         show_plotter(plotter)
 
 
-@pytest.mark.gl
-@pytest.mark.parametrize("linked", [False, True])
-def test_a_viewer_keeps_its_subplot(linked):
-    """Whichever is active later; others turn with it if they are linked."""
-    plotter = pv.Plotter(shape=(1, 2), off_screen=True, window_size=SIZE, notebook=True)
-    for k, color in enumerate(("navy", "white")):
-        plotter.subplot(0, k)
-        plotter.set_background(color, all_renderers=False)
-        add_ball(plotter)
-    if linked:
-        plotter.link_views()
-    widgets = show(plotter).children
-    assert (widgets[0]._link == widgets[1]._link) == linked
-    before = widgets[1].camera
-    turned = viewer_camera(pvdi.Camera((9, 1, 1), (1, 1, 1), (0, 1, 0), view_angle=20))
-    widgets[0].set_state({"camera": turned})
-    plotter.render()
-    first, second = (viewer_camera(renderer.camera) for renderer in plotter.renderers)
-    assert first == turned
-    assert second == widgets[1].camera == (turned if linked else before)
-    assert [widget.background for widget in widgets] == ["#000080", "#ffffff"]
-    assert widgets[0].camera == turned
-    plotter.close()
-
-
 @pytest.fixture(scope="module")
 def series(vdi):
     dense = pvdi.generate(BALL, vdi.camera, SIZE, cmap="bone", opacity=[0, 0.5, 1])
@@ -390,10 +362,10 @@ def test_a_scene_is_sent_again_when_something_in_it_is_another(plotter):
 
 @pytest.mark.gl
 def test_a_view_that_rests_gets_a_vdi_of_its_own(plotter):
-    """As in a window on the screen, and seen by the viewer, in the loop that cells run in."""
+    """In the loop that cells run in."""
 
     async def in_a_kernel():
-        actor = add_ball(plotter, draw="vdi", settings=pvdi.Settings(regenerate_below=1.0))
+        actor = add_ball(plotter)
         widget = show(plotter)
         first, file = widget.vdi, file_of(widget)
         turned = viewer_camera(pvdi.Camera.from_any(plotter.camera).azimuth(70))
@@ -424,10 +396,16 @@ def test_pyvista_takes_the_backend_by_itself_where_trame_is_not_installed(plotte
 
 
 @pytest.mark.gl
-def test_a_scene_without_vdis_is_shown_as_ever(plotter, monkeypatch):
+def test_a_scene_without_vdis_and_subplots_are_shown_as_ever(plotter, monkeypatch):
     monkeypatch.setattr(pv, "registered_jupyter_backends", tuple)
     plotter.add_mesh(pv.Sphere())
     assert isinstance(show(plotter), Image.Image)
+    subplots = pv.Plotter(shape=(1, 2), off_screen=True, window_size=SIZE, notebook=True)
+    add_ball(subplots)
+    with pytest.warns(UserWarning, match="not subplots"):
+        shown = subplots.show(jupyter_backend="vdi", return_viewer=True)
+    assert isinstance(shown, Image.Image)
+    subplots.close()
 
 
 @pytest.mark.gl
@@ -586,26 +564,6 @@ def test_the_view_shows_a_plotter_s_scene_and_another_in_its_place(open_widget, 
         [list(binaries(widget))[1], in_base64(scene_of(widget))],
     )
     assert not is_red(picture(page, SIZE, "viewers[0]")).any()
-
-
-@pytest.mark.gl
-def test_subplots_are_where_they_are_in_the_window(open_widget):
-    """One without a VDI as well; what spans two rows spans both."""
-    plotter = pv.Plotter(shape="1|2", off_screen=True, window_size=SIZE, notebook=True)
-    plotter.subplot(0)
-    add_ball(plotter)
-    plotter.subplot(1)
-    plotter.add_mesh(pv.Sphere(), color="red")
-    grid = show(plotter)
-    places = [(one.layout.grid_column, one.layout.grid_row) for one in grid.children]
-    assert places == [("1 / 2", "1 / 3"), ("2 / 3", "1 / 2"), ("2 / 3", "2 / 3")]
-    assert [one.vdi is None for one in grid.children] == [False, True, True]
-    with pytest.raises(pvdi.InvalidVDIError, match="there is no VDI here"):
-        grid.children[1].screenshot()
-    np.testing.assert_array_equal(png(grid._repr_mimebundle_()), plotter.screenshot())
-    page = open_widget(grid.children[1])
-    assert picture(page, (48, 32), "viewers[0]")[16, 24, 0] > 100
-    plotter.close()
 
 
 def test_a_series_in_a_notebook_has_one_time(open_widget, series):

@@ -108,10 +108,6 @@ CALLS = {
     "add_text_slider_widget": lambda p: p.add_text_slider_widget(ignore, ["a", "b"]),
     "add_timer_event": lambda p: p.add_timer_event(1, 1, ignore),
     "add_title": lambda p: p.add_title("title", font_size=8),
-    "add_transfer_function_editor": lambda p: p.add_transfer_function_editor(
-        p.add_volume(GRID, show_scalar_bar=False)
-    ),
-    "add_vdi_clip_plane": lambda p: p.add_vdi_clip_plane(p.volume),
     "add_vdi": lambda p: p.add_vdi(BALL, show_scalar_bar=False),
     "add_volume": lambda p: p.add_volume(GRID, show_scalar_bar=False),
     "add_volume_clip_plane": lambda p: p.add_volume_clip_plane(
