@@ -23,7 +23,7 @@ from shared import ROOMS, Case, Latest, Results, execute, load, mean_of, parser_
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
-from pyvista_vdi.plotting.convert import to_image_data
+from pyvista_vdi.plotting.volumes import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 #: Five of 256^3 voxels or about as many, and one that is solid.

@@ -35,7 +35,7 @@ from pyvista_vdi.measure.bench import ratio, take_turns
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import ANGLES, TRANSFER_FUNCTIONS, filling_camera
-from pyvista_vdi.plotting.convert import to_image_data
+from pyvista_vdi.plotting.volumes import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.view import aim
 
 #: Three that are large, four of 256^3 to 302^3 voxels, and one that is solid.

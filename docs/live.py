@@ -25,7 +25,7 @@ BACKGROUND = (0.1, 0.1, 0.15)
 
 
 def make_brain(size: tuple[int, int]) -> pvdi.VDI:
-    """Return the shipped brain, from its left and above, with dark furrows."""
+    """Return the shipped brain, from its left and above."""
     volume = examples.load_brain()
     x, y, z = volume.center
     camera = pvdi.Camera((x - 260, y + 260, z + 170), (x, y, z), (0, 0, 1))
@@ -34,14 +34,13 @@ def make_brain(size: tuple[int, int]) -> pvdi.VDI:
         size,
         cmap="bone",
         opacity=[0, 0, 0, 0.6, 1, 1],
-        ambient_occlusion=pvdi.AmbientOcclusion(strength=0.15),
         max_supersegments=10,
     )
 
 
 def make_rayleigh_taylor(size: tuple[int, int]) -> pvdi.VDI:
     """Return the shipped mixing layer: both fluids are transparent, what is mixed is not."""
-    volume = examples.load_rayleigh_taylor()
+    volume = examples.load_data("rayleigh_taylor")
     x, y, z = volume.center
     camera = pvdi.Camera((x + 300, y - 380, z + 120), (x, y, z), (0, 0, 1))
     opacity = [0.0, 0.0, 0.02, 0.1, 0.3, 0.1, 0.02, 0.0, 0.0]

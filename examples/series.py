@@ -52,7 +52,8 @@ def main() -> None:
     actor = plotter.add_vdi(series, show_scalar_bar=False)
     plotter.camera_position = (camera.position, camera.focal_point, camera.view_up)
     if not off_screen:
-        actor.add_time_slider(plotter, title="time")
+        ends = series.times[0], series.times[-1]
+        plotter.add_slider_widget(lambda time: setattr(actor, "time", time), ends, title="time")
         actor.play(rate=10)
         plotter.show()
         return

@@ -16,7 +16,6 @@ from pyvista_vdi.plotting import registration
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
-    "AmbientOcclusion": "model.ambient_occlusion",
     "Camera": "model.camera",
     "DeferredVDI": "model.deferred",
     "Cropping": "model.cropping",
@@ -24,8 +23,6 @@ _HOMES = {
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
-    "Plotter": "plotting.plotter",
-    "Report": "device.report",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",
@@ -37,7 +34,6 @@ _HOMES = {
     "describe_devices": "device",
     "list_devices": "device",
     "list_volumes": "io.volumes",
-    "open_volume": "io.stores",
     "presets": "model.presets",
     "read_volume": "io.volumes",
     **dict.fromkeys(("Settings", "estimate", "generate", "pick", "read"), "api"),

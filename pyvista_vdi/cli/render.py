@@ -33,8 +33,7 @@ from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import as_path, with_suffix
-from pyvista_vdi.plotting.imports import import_pyvista
-from pyvista_vdi.plotting.screen import why_no_window
+from pyvista_vdi.plotting.imports import import_pyvista, why_no_window
 
 
 def render(options: argparse.Namespace) -> int:
@@ -129,7 +128,13 @@ def _show(plotter: Any, actor: Any, first: Camera, options: argparse.Namespace) 
         rate = RATE if options.rate is None else options.rate
         plotter.add_key_event("space", lambda: actor.pause() if actor.playing else actor.play(rate))
         if len(actor.series) > 1:
-            actor.add_time_slider(plotter)
+            times = actor.series.times[0], actor.series.times[-1]
+            plotter.add_slider_widget(
+                lambda time: setattr(actor, "time", time),
+                times,
+                title="time",
+                interaction_event="always",
+            )
         if options.play:
             actor.play(rate)
     plotter.show()

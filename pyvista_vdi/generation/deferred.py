@@ -112,7 +112,7 @@ def generate_deferred(
         "sample_distance": metadata["sample_distance"],
         "importance": points,
     }
-    return DeferredVDI.of_lists(lists, about).with_precision(options.precision)
+    return DeferredVDI(lists, about).with_precision(options.precision)
 
 
 def kept_range(
@@ -127,11 +127,6 @@ def kept_range(
         raise UnsupportedError(
             "RGBA volumes have colours of their own, so that nothing is left to be classified "
             "afterwards: leave classification='deferred' out"
-        )
-    if options.ambient_occlusion is not None:
-        raise UnsupportedError(
-            "ambient occlusion follows from opacities, which a deferred VDI does not have: leave "
-            "ambient_occlusion out, or classification='deferred'"
         )
     asked = volume.finite_range() if deferral.value_range is None else deferral.value_range
     low, high = as_range(asked)

@@ -327,11 +327,6 @@ class VDI(Lists):
         """
         return registry.method("VDI.plot")(self, **arguments)
 
-    def _repr_html_(self) -> str | None:
-        """Return a thumbnail and the figures, for what shows HTML and no viewer."""
-        form = registry.method("VDI._repr_html_", lambda vdi: None)
-        return form(self)  # type: ignore[no-any-return]
-
 
 def made_vdi(
     camera: Camera,

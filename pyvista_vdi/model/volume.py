@@ -16,7 +16,6 @@ from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_extern
 from pyvista_vdi.model.checks import as_floats, as_vector
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.host_memory import require_host_memory
-from pyvista_vdi.model.packed_values import packing_of
 
 
 class Geometry:
@@ -105,6 +104,11 @@ VOXEL_TYPES: tuple[str, ...] = (
 
 #: Numbers that float64 must have from voxel to voxel, so that rounding is not seen.
 _PLACES_IN_A_STEP = 256
+
+#: Attributes by which arrays in files say that their values are others than those that are stored.
+_PACKING = ("scale_factor", "add_offset", "_Unsigned")
+#: Attributes with numbers that stand for nothing, and what xarray writes for NaN in zarr 3.
+_MISSING, _NAN = ("_FillValue", "missing_value"), "AAAAAAAA+H8="
 
 #: Types that one of those represents without loss for every value they can hold.
 _WIDENED = {"bool": "uint8", "float16": "float32"}
@@ -322,16 +326,27 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     """Return an array that is read chunk by chunk, as a volume holds it; nothing is read yet.
 
     ``index`` says what is taken of an array of more dimensions, as of a :class:`ChunkedArray`.
-    Values that its attributes pack (``scale_factor``, ``add_offset``, ``_FillValue``) are unpacked.
+    Values that its attributes pack, as the CF conventions have it, are refused.
     """
     if isinstance(array, ChunkedArray):
         return array
-    packing: Any = packing_of(array)
-    kind, long = _voxel_type(array.dtype if packing is None else packing.dtype)
-    checked = _from_long_integers if long else packing
+    attributes = getattr(array, "attrs", {})
+    said = [name for name in _PACKING if name in attributes]
+    said += [name for name in _MISSING if name in attributes and not _is_nan(attributes[name])]
+    if said:
+        raise InvalidVolumeError(
+            f"the array's values are packed ({', '.join(said)}): open it by xarray, which unpacks "
+            'them, and give pyvista_vdi.Volume(dataset["name"].data)'
+        )
+    kind, long = _voxel_type(array.dtype)
+    checked = _from_long_integers if long else None
     found = ChunkedArray(array, index=index, checked=checked, dtype=kind)
     _check_planes(found.shape)
     return found
+
+
+def _is_nan(said: Any) -> bool:
+    return said == _NAN if isinstance(said, str) else bool(np.isnan(as_floats(said)).all())
 
 
 def _check_planes(shape: tuple[int, ...]) -> None:

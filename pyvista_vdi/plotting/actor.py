@@ -8,12 +8,11 @@ import pyvista as pv
 from pyvista.plotting.mapper import OpenGLGPUVolumeRayCastMapper
 from pyvista.plotting.volume import Volume
 
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 from pyvista_vdi.vtk_pipeline.filters.view import framed
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkCamera, vtkImageData, weakly
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkCamera, vtkImageData
 
 # PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
 require_this_build(Volume)
@@ -84,17 +83,9 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 class PlotterVDIActor(VDIActorMethods, Volume):
     """What ``Plotter.add_vdi`` returns: a ``pyvista.Volume`` with :attr:`vdi`."""
 
-    #: What reads finer levels of a store; ``None`` where none is shown.
-    _refinement: Any = None
-
     def __init__(self) -> None:
         super().__init__()
         self._become_vdi_actor()
-
-    @property
-    def level(self) -> int | None:
-        """Level of the store that is shown, 0 is the finest; ``None`` where no store is."""
-        return None if self._refinement is None else self._refinement.shown.level  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         """Return what is shown, and what of it the last frame drew."""
@@ -138,51 +129,6 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         """Return the camera of a renderer's next picture."""
         return first_camera(renderer, renderer.ComputeVisiblePropBounds())
 
-    def add_time_slider(self, plotter: Any, **options: Any) -> Any:
-        """Show a slider that sets :attr:`time`, and in each frame shows that of the step drawn.
-
-        Parameters
-        ----------
-        plotter : pyvista.Plotter
-            Which shows this actor.
-        **options
-            Those of ``plotter.add_slider_widget``: ``title``, ``pointa``, ``pointb``, ``style`` ...
-
-        Returns
-        -------
-        vtkSliderWidget
-            PyVista's widget; ``plotter.clear_slider_widgets()`` takes it away.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If no series is shown, or it has one step.
-        """
-        first, last = self._player().series.times[0], self._player().series.times[-1]
-        if first == last:
-            raise InvalidArgumentError("this series has one step: there is no time to choose")
-        actor = weakly(self)
-
-        def chosen(time: float) -> None:
-            shown = actor()
-            if shown is not None:
-                shown.time = time
-
-        slider = plotter.add_slider_widget(
-            chosen,
-            (first, last),
-            **{"value": self.time, "title": "time", "interaction_event": "always", **options},
-        )
-        bar = weakly(slider.GetRepresentation())
-
-        def follow(*_: Any) -> None:
-            shown, representation = actor(), bar()
-            if shown is not None and representation is not None and shown.series is not None:
-                representation.SetValue(shown.time)
-
-        plotter.renderer.AddObserver("StartEvent", follow)
-        return slider
-
     def copy(self, deep: bool = True) -> PlotterVDIActor:
         """Return another actor that shows the same VDI, with a mapper of its own.
 
@@ -221,11 +167,8 @@ def first_camera(renderer: Any, bounds: Any) -> Any:
     camera = renderer.GetActiveCamera()
     if not isinstance(renderer, pv.Renderer) or camera.is_set:
         return camera
-    plotter = renderer.parent
-    if not plotter._first_time:
-        return camera
     # Of several that share a camera, the first resets it
-    first = next(each for each in plotter.renderers if each.GetActiveCamera() is camera)
+    first = next(each for each in renderer.parent.renderers if each.GetActiveCamera() is camera)
     if first is not renderer:
         renderer, bounds = first, first.ComputeVisiblePropBounds()
     copied = vtkCamera()

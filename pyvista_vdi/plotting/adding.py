@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
@@ -10,16 +11,19 @@ from typing import Any, ClassVar, NamedTuple, get_type_hints
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import (
-    InvalidArgumentError,
     InvalidArgumentTypeError,
     UnsupportedError,
     warn_external,
 )
 from pyvista_vdi.generation.deferred import kept_range
+from pyvista_vdi.io import is_vdi_file, read
+from pyvista_vdi.io.files import holds
+from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.io.volumes import read_volume
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -34,26 +38,19 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.render_options import DrawingOptions
-from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike, VolumeLike
+from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI, picture_view
-from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper
+from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper, first_camera
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.prepared import prepared
 from pyvista_vdi.plotting.progress import progress_callback
-from pyvista_vdi.plotting.refinement import Refinement
-from pyvista_vdi.plotting.uniform import UniformGrid
-from pyvista_vdi.plotting.volumes import as_grid, held, require_grid
+from pyvista_vdi.plotting.volumes import as_grid, held, load
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
-
-#: What ``add_actor`` understands as culling, besides nothing.
-_CULLING = (True, "back", "backface", "b", "front", "frontface", "f")
 
 #: ``add_volume``'s names of VTK's mappers.
 _MAPPERS = ("fixed_point", "gpu", "open_gl", "smart", "ugrid")
@@ -63,21 +60,6 @@ _BELOW_GOAL = 0.02
 
 #: Colour maps of blocks that are to be told apart: those of ``add_volume``.
 _MAPS = ("Reds", "Greens", "Blues", "Greys", "Oranges", "Purples")
-
-
-def _scalar_bar_args(given: Any) -> Mapping[str, Any]:
-    if not isinstance(given, Mapping | None):
-        raise InvalidArgumentTypeError(f"scalar_bar_args must be a dictionary; got {given!r}")
-    return given or {}
-
-
-def _culling(given: Any) -> str | bool:
-    if given and (given.lower() if isinstance(given, str) else given) not in _CULLING:
-        raise InvalidArgumentError(
-            f"culling must be False or one of {_CULLING}; got {given!r} (faces are a mesh's: "
-            "it changes nothing of a volume)"
-        )
-    return "backface" if given is True else given
 
 
 def _note_mapper(name: Any) -> None:
@@ -97,7 +79,7 @@ class Placement(Options):
 
     reset_camera: bool | None = option(None, "whether the view is reset, as in ``add_volume``")
     name: str | None = option(None, "of the actor; another of this name is replaced")
-    culling: bool | str = option(False, "of faces, which a volume has none of", check=_culling)
+    culling: bool | str = option(False, "of faces, which a volume has none of")
     multi_colors: bool = option(
         False, "give each block of a ``MultiBlock`` a colour map of its own"
     )
@@ -106,10 +88,9 @@ class Placement(Options):
         "of VTK's volume mappers; a VDI has its own, and none means a thing",
         check=_note_mapper,
     )
-    scalar_bar_args: Mapping[str, Any] = option(
+    scalar_bar_args: Mapping[str, Any] | None = option(
         None,
         "of the scalar bar, as in ``add_volume``",
-        check=_scalar_bar_args,
         takes="dict[str, Any] | None",
     )
     show_scalar_bar: bool | None = option(None, "whether there is a scalar bar; as the theme says")
@@ -124,18 +105,6 @@ class Making(Options):
     """What a VDI is made of, from where, and by what."""
 
     resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
-    resample: str | Sequence[int] | None = option(
-        None,
-        "resample any grid, and blocks of them, to a uniform one",
-        'Of so many points along x, y and z; ``"auto"``: voxels as large as the mean cell, a '
-        "uniform grid as it is. What lies outside their cells is not drawn. With ``categories``, "
-        "by the nearest value.",
-    )
-    mask: VolumeLike | NDArray[Any] | None = option(
-        None,
-        "labels of the volume's points, or of its cells: where they are 0, nothing is drawn",
-        "A grid may have its axes mirrored or in another order.",
-    )
     camera: CameraLike | None = option(
         None,
         "the generating view",
@@ -227,22 +196,27 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
     if isinstance(volume, vtkMultiBlockDataSet):
         return _blocks(plotter, pv.wrap(volume), asked)
     get_runtime(asked.making.device)  # a missing device is said here, not while a frame is drawn
-    volume, stored = prepared(plotter, volume, asked)
+
+    # Read what is named, and find what can be shown of it
+    if isinstance(volume, str | os.PathLike):
+        volume = _of_file(volume, asked)
+    if isinstance(volume, StoredVolume):
+        volume, asked = _of_store(plotter, volume, asked)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
         first = vdi_from_image(first)
     if isinstance(first, DeferredVDI):
-        asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
-        title = str(first.metadata.get("scalars") or "Data")
-        shown = _values_shown(first, asked, first.value_range, first.unit_distance, title)
+        shown = _of_values(first, asked)
     elif isinstance(first, VDI):
-        shown = _vdi_shown(first, asked)
+        shown = _of_vdi(first, asked)
     elif asked.deferral.given:
-        shown = _deferred(first, asked)
+        shown = _of_late_values(first, asked)
     else:
-        shown = _volume_shown(first, asked, plotter, stored)
-    actor, mapper = PlotterVDIActor(), _mapper(shown, asked, plotter._theme)
+        shown = _of_volume(first, asked, plotter)
+
+    # Make an actor that shows it
+    actor, mapper = PlotterVDIActor(), _mapper(shown, asked, plotter.theme)
     if shown.prop is not None:
         actor.prop = shown.prop
     thing = shown.thing if several is None else several
@@ -258,49 +232,26 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
     actor.mapper = mapper
     matrix = asked.place.user_matrix
     actor.user_matrix = np.eye(4) if matrix is None else matrix
+
+    # Put it into the plotter, which opens from the view of a VDI of its own
     plotter.mapper, plotter.volume = mapper, actor  # as add_volume does
+    own: Any = first if several is None else several
+    if several is not None and several.times is None and own.camera == own.cameras[0]:
+        own = None  # a set that tells of no view
     with _all_or_nothing(plotter, actor):
-        _put(plotter, actor, _own(first, several), shown, asked.place)
-    if stored is not None:
-        actor._refinement = Refinement(actor, plotter.renderer, stored)
+        _put(plotter, actor, own, shown, asked.place)
     plotter.renderer.Modified()
     return actor
-
-
-def _put(plotter: Any, actor: Any, own: Any, shown: _Shown, place: Placement) -> None:
-    """Put an actor and its scalar bar into a plotter, which opens from the view of its ``own``."""
-    render = not plotter._first_time if place.render is None else place.render
-    camera = plotter.renderer.camera  # plotter.camera would set it
-    touched = camera.is_set or camera.parallel_projection
-    opens = own is not None and place.reset_camera is not False and not touched
-    plotter.add_actor(
-        actor,
-        reset_camera=False if opens else place.reset_camera,
-        name=place.name,
-        culling=place.culling,
-        pickable=place.pickable,
-        render=render and not opens,
-    )
-    if opens:  # from its own view: others may show little of it
-        aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
-        if place.reset_camera:
-            plotter.reset_camera(render=False)
-        plotter.renderer.reset_camera_clipping_range()
-        if render:
-            plotter.render()
-    themed = plotter._theme.show_scalar_bar or place.scalar_bar_args
-    if themed if shown.bar is None else shown.bar:
-        plotter.add_scalar_bar(**{"title": shown.title, **place.scalar_bar_args})
 
 
 def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
     """Add each block of a ``MultiBlock``; return their actors, lists of those within blocks.
 
     Blocks that are missing are left out, and a name gets the block's number. A block that is no
-    uniform grid, and cannot be resampled to one, is refused before anything is added.
+    uniform grid is refused before anything is added.
     """
     for block in blocks.recursive_iterator(skip_none=True):
-        require_grid(block, uniform=asked.making.resample is None)
+        as_grid(block, None, None)
     actors: list[Any] = []
     maps = cycle(_MAPS)
     with _all_or_nothing(plotter, actors):
@@ -316,17 +267,25 @@ def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
     return actors
 
 
-def _own(first: Any, several: VDICollection | None) -> Any:
-    """Return what has a view to open from; ``None`` for volumes, and sets that tell of none."""
-    sets: Any = several
-    if several is not None and several.times is None and sets.camera == sets.cameras[0]:
-        return None
-    if several is not None:
-        return several
-    return first if isinstance(first, VDI | DeferredVDI) else None
+def _of_file(path: Any, asked: Addition) -> Any:
+    """Return the VDI, series, set, store or volume in a file."""
+    if is_vdi_file(path) or holds(path) in ("series", "set"):
+        return read(path)
+    scalars = asked.array.scalars
+    return read_volume(path, array=scalars if isinstance(scalars, str) else None)
 
 
-def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
+def _of_store(plotter: Any, stored: StoredVolume, asked: Addition) -> tuple[Any, Addition]:
+    """Return the level of a store that the view requires, and opacities of the finest's voxels."""
+    view = Camera.from_any(first_camera(plotter.renderer, stored.bounds))
+    level = stored.in_view(view, window_size=plotter.window_size)
+    if asked.look.opacity_unit_distance is None:
+        look = replace(asked.look, opacity_unit_distance=level.default_unit_distance)
+        asked = replace(asked, look=look)
+    return load(level), asked
+
+
+def _of_vdi(shown: VDI, asked: Addition) -> _Shown:
     """Return a VDI with the colours that it was made with, as far as its metadata has them."""
     asked.refuse_with_a_vdi()
     place, annotations = asked.place, asked.look.annotations
@@ -344,9 +303,15 @@ def _vdi_shown(shown: VDI, asked: Addition) -> _Shown:
     return _Shown(shown, table, table.scalar_range, title, bar=bar)
 
 
-def _deferred(volume: Any, asked: Addition) -> _Shown:
+def _of_values(shown: DeferredVDI, asked: Addition) -> _Shown:
+    """Return a deferred VDI with the property that classifies it."""
+    asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
+    title = str(shown.metadata.get("scalars") or "Data")
+    return _values_shown(shown, asked, shown.value_range, shown.unit_distance, title)
+
+
+def _of_late_values(volume: Any, asked: Addition) -> _Shown:
     """Return the values of a volume, which the first picture has made for its view."""
-    asked.array.require_composite()
     asked.deferral.refuse_target(asked.target)
     _refuse_of_values(asked.look)
     fixed = {"coverage": asked.drawing.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
@@ -360,11 +325,10 @@ def _deferred(volume: Any, asked: Addition) -> _Shown:
     source = _source(volume, asked)
     source.SetDeferral("deferred", asked.deferral.value_range, asked.deferral.importance)
     source.SetVolumeProperty(pv.VolumeProperty(interpolation_type=asked.look.interpolation))
-    read = source.GetVolume()
-    ends, _ = kept_range(read, asked.options, asked.deferral)
+    volume = source.GetVolume()
+    ends, _ = kept_range(volume, asked.options, asked.deferral)
     plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
-    values = LateValues(source)
-    return _values_shown(values, plain, ends, read.default_unit_distance, read.name)
+    return _values_shown(source, plain, ends, volume.default_unit_distance, volume.name)
 
 
 def _refuse_of_values(look: Looks) -> None:
@@ -381,7 +345,7 @@ def _refuse_of_values(look: Looks) -> None:
 
 
 def _values_shown(
-    values: DeferredVDI | LateValues,
+    values: DeferredVDI | VDISource,
     asked: Addition,
     value_range: tuple[float, float],
     unit_distance: float,
@@ -396,59 +360,47 @@ def _values_shown(
     return _Shown(DeferredInput(values, prop), table, table.scalar_range, title, prop, bar)
 
 
-def _source(volume: Any, asked: Addition) -> VDISource:
-    """Return a source of VDIs of a volume, made as it was asked for."""
-    source, preference = VDISource(), asked.array.preference
-    uniform = volume if isinstance(volume, UniformGrid) else None
-    if uniform is None:
-        image, array_name = as_grid(volume, asked.array.scalars, asked.making.resolution)
-        data = held(image)
-    else:
-        data, array_name = uniform.image, uniform.name
-    asked.array.require_composite()
-    named = None if array_name is None else data.GetPointData().GetArray(array_name)
-    if named is not None and preference == "point":
-        # As add_volume: another may be made the active one of the mapper's dataset
-        data.GetPointData().SetActiveScalars(array_name)
-        array_name = None
-    if uniform is None:
-        source.SetInputDataObject(data)
-    else:
-        source.SetInputConnection(uniform.GetOutputPort())
-    source.SetScalars(array_name, preference)
-    source.SetOptions(asked.options)
-    source.SetTarget(asked.target)
-    source.SetDevice(asked.making.device)
-    source.SetProgressCallback(progress_callback(asked.making.progress_bar))
-    if asked.making.camera is not None:
-        source.SetCamera(asked.making.camera)
-    return source
-
-
-def _volume_shown(volume: Any, asked: Addition, plotter: Any, stored: Volume | None) -> _Shown:
+def _of_volume(volume: Any, asked: Addition, plotter: Any) -> _Shown:
     """Return a source of VDIs of a volume, classified as ``add_volume`` would."""
     scalars, look, source = asked.array.scalars, asked.look, _source(volume, asked)
     told = {name: value for name, value in look.describe().items() if name in Look.declared}
     source.SetMetadata({"classification": {**asked.array.describe(), **told}})
     source.SetCoverage(asked.drawing.coverage)
-    read = source.GetVolume()
+    volume = source.GetVolume()
     bar = asked.place.show_scalar_bar
-    if read.rgba:
+    if volume.rgba:
         look, bar = look.of_rgba(), False
     look = replace(look, clim=range_to_classify(scalars, look.clim))
-    unit_distance = (read if stored is None else stored).default_unit_distance
-    values = read.array
-    if isinstance(volume, UniformGrid) and asked.making.resample is not None:
-        # As add_volume, of the grid itself
-        values, unit_distance = volume.values, volume.unit_distance
-    table = look.lookup_table(values)
-    prop = look.volume_property(table, unit_distance, rgba=read.rgba)
+    table = look.lookup_table(volume.array)
+    prop = look.volume_property(table, volume.default_unit_distance, rgba=volume.rgba)
     look.light(prop)
     source.SetLights(plotter.renderer)
     source.SetVolumeProperty(prop)
     # As add_volume: values that come without a name have none
-    title = read.name if scalars is None or isinstance(scalars, str) else ""
-    return _Shown(source, table, look.scalar_range(table, read), title, prop, bar)
+    title = volume.name if scalars is None or isinstance(scalars, str) else ""
+    return _Shown(source, table, look.scalar_range(table, volume), title, prop, bar)
+
+
+def _source(volume: Any, asked: Addition) -> VDISource:
+    """Return a source of VDIs of a volume, made as it was asked for."""
+    asked.array.require_composite()
+    image, name = as_grid(volume, asked.array.scalars, asked.making.resolution)
+    data, preference = held(image), asked.array.preference
+    named = None if name is None else data.GetPointData().GetArray(name)
+    if named is not None and preference == "point":
+        # As add_volume: another may be made the active one of the mapper's dataset
+        data.GetPointData().SetActiveScalars(name)
+        name = None
+    source = VDISource()
+    source.SetInputDataObject(data)
+    source.SetScalars(name, preference)
+    source.SetOptions(asked.options)
+    source.SetDial(**asked.target.given)
+    source.SetDevice(asked.making.device)
+    source.SetProgressCallback(progress_callback(asked.making.progress_bar))
+    if asked.making.camera is not None:
+        source.SetCamera(asked.making.camera)
+    return source
 
 
 def _mapper(shown: _Shown, asked: Addition, theme: Any) -> Any:
@@ -468,6 +420,33 @@ def _mapper(shown: _Shown, asked: Addition, theme: Any) -> Any:
     mapper.SetRegenerateBelow(below)
     mapper.SetDraw(drawing.draw)
     return mapper
+
+
+def _put(plotter: Any, actor: Any, own: Any, shown: _Shown, place: Placement) -> None:
+    """Put an actor and its scalar bar into a plotter, which opens from the view of its ``own``."""
+    render = place.render is None or place.render  # which nothing does before the first picture
+    camera = plotter.renderer.camera  # plotter.camera would set it
+    touched = camera.is_set or camera.parallel_projection
+    made = isinstance(own, VDI | DeferredVDI | VDICollection)
+    opens = made and place.reset_camera is not False and not touched
+    plotter.add_actor(
+        actor,
+        reset_camera=False if opens else place.reset_camera,
+        name=place.name,
+        culling=place.culling,
+        pickable=place.pickable,
+        render=render and not opens,
+    )
+    if opens:  # from its own view: others may show little of it
+        aim(camera, picture_view(own)[0], as_array(actor.GetMatrix()))
+        if place.reset_camera:
+            plotter.reset_camera(render=False)
+        plotter.renderer.reset_camera_clipping_range()
+        if render:
+            plotter.render()
+    about, bar = place.scalar_bar_args or {}, shown.bar
+    if (plotter.theme.show_scalar_bar or about) if bar is None else bar:
+        plotter.add_scalar_bar(**{"title": shown.title, **about})
 
 
 @contextlib.contextmanager

@@ -1,21 +1,27 @@
-"""``Plotter.add_vdi``: a VDI in place of a volume, with ``add_volume``'s arguments."""
+"""``Plotter.add_vdi``, with ``add_volume``'s arguments, and ``Plotter.vdi``, what it has beside."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+import io
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pyvista as pv
 import pyvista.plotting  # whole: pv.Plotter is missing while another thread imports it
 
+from pyvista_vdi import registry
 from pyvista_vdi.model.arguments import takes
 from pyvista_vdi.model.types import AnyVolume
 from pyvista_vdi.plotting.actor import PlotterVDIActor
 from pyvista_vdi.plotting.adding import Addition, added
 from pyvista_vdi.plotting.registration import Component
 from pyvista_vdi.vtk_pipeline.vtk import weakly
+
+if TYPE_CHECKING:
+    from pyvista_vdi.plotting.editor import TransferFunctionEditor
 
 
 @pv.register_plotter_component("add_vdi", override=True)  # of registration._Pending
@@ -53,7 +59,7 @@ class AddVDI(Component):
         volume : pyvista.ImageData, numpy.ndarray, pyvista.MultiBlock, Volume, path, or VDIs
             A uniform grid, or a rectilinear one of equidistant points; a NumPy array as
             ``add_volume`` takes it; blocks of uniform grids; a file, or a store, of which the level
-            that the view requires is shown (``actor.level``). Or a VDI, also as
+            that the view requires is shown. Or a VDI, also as
             ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
             (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
             view is drawn. With VDIs nothing is generated, arguments that only a volume can honour
@@ -67,8 +73,8 @@ class AddVDI(Component):
             A ``pyvista.Volume``; ``actor.vdi`` is the VDI, made whenever it is asked for and there
             is none, before the first picture too, for the view that this would have,
             ``actor.regenerate()`` makes another from the current view, and ``actor.status`` says
-            how it is drawn. Changes to ``actor.prop``, to the array's values or to the mask are in
-            the next picture. A ``MultiBlock`` gives a list of actors.
+            how it is drawn. Changes to ``actor.prop`` or to the array's values are in the next
+            picture. A ``MultiBlock`` gives a list of actors.
 
         Raises
         ------
@@ -90,30 +96,132 @@ class AddVDI(Component):
         >>> actor = plotter.add_vdi(pyvista_vdi.examples.load_brain(), cmap="bone")
         >>> plotter.show()  # doctest: +SKIP
         """
-        asked = replace(asked, look=replace(asked.look, theme=self._plotter._theme))
-        made = added(self._plotter, volume, asked)
-        self._remember(made)
+        plotter = self._plotter
+        asked = replace(asked, look=replace(asked.look, theme=plotter.theme))
+        made: Any = added(plotter, volume, asked)
+        found = [made]
+        while found:  # lists of blocks within blocks
+            each = found.pop()
+            if isinstance(each, list):
+                found += each
+            else:
+                self._actors.append(weakly(each))
         return made  # type: ignore[no-any-return]
 
     __doc__ = __call__.__doc__  # PyVista hands out an object where users look for the method
-
-    def _remember(self, made: Any) -> None:
-        """Keep actors in mind, weakly, until the plotter is closed."""
-        for each in made if isinstance(made, list) else [made]:
-            if isinstance(each, list):
-                self._remember(each)
-            else:
-                self._actors.append(weakly(each))
 
     def __plotter_close__(self) -> None:
         """Release images and textures, even where the user keeps an actor."""
         for weak in self._actors:
             actor = weak()
-            if actor is not None and actor._refinement is not None:
-                actor._refinement.stop()
             if actor is not None and actor.mapper is not None:
                 actor.mapper.driver.release()
         self._actors.clear()
+
+    def __plotter_deep_clean__(self) -> None:
+        """Nothing else is held."""
+
+
+@pv.register_plotter_component("vdi", override=True)  # of registration._Pending
+class PlotterVDIs(Component):
+    """What a plotter's VDIs have beside them: a page of the scene, and editors.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Held weakly.
+    """
+
+    def __init__(self, plotter: Any) -> None:
+        super().__init__(plotter)
+        self._editors: list[TransferFunctionEditor] = []
+
+    def export_html(self, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
+        """Write one HTML file that shows the plotter's scene, VDIs included, and turns it.
+
+        It opens from disk, offline, in any browser with WebGL 2, and needs no trame. A series
+        plays in it, and of a set the VDI nearest to the view is drawn.
+
+        Parameters
+        ----------
+        filename : path-like or None
+            Where the page is written; ``.html`` is put in the place of another suffix.
+
+        Returns
+        -------
+        io.StringIO or None
+            The page, if there is no file name.
+
+        Warns
+        -----
+        VDIWarning
+            Of what is not shown, by name.
+
+        Raises
+        ------
+        VDIFileError
+            If the file cannot be written.
+        InvalidArgumentError
+            If the plotter is gone, or has subplots.
+
+        Examples
+        --------
+        >>> import pyvista as pv
+        >>> plotter = pv.Plotter(off_screen=True)
+        >>> actor = plotter.add_vdi(pv.Wavelet(), cmap="bone")
+        >>> plotter.vdi.export_html("scene.html")  # doctest: +SKIP
+        """
+        export = registry.method("plotter.vdi.export_html")
+        return export(self._plotter, filename)  # type: ignore[no-any-return]
+
+    def add_transfer_function_editor(
+        self,
+        actor: Any,
+        *,
+        loc: Sequence[float] = (0.58, 0.66),
+        size: Sequence[float] = (0.4, 0.32),
+    ) -> TransferFunctionEditor:
+        """Edit the opacities and colours of a volume over its picture and its values' histogram.
+
+        A double-click on it gives it the mouse, as with all charts of PyVista's, and one beside it
+        gives it back to the camera. Then points of the opacity curve are dragged, added by a click,
+        and deleted by the Delete key.
+
+        Parameters
+        ----------
+        actor : pyvista.Volume or vtkVolume
+            Of ``add_volume``, or of ``add_vdi`` with a volume or a :class:`DeferredVDI`. Its
+            property is edited; what others change of it is shown with the next frame.
+        loc, size : (float, float), optional
+            Lower left corner, and width and height, as shares of the viewport.
+
+        Returns
+        -------
+        TransferFunctionEditor
+            The same by program: ``points``, ``apply_cmap``, ``remove``.
+
+        Raises
+        ------
+        UnsupportedError
+            If there is nothing to edit: RGBA brings its colours, and so does a VDI without its
+            volume, unless it is a deferred one.
+        InvalidArgumentError
+            If the actor is no volume of this plotter, or another argument cannot be used.
+        """
+        from pyvista_vdi.plotting.editor import TransferFunctionEditor
+
+        editor = TransferFunctionEditor(self._plotter, actor, loc, size)
+        for each in self._editors:
+            if each.actor is actor:
+                each.remove()
+        self._editors = [*(each for each in self._editors if each.renderer is not None), editor]
+        self._plotter.render()
+        return editor
+
+    def __plotter_close__(self) -> None:
+        """Observe nothing any more."""
+        for each in self._editors:
+            each.remove()
 
     def __plotter_deep_clean__(self) -> None:
         """Nothing else is held."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -10,6 +12,9 @@ from typing import Any
 from pyvista_vdi.errors import MissingDependencyError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.vtk_pipeline.vtk import explain_import_error
+
+#: VTK's windows that are on no screen.
+_OFF_SCREEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 
 
 def import_pyvista() -> Any:
@@ -37,9 +42,9 @@ def camera_to_pyvista(camera: Camera) -> Any:
 def volumes_in(file: Path) -> Any:
     """Return what PyVista's readers find in a file; MissingDependencyError says how to get them."""
     import_pyvista()
-    from pyvista_vdi.plotting import volume_files
+    from pyvista_vdi.plotting import files
 
-    return volume_files.volumes_in(file)
+    return files.volumes_in(file)
 
 
 def vtk_steps(file: str) -> tuple[Sequence[Any], tuple[float, ...]]:
@@ -52,3 +57,25 @@ def vtk_steps(file: str) -> tuple[Sequence[Any], tuple[float, ...]]:
 
         return steps_and_times(import_pyvista().get_reader(file).reader)
     return (), ()
+
+
+def why_no_window() -> str | None:
+    """Return why VTK can open no window that somebody sees, or ``None``.
+
+    It would draw off-screen, and return at once from showing what it drew.
+    """
+    if not sys.platform.startswith("linux"):
+        return None
+    display = os.environ.get("DISPLAY")
+    if not display:
+        return "DISPLAY names no X display"
+    import_pyvista()  # says what is missing where VTK cannot be loaded
+    from pyvista_vdi.vtk_pipeline.vtk import vtkRenderWindow
+
+    kind = vtkRenderWindow().GetClassName()
+    if kind not in _OFF_SCREEN:
+        return None
+    return (
+        f"VTK draws in a {kind}, off-screen: the display {display} cannot be reached, or "
+        "VTK_DEFAULT_OPENGL_WINDOW asks for it"
+    )

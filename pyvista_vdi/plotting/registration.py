@@ -28,9 +28,7 @@ _PLOTTERS = "pyvista.plotting"
 #: ``pyproject.toml``.
 COMPONENTS = {
     "add_vdi": "pyvista_vdi.plotting.component",
-    "add_vdi_clip_plane": "pyvista_vdi.plotting.clip_plane",
-    "add_transfer_function_editor": "pyvista_vdi.plotting.add_transfer_function_editor",
-    "vdi": "pyvista_vdi.plotting.pages",
+    "vdi": "pyvista_vdi.plotting.component",
 }
 ACCESSORS = {"vdi": "pyvista_vdi.plotting.accessor"}
 

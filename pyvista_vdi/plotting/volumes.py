@@ -1,7 +1,8 @@
-"""What ``add_volume`` takes as a volume, to one uniform grid with named scalars."""
+"""What ``add_volume`` takes as a volume, and paths and stores, to a uniform grid with scalars."""
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -13,44 +14,54 @@ from pyvista_vdi.errors import (
     InvalidVolumeTypeError,
     UnsupportedError,
 )
+from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.convert import to_image_data
-from pyvista_vdi.vtk_pipeline.filters.convert import as_numpy, require_image
-from pyvista_vdi.vtk_pipeline.vtk import vtkCommonDataModel, vtkRectilinearGrid
+from pyvista_vdi.vtk_pipeline.filters.convert import as_numpy, require_image, volume_to_image
+from pyvista_vdi.vtk_pipeline.vtk import vtkRectilinearGrid
+
+_log = logging.getLogger(__name__)
 
 #: What ``add_volume`` calls scalars that are given as an array.
 _UNNAMED = "Data"
 
 
-def as_grid(
-    volume: Any, scalars: Any, resolution: Any, *, uniform: bool = True
-) -> tuple[Any, str | None]:
-    """Return a grid and the name of its scalars, ``None`` for the active ones.
+def load(volume: StoredVolume) -> Volume:
+    """Read a level of a store and log which; DeviceMemoryError if the host lacks the memory."""
+    remedy = "open a coarser level by pyvista_vdi.read_volume(path, level=...), or generate a VDI"
+    require_host_memory(
+        volume.array.nbytes, f"the volume in {volume.store.path}", remedy, free=True
+    )
+    _log.info("%s: %s", volume.store.path, volume.describe())
+    return volume.load()
+
+
+def to_image_data(volume: Volume, name: str | None = None) -> pv.ImageData:
+    """Return a volume as PyVista's uniform grid, with its values as the active point array.
+
+    ``name`` is the array's, the volume's own by default. It may share memory with the volume.
+    """
+    grid: pv.ImageData = pv.wrap(volume_to_image(volume, name))
+    return grid
+
+
+def as_grid(volume: Any, scalars: Any, resolution: Any) -> tuple[Any, str | None]:
+    """Return a uniform grid and the name of its scalars, ``None`` for the active ones.
 
     ``volume`` is a grid, a NumPy array with the spacing ``resolution``, or a Volume; the user's own
     grid is returned where that is possible, so that changes to it are seen. ``scalars`` is a name,
     or values per point or cell, which go into a shallow copy. A rectilinear grid whose points are
-    equidistant is a uniform one; others are refused with a remedy, if it is to be ``uniform``.
+    equidistant is a uniform one; others are refused with a remedy.
     """
     if isinstance(volume, np.ndarray):
         image = _from_array(volume, resolution)
     elif isinstance(volume, Volume):
         image = to_image_data(volume)
     else:
-        image = _as_uniform(volume)
-        require_grid(image, uniform=uniform)
+        image = require_image(_as_uniform(volume))
     if scalars is None or isinstance(scalars, str):
         return image, scalars
     return _with_values(image, np.asarray(scalars)), _UNNAMED
-
-
-def require_grid(data: Any, *, uniform: bool) -> None:
-    """Refuse what is no uniform grid, or, where it need not be uniform, what has no volume."""
-    other = isinstance(data, vtkCommonDataModel.vtkDataSet) and not isinstance(
-        data, vtkCommonDataModel.vtkPolyData
-    )
-    if uniform or not other:
-        require_image(data)
 
 
 def _as_uniform(grid: Any) -> Any:
@@ -122,13 +133,10 @@ def _with_values(image: Any, values: Any) -> pv.ImageData:
             f"scalars must have one value per point ({n_points}) or per cell ({n_cells}); "
             f"got shape {values.shape}"
         )
-    copy = type(pv.wrap(image))()
+    copy = pv.ImageData()
     copy.CopyStructure(image)
-    for to, marks in (
-        (copy.GetPointData(), image.GetPointGhostArray()),
-        (copy.GetCellData(), image.GetCellGhostArray()),
-    ):
-        to.AddArray(marks)
+    copy.GetPointData().AddArray(image.GetPointGhostArray())
+    copy.GetCellData().AddArray(image.GetCellGhostArray())
     data = copy.point_data if len(values) == n_points else copy.cell_data
     data.set_array(values, _UNNAMED)
     return copy

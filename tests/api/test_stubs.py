@@ -14,7 +14,6 @@ import typing
 from pathlib import Path
 
 import numpy.typing as npt
-import pytest
 
 import pyvista_vdi
 from pyvista_vdi import api
@@ -26,14 +25,9 @@ PACKAGE = Path(pyvista_vdi.__file__).parent
 #: Modules that names in annotations are imported from; else it is where the class is.
 HOMES = (collections.abc, typing, npt, types)
 CLASSES = {
-    "AddTransferFunctionEditor": "plotting.add_transfer_function_editor",
-    "AddVDIClipPlane": "plotting.clip_plane",
-    "AmbientOcclusion": "model.ambient_occlusion",
     "DeferredVDI": "model.deferred",
     "Estimate": "generation.slices",
     "Pick": "raycasting.picking",
-    "PlotterVDIActor": "plotting.actor",
-    "PlotterVDIs": "plotting.pages",
     "Settings": "api",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",
@@ -115,13 +109,6 @@ def stubs():
     maker = type("", (), {"__signature__": made})
     text += definition(maker, "__init__", margin="    ", **{"return": None})
     yield "api/__init__.pyi", stub("The public functions and their options", text)
-    pytest.importorskip("pyvista")
-    from pyvista_vdi.plotting.component import AddVDI
-
-    text = "class Plotter(pv.Plotter):\n    add_vdi_clip_plane: AddVDIClipPlane\n"
-    text += "    add_transfer_function_editor: AddTransferFunctionEditor\n    vdi: PlotterVDIs\n"
-    text += definition(AddVDI.__call__, "add_vdi", margin="    ")
-    yield "plotting/plotter.pyi", stub("A plotter with what this package adds", text)
     text = "class OptionMethods:\n"
     for each in dataclasses.fields(GenerationOptions):
         if each.name != "lights":

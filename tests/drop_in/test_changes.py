@@ -300,9 +300,9 @@ clip_plane(", not implicit", normal="y", implicit=False)
 
 @kind.case()
 def a_clip_plane_of_a_grid(pl, add):
-    """``add_vdi_clip_plane(grid)`` in place of ``add_volume_clip_plane(grid)``."""
-    put = pl.add_vdi_clip_plane if add.ours else pl.add_volume_clip_plane
-    put(grid(), normal="x", **BARE)
+    """``add_volume_clip_plane(add_vdi(grid))`` in place of ``add_volume_clip_plane(grid)``."""
+    shown = add(grid(), **BARE) if add.ours else grid()
+    pl.add_volume_clip_plane(shown, normal="x", **({} if add.ours else BARE))
     if not add.ours:
         half_voxel_steps(pl.volume)
 

@@ -15,9 +15,9 @@ from extreme_scenes import (
     transfer,
     view,
 )
+from reference.compositing import composite
 
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
 
 pytestmark = pytest.mark.extremes

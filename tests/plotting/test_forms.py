@@ -10,30 +10,17 @@ import pytest
 import pyvista as pv
 from plugin_scenes import (
     LOOKS,
-    add_judge,
-    add_ours,
-    assert_as_vtk,
     shown,
     soft_ball,
 )
 from pyvista.plotting.plotter import _ALL_PLOTTERS
-from settings import with_settings
 
-import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
-from pyvista_vdi.plotting.add_transfer_function_editor import AddTransferFunctionEditor
-from pyvista_vdi.plotting.clip_plane import AddVDIClipPlane
-from pyvista_vdi.plotting.component import AddVDI
-from pyvista_vdi.plotting.pages import PlotterVDIs
 
 pytestmark = pytest.mark.gl
 
 WINDOW = (60, 50)
 #: That the VDI is missing where a scene is written for another renderer.
-MESSAGE = (
-    "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
-    "plotter.vdi.export_html, screenshots"
-)
 
 
 def two_balls():
@@ -58,14 +45,6 @@ def test_blocks_are_those_that_are_added_one_by_one(plotter, multi_colors):
     vtks = judge.add_volume(blocks, multi_colors=multi_colors, name="balls")
     assert len(vtks) == 2
     assert names == [name for name in judge.renderer.actors if name.startswith("balls")]
-
-
-@pytest.mark.parametrize("name", ["cmap", "colormap"])
-def test_colours_of_their_own_go_before_a_colour_map(plotter, name):
-    actors = plotter.add_vdi(two_balls(), multi_colors=True, **{name: "bone"})
-    reds, greens = (actor.mapper.lookup_table.values[-1, :3] for actor in actors)
-    assert reds.argmax() == 0
-    assert greens.argmax() == 1
 
 
 def test_blocks_within_blocks_and_none(plotter):
@@ -106,29 +85,6 @@ def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted(plotter):
     np.testing.assert_array_equal(shown(plotter), named)
 
 
-@pytest.mark.parametrize("given", ["volume", "actor", "actor, by add_volume's"])
-def test_a_plane_widget_clips_as_it_clips_a_volume(given):
-    plane = {"normal": "x", "interaction_event": "always"}
-
-    def scene(plotter, add):
-        if add is add_ours and given == "volume":
-            looks = {"interpolation": "linear", "sample_distance": 0.02, "max_supersegments": 64}
-            widget = plotter.add_vdi_clip_plane(
-                soft_ball(), **plane, **with_settings(**looks), **LOOKS
-            )
-            assert widget.IsA("vtkImplicitPlaneWidget")
-        else:
-            actor = add(plotter, soft_ball())
-            ours = "add_vdi_clip_plane" if given == "actor" else "add_volume_clip_plane"
-            clips = {add_ours: ours, add_judge: "add_volume_clip_plane"}
-            if add in clips:
-                getattr(plotter, clips[add])(actor, **plane)
-        plotter.clear_plane_widgets()
-
-    # In fewer pixels those that the plane cuts through are further off
-    assert_as_vtk(scene, window_size=(240, 200))
-
-
 def test_plot_of_a_grid_is_what_a_plotter_shows(plotter):
     volume = soft_ball(8)
     arguments = {
@@ -161,19 +117,8 @@ def test_a_plot_that_is_refused_leaves_no_plotter():
     assert before == _ALL_PLOTTERS
 
 
-def test_help_is_the_method_s_and_what_is_promised_is_there(plotter):
+def test_help_is_the_method_s(plotter):
     for found in (plotter.add_vdi, type(plotter).add_vdi):
         assert inspect.getdoc(found).startswith("Add a volume that turns fluently")
         assert "max_supersegments : int" in inspect.getdoc(found)
     assert next(iter(inspect.signature(plotter.add_vdi).parameters)) == "volume"
-    assert "plane widget" in inspect.getdoc(plotter.add_vdi_clip_plane)
-    ours = pvdi.Plotter(off_screen=True, window_size=WINDOW)
-    assert isinstance(ours, pv.Plotter)
-    kinds = {
-        "add_vdi": AddVDI,
-        "add_vdi_clip_plane": AddVDIClipPlane,
-        "add_transfer_function_editor": AddTransferFunctionEditor,
-        "vdi": PlotterVDIs,
-    }
-    assert pvdi.Plotter.__annotations__ == {name: kind.__name__ for name, kind in kinds.items()}
-    assert {name: type(getattr(ours, name)) for name in kinds} == kinds

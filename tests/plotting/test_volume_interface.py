@@ -141,7 +141,7 @@ REFUSED = {
     ),
     "sample distance": (lambda a: a.mapper.SetSampleDistance(-1.0), "sample_distance.*got -1.0"),
     "mask": (lambda a: a.mapper.SetMaskInput(image()), "set masked voxels"),
-    "scattering": (lambda a: a.mapper.SetVolumetricScatteringBlending(0.5), "ambient_occlusion"),
+    "scattering": (lambda a: a.mapper.SetVolumetricScatteringBlending(0.5), "SetShade"),
     "another mapper": (
         lambda a: setattr(a, "mapper", pv.plotting.mapper.SmartVolumeMapper()),
         "needs a VDIMapper; got SmartVolumeMapper",
@@ -204,7 +204,7 @@ def test_what_a_vdi_cannot_honour_is_refused_by_name(closed, name):
     np.testing.assert_array_equal(shown.picture(), before)
 
 
-def test_a_vdi_without_its_volume_has_no_other_steps(plotter):
+def test_a_vdi_without_its_volume_has_no_other_array_and_no_other_steps(plotter):
     actor = plotter.add_vdi(image().vdi.generate(plotter.camera, (8, 6)))
     with pytest.raises(UnsupportedError, match="keeps the steps"):
         actor.mapper.SetSampleDistance(0.1)

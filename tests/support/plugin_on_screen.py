@@ -22,7 +22,6 @@ from plugin_scenes import LOOKS, soft_ball
 from skimage.io import imread
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.plotting import refinement
 from pyvista_vdi.quality.rate import FrameRate
 from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, vtk_to_numpy, vtkUnsignedCharArray
 
@@ -324,64 +323,6 @@ def the_screen_shows_every_pixel_and_depth_is_read():
     plotter.close()
 
 
-def store(folder):
-    """A ball of three levels, each of which has half the points, and other stripes."""
-    import zarr
-
-    group = zarr.open_group(folder, mode="w", zarr_format=2)
-    z, y, x = np.mgrid[:64, :64, :64]
-    inside = (z - 31.5) ** 2 + (y - 31.5) ** 2 + (x - 31.5) ** 2 < 28**2
-    datasets = []
-    for level, step in enumerate((1, 2, 4)):
-        values = np.where(inside, np.where(x // (16 >> level) % 2, 230, 90), 0).astype(np.uint8)
-        group.create_array(str(level), data=values[::step, ::step, ::step], chunks=(16, 16, 16))
-        scale = [{"type": "scale", "scale": [float(step)] * 3}]
-        datasets.append({"path": str(level), "coordinateTransformations": scale})
-    axes = [{"name": a, "type": "space"} for a in "zyx"]
-    group.attrs["multiscales"] = [{"version": "0.4", "datasets": datasets, "axes": axes}]
-    return folder
-
-
-def a_finer_level_comes_by_itself():
-    """The wheel comes nearer, frames go on meanwhile, and the level read is drawn by the loop."""
-    go_on, load, middle = threading.Event(), refinement.load, (31.5, 31.5, 31.5)
-
-    def held(volume):
-        assert go_on.wait(LONG)
-        return load(volume)
-
-    with tempfile.TemporaryDirectory() as folder:
-        plotter = pv.Plotter(off_screen=False, window_size=(121, 103))
-        plotter.camera_position = ((31.5, 31.5, 4000), middle, (0, 1, 0))
-        looks = {"clim": (0, 255), "cmap": "viridis", "show_scalar_bar": False, "draw": "volume"}
-        actor = plotter.add_vdi(pvdi.open_volume(store(folder)), **looks)
-        plotter.show(interactive_update=True, auto_close=False)
-        assert (actor.level, plotter.render_window.GetShowWindow()) == (2, 1)
-        refinement.load = held
-        hand = Hand(plotter)
-        for distance in (1200, 400, 160):
-            plotter.camera.position = (31.5, 31.5, 31.5 + distance)
-            hand.send("MouseWheelForwardEvent", 60, 50)
-            assert actor.level == 2, actor.level
-        coarse, frames = pixels(plotter), []
-        plotter.render_window.AddObserver("EndEvent", lambda *_: frames.append(actor.level))
-        go_on.set()
-        wait(plotter, lambda: actor.level < 2)
-        wait(plotter, lambda: actor._refinement._worker.job is None)
-        fine = pixels(plotter)
-        assert frames, "no frame was drawn"
-        assert np.abs(fine - coarse).mean() > 5, np.abs(fine - coarse).mean()
-        other = pv.Plotter(off_screen=True, window_size=(121, 103))
-        other.camera = plotter.camera.copy()
-        other.add_vdi(pvdi.open_volume(folder), **looks)
-        again = other.screenshot(return_img=True).astype(int)[::-1].reshape(-1, 3)
-        assert np.abs(again - fine).max() <= 2, np.abs(again - fine).max()
-        other.close()
-        refinement.load = load
-        plotter.close()
-        assert not [t for t in threading.enumerate() if t.name == "pyvista-vdi level"]
-
-
 CASES = (
     the_screen_shows_every_pixel_and_depth_is_read,
     a_series_plays_by_itself_and_goes_on_after_a_turn,
@@ -393,7 +334,6 @@ CASES = (
     held_still_nothing_turns_and_moving_shows_the_new_vdi,
     show_blocks_and_the_new_vdi_comes,
     closing_in_the_middle,
-    a_finer_level_comes_by_itself,
 )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from functools import partial
 from itertools import pairwise, zip_longest
-from operator import attrgetter, getitem
+from operator import getitem
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidArgumentTypeError,
     MissingDependencyError,
-    with_article,
 )
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, cuts_of
 from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task
@@ -69,7 +68,7 @@ def generate_in_blocks(
     if not isinstance(client, str | Client):
         raise InvalidArgumentTypeError(
             f"client must be a distributed.Client or the address of a scheduler; got "
-            f"{with_article(type(client).__name__)}: give distributed.Client(cluster) for a cluster"
+            f"{type(client).__name__}: give distributed.Client(cluster) for a cluster"
         )
     try:
         connection = Client(client) if isinstance(client, str) else nullcontext(client)
@@ -94,11 +93,6 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
     first = workers.map("first-pass", task.first_pass, order, order, values.values(), share=0.4)
     seen = workers.results(workers.map("seen", Seen.without_faces, order, first.values()))
     entering = task.light_entering(windows, seen)
-    ambient = None
-    if task.occlusion is not None:
-        parts = workers.map("opacities", attrgetter("opacities"), order, first.values())
-        ambient = workers.map("ambient", task.ambient, [()], *([part] for part in parts.values()))
-        ambient = ambient[()]
 
     # Make the lists of each block in which something may be seen
     visible = list(entering)
@@ -110,7 +104,6 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
         visible,
         [values[block] for block in visible],
         entering.values(),
-        [ambient] * len(visible),
         *([first.get(found.get(at)) for found in around] for at in blocks.offsets),
         share=0.4,
     )

@@ -46,7 +46,6 @@ class Driver(Planner):
     def __init__(self) -> None:
         super().__init__()
         self.box = Box()
-        self.level: tuple[int, int] | None = None  # of a store, and of how many
         self._window: Callable[[], Window | None] = lambda: None  # of the last frame
         self._active = vtkWeakReference()  # which renderer is between its start and its end
         self._followed: list[Callable[[], Any]] = []  # renderers that say so
@@ -328,7 +327,6 @@ class Driver(Planner):
             stand_in=self._stand_in,
             drawn=last.way,
             time=None if player is None else player.time,
-            level=self.level,
         )
 
     def pick(self, renderer: Any, x: float, y: float) -> Pick | None:

@@ -62,9 +62,7 @@ class VolumePicture:
         self.shaded = request.transfer_function.shading is not None
         self.pictures = 0
         volume, sampling = request.volume, request.options
-        room = picture_room(
-            request.screen.size, sampling.memory_limit, sampling.occlusion_bytes(volume)
-        )
+        room = picture_room(request.screen.size, sampling.memory_limit)
         runtime = get_runtime(request.device)
         look = request.transfer_function
         medium = DeviceVolume(runtime, volume, look, sampling, room=room)

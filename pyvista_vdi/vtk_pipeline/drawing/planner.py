@@ -183,7 +183,6 @@ class Planner:
                     seen = replace(seen, first_look=False, volume=kind, **self._going_on())
         except Cancelled as error:
             if self._volume is None and source.last() is None:
-                source.forget_view()
                 raise
             self.complain(error)
             planned, shown = Plan("vdi"), self._volume or source.last()
@@ -366,11 +365,8 @@ class Planner:
         """Make the VDI of the source now; what fails is not repeated until something changes."""
         try:
             source.vdi()
-        except Cancelled:  # of one execution
+        except (Cancelled, InvalidVolumeError):  # of one execution, or soon found again
             raise
-        except InvalidVolumeError:  # soon found again
-            if not source.has_what_it_had():
-                raise  # else as VTK's mappers, which draw the data that are there
         except BaseException:
             self.failed = (*self.failed[-1:], source.stamp())
             raise

@@ -52,8 +52,6 @@ class VDIStatus:
         The one that is shown, or is to be replaced.
     time : float or None
         That of the step of a series; ``None`` where no series is shown.
-    level : (int, int) or None
-        Which level of a multi-scale store is shown, 0 is the finest, and of how many.
     """
 
     mode: Literal["none", "full", "preview"]
@@ -70,7 +68,6 @@ class VDIStatus:
     time: float | None = None
     magnification: float | None = None
     coverage: float | None = None
-    level: tuple[int, int] | None = None
 
     @property
     def share(self) -> float:
@@ -91,8 +88,6 @@ class VDIStatus:
         else:
             what = f"{self.mode}, the volume itself" if self.drawn == "volume" else self.mode
             parts = [f"{what}: {self.share:.0%} of {self.full_samples} pixels"]
-        if self.level is not None:
-            parts.append("level {} of {}".format(*self.level))
         if self.fps is not None:
             parts.append(f"{self.fps:.3g} frames/s")
         if self.angle is not None:

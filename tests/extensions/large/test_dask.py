@@ -18,7 +18,7 @@ from distributed import Client, LocalCluster
 from drawing import generate_in_blocks
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
-from pyvista_vdi import Volume, generate, open_volume
+from pyvista_vdi import Volume, generate, read_volume
 from pyvista_vdi.errors import (
     Cancelled,
     DeviceError,
@@ -89,14 +89,6 @@ def test_values_are_the_same_by_workers(client, scene, default_runtime):
     assert generate(volume, camera, size, client=client, **options).equals(expected)
 
 
-@pytest.mark.slow
-def test_occlusion_is_the_same_by_workers(client, scene, default_runtime):
-    arguments, options = scene
-    options = {**options, "ambient_occlusion": 8.0}
-    expected = generate_in_blocks(*arguments, device=default_runtime, **options)
-    assert generate_in_blocks(*arguments, client=client, **options).equals(expected)
-
-
 def kill_once(pid, fraction):
     """Return a progress callback that kills a worker once that much is done."""
     alive = [True]
@@ -146,7 +138,7 @@ def _left(dask_scheduler):
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
-        ("cluster", InvalidArgumentTypeError, r"a LocalCluster: give distributed.Client\(cluster"),
+        ("cluster", InvalidArgumentTypeError, r"LocalCluster: give distributed.Client\(cluster"),
         (7, InvalidArgumentTypeError, "an? int"),
         ("tcp://127.0.0.1:1", InvalidArgumentError, "no Dask scheduler answers at 'tcp://127"),
     ],
@@ -234,34 +226,23 @@ def in_folders(client, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(not Path("/proc/self/cwd").exists(), reason="a path that differs by process")
 @pytest.mark.parametrize("kind", [*STORES, "dask"])
-@pytest.mark.parametrize(
-    ("where", "said"), [("none", "cannot be read there"), ("other", "another file")]
-)
-def test_a_worker_that_has_not_the_same_store_is_named(
-    client, scene, in_folders, where, said, kind
-):
+def test_a_worker_that_has_not_the_store_is_named(client, scene, in_folders, kind):
     (_, *rest), options = scene
-    array, here = volume_of("uint8").array, in_folders("here", where)
-    make = STORES["zarr" if kind == "dask" else kind]
-    make(here, array)
-    if where != "none":
-        make(here.parent / where, array // 2)
+    STORES["zarr" if kind == "dask" else kind](in_folders("here", "none"), volume_of("uint8").array)
     path = "/proc/self/cwd/s"  # as of a mount that is not the same on all machines
-    opened = Volume(da.from_zarr(path)) if kind == "dask" else open_volume(path)
+    opened = Volume(da.from_zarr(path)) if kind == "dask" else read_volume(path)
     bad = list(client.nthreads())[1]
-    with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.*{said}"):
+    with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.* cannot be read there"):
         generate_in_blocks(opened, *rest, client=client, **options)
 
 
 @pytest.mark.every(9)
 @pytest.mark.parametrize("kind", STORES)
-def test_relative_paths_are_this_process_s_and_changes_are_seen_while_it_is_open(
-    client, scene, in_folders, kind, default_runtime
-):
+def test_relative_paths_are_this_process_s(client, scene, in_folders, kind, default_runtime):
     (_, *rest), options = scene
     array, here = volume_of("uint8").array, in_folders("none", "none")
     STORES[kind](here, array)
-    opened = open_volume("s")
+    opened = read_volume("s")
     whole = generate_in_blocks(opened, *rest, **options)
     assert generate_in_blocks(opened, *rest, client=client, **options).equals(whole)
     if kind == "hdf5":
@@ -269,7 +250,7 @@ def test_relative_paths_are_this_process_s_and_changes_are_seen_while_it_is_open
     changed = np.where(array > 100, 0, array)
     STORES[kind](here, changed)
     if kind == "hdf5":
-        opened = open_volume("s")
+        opened = read_volume("s")
     found = generate_in_blocks(opened, *rest, client=client, **options)
     expected = generate_in_blocks(Volume(changed), *rest, chunks=(16, 16, 16), **options)
     assert found.equals(expected)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from command_line import run
@@ -86,28 +84,6 @@ def _images(folder, times=(None, None, None)):
     return sorted(names)  # as a shell has them: step_10 is the first
 
 
-def _pvd(folder):
-    entries = [
-        f'<DataSet timestep="{time}" part="0" file="step_{number}.vti"/>'
-        for number, time in zip((9, 10, 2), (*TIMES[1:], TIMES[0]), strict=True)
-    ]
-    _images(folder)
-    text = f'<VTKFile type="Collection"><Collection>{"".join(entries)}</Collection></VTKFile>'
-    (folder / "run.pvd").write_text(text)
-    return ["run.pvd"]
-
-
-def _json(folder):
-    _images(folder)
-    files = [
-        {"name": f"step_{n}.vti", "time": time} for n, time in zip((2, 9, 10), TIMES, strict=True)
-    ]
-    (folder / "run.vti.series").write_text(
-        json.dumps({"file-series-version": "1.0", "files": files})
-    )
-    return ["run.vti.series"]
-
-
 def _vtkhdf(folder):
     h5py = pytest.importorskip("h5py")
     pytest.importorskip("pyvista")
@@ -139,8 +115,6 @@ KINDS = {
     "numbers in names": (_arrays, [0, 1, 2]),
     "numbers and times": (lambda folder: _images(folder, TIMES), TIMES),
     "times of some": (lambda folder: _images(folder, (0.5, None, 1.0)), [0, 1, 2]),
-    "a collection": (_pvd, TIMES),
-    "a series in JSON": (_json, TIMES),
     "vtkhdf": (_vtkhdf, TIMES),
 }
 LOOK = ("--size", "12x9", "--cmap", "gray", "--opacity", "linear", "--clim", "0", "255")
@@ -174,24 +148,6 @@ def test_what_is_done_with_names_and_times_is_said(capsys, tmp_path, monkeypatch
     colors = [float(vdi.color.mean()) for vdi in pvdi.read("run.vdis")]
     assert colors[2] == max(colors)
     assert colors[1] == min(colors)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "said"),
-    [
-        ("a.pvd", "<VTKFile><Collection/></VTKFile>", "lists no files"),
-        ("a.pvd", '<V><DataSet timestep="now" file="b.vti"/></V>', "no files with times"),
-        ("a.vti.series", '{"files": [{"name": "b.vti"}]}', "no list of time steps"),
-        ("absent.pvd", None, "cannot be read"),
-    ],
-)
-def test_lists_that_are_none_are_refused_by_name(name, text, said, capsys, tmp_path):
-    pytest.importorskip("pyvista")
-    if text is not None:
-        (tmp_path / name).write_text(text)
-    error = run(capsys, "series", tmp_path / name, "-o", tmp_path / "a.vdis", status=1)
-    assert said in error
-    assert str(tmp_path) in error
 
 
 def test_to_single_files_and_back(series, capsys, tmp_path):

@@ -11,8 +11,8 @@ from vtk_sources import ready_source, some_property
 from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, VDIWriter, vdi_from_image, vdi_to_image
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
 from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -76,23 +76,6 @@ def test_the_reader_gives_the_step_nearest_to_the_time_down_the_pipeline(path):
         picture.UpdateTimeStep(time)
         assert time_of(image) == time_of(picture.GetOutputDataObject(0)) == TIMES[step]
         assert picture.GetOutputDataObject(0).GetDimensions()[:2] == series[step].picture_size
-
-
-def test_a_series_grows_while_it_is_read(path, tmp_path):
-    series, reader = pvdi.read(path), reader_of(tmp_path / "b.vdis")
-    mapper = pvdi.VDIMapper()
-    with pytest.raises(VDIFileError, match=r"b\.vdis cannot be read"):
-        reader.Update()
-    assert announced(reader) is None
-    with pvdi.SeriesWriter(tmp_path / "b.vdis", precision=series[0].precision) as writer:
-        for i, vdi in enumerate(series):
-            writer.append(vdi, TIMES[i])
-            assert announced(reader)[0] == TIMES[: i + 1]
-            reader.UpdateTimeStep(9.0)
-            assert time_of(reader.GetOutputDataObject(0)) == TIMES[i]
-            if i == 0:
-                mapper.SetInputConnection(reader.GetOutputPort())
-            assert mapper.GetVDI().equals(vdi)
 
 
 SIZE = (24, 18)
@@ -221,28 +204,6 @@ def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate, dr
         frames_until(plotter, lambda: not actor.status.stand_in)
         assert actor.status.generation == generation
         assert actor.vdi.equals(made_of(ball_at(step), actor.vdi.camera, actor.vdi.window_size))
-
-
-def test_the_writer_writes_all_times(vdis, tmp_path):
-    producer, writer = Moving(), VDIWriter()
-    source = source_of(producer)
-    writer.SetInputConnection(source.GetOutputPort())
-    writer.SetFileName(tmp_path / "made.vdis")
-    writer.Write()
-    assert producer.read == [0, 1, 2]
-    series = pvdi.read(tmp_path / "made.vdis")
-    assert series.times == TIMES
-    for made, vdi in zip(series, vdis, strict=True):  # as generate_series and SeriesWriter do
-        assert made.precision == "8-byte"
-        assert made.equals(vdi.with_precision("8-byte"))
-    writer.SetPrecision("exact")
-    writer.Write()
-    exact = pvdi.read(tmp_path / "made.vdis")
-    assert all(made.equals(vdi) for made, vdi in zip(exact, vdis, strict=True))
-    writer.SetInputData(vdi_to_image(vdis[0]))
-    with pytest.raises(InvalidArgumentError, match="announces no time steps"):
-        writer.Write()
-    assert len(pvdi.read(tmp_path / "made.vdis")) == 3
 
 
 def test_a_series_of_a_source_with_times(vdis):
