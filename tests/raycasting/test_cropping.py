@@ -18,6 +18,7 @@ from reference.raycast import clip, inside_box, kept_parts, pixel_ray
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.cropping import PRESETS, Cropping
+from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 
 in_two_ways = pytest.mark.parametrize("dealt", ["one by one", "blocks"], indirect=True)
@@ -140,8 +141,8 @@ def test_an_estimate_compares_the_pictures_that_are_shown(default_runtime):
     corner = ((6.5, 20, 0, 20, 12, 20), 0x49)  # no box, to the left of 6.5
     assert estimator.estimate(vdi, camera).ssim < 0.9
     for cropping in ((-1, 6.5, -1, 20, -1, 20), corner):
-        assert estimator.estimate(vdi, camera, cropping=cropping).ssim > 0.99, cropping
-    assert estimator.estimate(vdi, camera, opacity_multiplier=0).ssim == 1.0
+        shown = RenderOptions(cropping=cropping)
+        assert estimator.estimate(vdi, camera, None, shown).ssim > 0.99, cropping
 
 
 def test_what_is_picked_is_what_is_shown(runtime):
