@@ -19,6 +19,7 @@ from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, sto
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import StoredVolume, is_store
 from pyvista_vdi.io.volumes.in_file import placed
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
@@ -44,6 +45,7 @@ LOOK = ("tf", "transfer_function", *declared(Look))
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
 _SHADING = ("shade", "ambient", "diffuse", "specular", "specular_power")
+_OCCLUSION = ("ambient_occlusion", "occlusion_radius", "occlusion_strength")
 
 
 def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dict[str, Any]:
@@ -53,6 +55,10 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
     """
     values = {name: getattr(options, name, None) for name in declared(*records)}
     found = {name: value for name, value in values.items() if value is not None}
+    of: Any = {n: getattr(options, f"occlusion_{n}", None) for n in ("radius", "strength")}
+    of = {name: value for name, value in of.items() if value is not None}
+    if "ambient_occlusion" in values and (of or "ambient_occlusion" in found):
+        found["ambient_occlusion"] = AmbientOcclusion(**of)
     seldom = {name: found.pop(name) for name in Settings.declared if name in found and not flat}
     return found | ({"settings": Settings(**seldom)} if seldom else {})
 
@@ -76,7 +82,7 @@ def refuse_with_values(options: argparse.Namespace) -> None:
     found = format_named(options.output)
     if found is not None and not found.values and found.holds == "VDI":
         raise InvalidArgumentError(f"{why}write a .vdi file in place of {found.suffix}")
-    names = (*_SHADING, *declared(QualityTarget))
+    names = (*_SHADING, *_OCCLUSION, *declared(QualityTarget))
     refuse(options, names, "VDIs that have colours", why)
     looks = [name for name in LOOK if name != "interpolation"]
     refuse(options, looks, "'pyvista-vdi render', view or convert of what is written", why)

@@ -180,7 +180,7 @@ def test_view_of_a_volume(folder, capsys, default_runtime, tmp_path):
 def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_path):
     target, picture = tmp_path / "b.vdi", tmp_path / "b.png"
     options = "--azimuth 30 --size 20x12 --max-supersegments 7 --compression lz4"
-    options += " --criterion homogeneity"
+    options += " --criterion homogeneity --ambient-occlusion --occlusion-strength 0.4"
     table = ("--transfer-function", folder / "tf.json")
     out = run(capsys, "generate", folder / "v.nrrd", "-o", target, *table, *options.split())
     assert "20 x 12 lists" in out
@@ -189,6 +189,8 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     assert vdi.window_size == (20, 12)
     assert vdi.counts.max() <= 7
     assert vdi.metadata["criterion"] == "homogeneity"
+    occlusion = vdi.metadata["ambient_occlusion"]
+    assert (occlusion["strength"], occlusion["directions"]) == (0.4, 32)
     assert vdi.camera == filling_camera(vdi.bounds, (20, 12), azimuth=30)
     out = run(capsys, "render", target, "-o", picture, "--size", "30x10")
     assert out == f"{picture}: 30 x 10\n"

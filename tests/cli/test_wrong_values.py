@@ -74,6 +74,8 @@ WRONG = {
     "--host": ("'no such host'", "999.1.1.1"),
     "--importance": ("x", "''", "1,nan", "5"),
     "--name": ("a/b",),
+    "--occlusion-radius": NOT_ABOVE_0,
+    "--occlusion-strength": (*BELOW_0, "1.5"),
     "--opacity": ("nothing", "''", "0,x", "0,nan", "0,1e999"),
     "--path": tuple(f"camera.json {file}" for file in NO_JSON),
     "--size": ("x", "''", "12", "0x3", "-1x3", "12xnan", "99999x3", "3x2x1"),

@@ -301,6 +301,8 @@ def settings(folder):
 
     source.MaxSupersegments = 3
     source.Shade = 1
+    source.AmbientOcclusion = 1
+    source.AmbientOcclusionRadius = 9
     source.InterpolationType = "Nearest"
     source.Coverage = "bounds"
     source.View = "Camera"

@@ -248,6 +248,7 @@ def test_settings_reach_the_vdi(paraview, tmp_path):
     assert before > 0.1
     assert after == 0.0  # the colour function has no blue any more
     assert found["longest"] == 3
+    assert found["metadata"]["ambient_occlusion"]["radius"] == 9
     camera = found["camera"]
     np.testing.assert_allclose(camera["position"], (398, 108, 90), atol=1e-9)
     assert camera["parallel_projection"]
