@@ -22,7 +22,7 @@ from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.model.standard_cases import filling_camera
 
 NAMES = """
-devices generate render view turntable movie info convert serve series set compare tradeoff
+devices generate render view info convert serve series set compare tradeoff
 paraview
 """
 OF_EXTENSIONS = {"paraview": "paraview", "series": "series", "set": "sets", "serve": "web"}
@@ -66,18 +66,11 @@ def folder(tmp_path_factory):
 
 
 def test_help_names_every_verb(capsys):
-    out = run(capsys, "--help")
+    out = run(capsys)
+    assert out == run(capsys, "--help")
+    assert out.count("\n") <= 24, "a screen"
     # argparse begins a new line behind a long one
     assert set(VERBS) == set(re.findall(r"^    ([a-z]+)(?:\s|$)", out, re.MULTILINE))
-
-
-def test_without_a_verb_it_shows_commands_that_parse(capsys):
-    out = run(capsys)
-    shown = re.findall(r"^  pyvista-vdi (.+?)(?:  .*)?$", out, re.MULTILINE)
-    assert [line.split()[0] for line in shown][:2] == ["generate", "view"]
-    assert len(shown) == 6
-    for line in shown:
-        assert parser.parse(line.split()) is not None
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -94,7 +87,7 @@ def test_each_verb_explains_itself_with_an_example(verb, capsys):
         ("generat", "there is no subcommand 'generat': did you mean 'generate'?"),
         (
             "zzz",
-            "there is no subcommand 'zzz': known are devices, generate, render, view, turntable",
+            "there is no subcommand 'zzz': known are devices, generate, render, view, info",
         ),
         ("info", "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
         # Not "argument VOLUME: not allowed with argument --example" for the value behind it
@@ -102,19 +95,15 @@ def test_each_verb_explains_itself_with_an_example(verb, capsys):
             "generate --example brain --qualty high -o a",
             "generate takes no argument '--qualty': did you mean '--quality'?",
         ),
-        ("info a b", "info takes no argument 'b'; see pyvista-vdi info --help"),
+        ("info a b", "info takes no argument 'b': known are --help, --example"),
         ("generate a -o b --cmpa=bone", "no argument '--cmpa=bone': did you mean '--cm"),
         ("generate -o b", "one of the arguments VOLUME --example is required"),
         ("generate a --example b -o c", "not allowed with argument"),
-        ("generate a -o b -q", "no argument '-q': see --help"),
+        ("generate a -o b -q", "no argument '-q': known are --help"),
         ("devices --jso", "no argument '--jso': did you mean '--json'?"),
         ("devices --Q", "no argument '--Q': known are --help, --json"),
         ("generate a -o b --position 1 2", "expected 3 arguments"),
         ("serve", "one of the arguments VOLUME --example is required"),
-        (
-            "benchmark --profile full",
-            "no subcommand 'benchmark': the paper's tables .* benchmarks/paper.py",
-        ),
     ],
 )
 def test_mistakes_in_the_arguments(arguments, message, capsys):
@@ -126,9 +115,15 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     cases(
-        ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing 1 1 2 is for volumes"),
-        ("view a.vdi --scalars x --screenshot b.png", "--scalars x is for volumes"),
-        ("view a.vdi --cmap bone --screenshot b.png", "a.vdi has its look, and --cmap bone"),
+        ("info a.vdi --spacing 1 1 2", "--spacing=.*1.0, 2.0.* is for volumes, and a.vdi is a VDI"),
+        (
+            "view a.vdi --scalars x --screenshot b.png",
+            "--scalars=x is for volumes",
+        ),
+        (
+            "view a.vdi --cmap bone --screenshot b.png",
+            "--cmap=bone is for .*a.vdi has its look",
+        ),
         ("render v.nrrd -o a.png", "v.nrrd is no VDI.*'pyvista-vdi generate v.nrrd -o FILE.vdi'"),
         ("convert v.nrrd -o a.vdi", "v.nrrd is no VDI.*'pyvista-vdi generate v.nrrd -o FILE.vdi'"),
         (
@@ -147,7 +142,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ),
         ("info no.html", "no.html is not a page with a VDI: .* written by VDI.save"),
         ("view cut.html --screenshot b.png", "cut.html is damaged: .*copy it from its"),
-        ("info a.html --spacing 1 1 2", "a.html is a VDI: --spacing 1 1 2 is for vol"),
+        ("info a.html --spacing 1 1 2", "--spacing=.* is for volumes, and a.html is a VDI"),
         ("generate none.nrrd -o b.vdi", "none.nrrd does not exist: check .*, or .*--example"),
         ("generate a.vdi -o b.vdi", "a.vdi is a VDI, not a volume"),
         ("compare none.nrrd --out new", "none.nrrd"),
@@ -215,9 +210,9 @@ def test_nothing_that_a_file_says_reaches_the_terminal_raw(capsys, tmp_path):
 def test_info(folder, capsys):
     out = run(capsys, "info", folder / "a.vdi")
     lines = dict(line.split("  ", 1) for line in out.splitlines())
-    assert lines["lists"].strip() == "24 x 16"
-    assert lines["supersegments"].strip() == "200, 0.52 per list"
-    assert lines["criterion"].strip() == '"none"'
+    assert lines["window_size"].strip() == "[24, 16]"
+    assert lines["n_supersegments"].strip() == "200"
+    assert lines["criterion"].strip() == "none"
     out = run(capsys, "info", folder / "a.vdi", "--json")
     about = json.loads(out)
     assert about["n_supersegments"] == 200
@@ -230,10 +225,9 @@ def test_info_of_a_volume(folder, capsys):
     lines = {name: text.strip() for name, text in (x.split("  ", 1) for x in out.splitlines())}
     volume = read_volume(folder / "v.nrrd")
     nx, ny, nz = volume.dimensions
-    assert lines["points"] == f"{nx} x {ny} x {nz}"
-    assert lines["spacing"] == "(1, 2, 3)"
-    assert lines["origin"] == "(0, 0, 5)"
-    assert lines["bounds"] == f"(0, {nx - 1}, 0, {2 * (ny - 1)}, 5, {5 + 3 * (nz - 1)})"
+    assert lines["dimensions"] == f"[{nx}, {ny}, {nz}]"
+    assert lines["spacing"] == "[1.0, 2.0, 3.0]"
+    assert lines["origin"] == "[0.0, 0.0, 5.0]"
     about = json.loads(outcome(capsys, *arguments, "--json")[1])
     assert about["range"] == [*volume.finite_range()]
     assert about["dimensions"] == [nx, ny, nz]
@@ -287,7 +281,6 @@ def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     arguments = (*arguments, "--size", "60x40", "-o", target)
     asked = ("--quality", "fast", "--max-bytes", "1e9", "--target-angle", "20")
     out = run(capsys, *arguments, *asked)
-    assert "settings are chosen by a measurement" in out
     vdi = io.read(target)
     width, height = vdi.window_size
     assert f"{width} x {height} lists, " in out
@@ -311,7 +304,6 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     table = ("--transfer-function", folder / "tf.json")
     out = run(capsys, "generate", folder / "v.nrrd", "-o", target, *table, *options.split())
     assert "20 x 12 lists" in out
-    assert "up to" in out
     vdi = io.read(target)
     assert vdi.window_size == (20, 12)
     assert vdi.counts.max() <= 7
