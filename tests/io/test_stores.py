@@ -19,7 +19,6 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
     UnsupportedError,
 )
-from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.standard_cases import filling_camera
 
 VALUES = np.random.default_rng(5).integers(0, 250, (2, 3, 8, 16, 24)).astype(np.uint16)
@@ -127,8 +126,7 @@ def test_opacities_of_all_levels_refer_to_the_finest(image):
     finest, coarsest = (pvdi.read_volume(image[0], level=k) for k in (0, 2))
     expected = pvdi.Volume(VALUES[0, 0], finest.spacing).default_unit_distance
     again = pickle.loads(pickle.dumps(coarsest))
-    other = as_volume(coarsest, scalars=np.zeros(coarsest.array.size))
-    for volume in (finest, coarsest, coarsest.load(), again, other):
+    for volume in (finest, coarsest, coarsest.load(), again):
         assert volume.default_unit_distance == expected
 
 
