@@ -34,7 +34,7 @@ def test_includes_are_expanded_once_with_line_marks(texts):
     texts["vdi/main.cl"] = '#include "common/a.cl"\n#include "common/b.cl"\nint main_c;\n'
     texts["common/a.cl"] = "int a;\n"
     texts["common/b.cl"] = '  #  include "common/a.cl"\nint b;'
-    assert programs.expand("vdi/main.cl").splitlines() == [
+    assert programs.expand("vdi/main.cl").splitlines()[len(programs.definitions()) :] == [
         '#line 1 "vdi/main.cl"',
         '#line 1 "common/a.cl"',
         "int a;",
@@ -159,31 +159,6 @@ def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
             runtime.fill(x, np.float32(value))
             launch(3, 1, x=x)
             assert np.all(runtime.download(x) == value * 2)
-
-
-def test_queue_scope_gives_a_thread_its_own_queue(runtime, scale_file, monkeypatch):
-    cl, queues = devices.opencl(), []
-    enqueue = cl.enqueue_nd_range_kernel
-
-    def noted(queue, *args, **kwargs):
-        queues.append(queue.int_ptr)
-        return enqueue(queue, *args, **kwargs)
-
-    monkeypatch.setattr(cl, "enqueue_nd_range_kernel", noted)
-    launch = runtime.bind(scaling(scale_file), {"ADD": 1}, factor=1, n=4)
-    with runtime.buffer((4,)) as x:
-        runtime.fill(x, 0)
-        launch.set(x=x)
-        launch(4, 1)
-        with runtime.queue_scope():
-            with runtime.queue_scope():
-                launch(4, 1)
-            launch(4, 1)
-        launch(4, 1)
-        assert np.all(runtime.download(x) == 4)
-    outer, innermost, inner, last = queues
-    assert outer == last
-    assert len({outer, innermost, inner}) == 3
 
 
 @pytest.fixture

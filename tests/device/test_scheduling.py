@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import threading
 from importlib import resources
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import KernelDeclaration, devices, programs
+from pyvista_vdi.device import KernelDeclaration, programs
 from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import Cancelled
@@ -336,14 +335,10 @@ def ring():
     return array
 
 
-@pytest.mark.parametrize("own_queue", [False, True])
-def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, own_queue):
-    """Whatever thread releases it, and whichever queue reads it."""
+def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels):
+    """Whatever thread releases it."""
     array, steps = ring(), 2**20  # tens of milliseconds: the kernel runs when release() is called
-    with (
-        runtime.buffer((64,), np.uint32) as end,
-        runtime.queue_scope() if own_queue else contextlib.nullcontext(),
-    ):
+    with runtime.buffer((64,), np.uint32) as end:
         shared = runtime.upload(array)
         chase = KernelDeclaration(kernels, "chase")
         launch = runtime.bind(chase, next=shared, end=end, steps=steps)
@@ -351,45 +346,3 @@ def test_memory_in_place_is_free_when_its_buffer_is_released(runtime, kernels, o
         InThread(shared.release).value()
         array[...] = 0  # in place of freeing it, which would crash some time later, or not
         np.testing.assert_array_equal(runtime.download(end), (np.arange(64) + steps) % 64)
-
-
-@pytest.fixture
-def finished(monkeypatch):
-    """How often each queue that is made from now on was finished, in the order of making."""
-    cl, made = devices.opencl(), []
-
-    class Counted(cl.CommandQueue):
-        def __init__(self, *args):
-            super().__init__(*args)
-            self.place = len(made)
-            made.append(0)
-
-        def finish(self):
-            made[self.place] += 1
-            super().finish()
-
-    monkeypatch.setattr(cl, "CommandQueue", Counted)
-    return made
-
-
-def test_a_thread_waits_for_its_own_queue_only(runtime, finished):
-    with runtime.queue_scope():
-        InThread(runtime.finish).value()
-        assert finished == [0]
-        runtime.finish()
-        assert finished == [1]
-        with runtime.queue_scope():
-            assert finished == [2, 0]
-            runtime.finish()
-        assert finished == [2, 2]
-    assert finished == [3, 2]
-
-
-def test_a_result_that_is_never_read_is_finished_before_its_memory_goes(runtime, kernels, finished):
-    with runtime.queue_scope():
-        buffer = runtime.result((64,), np.uint32)
-        runtime.bind(KernelDeclaration(kernels, "index"), x=buffer, wide=64)(64, 64)
-        runtime.finish()
-        before = sum(finished)
-        buffer.release()
-        assert (sum(finished) > before) == runtime.is_cpu
