@@ -34,7 +34,6 @@ _HOMES = {
     "describe_devices": "device",
     "list_devices": "device",
     "list_volumes": "io.volumes",
-    "open_volume": "io.stores",
     "presets": "model.presets",
     "read_volume": "io.volumes",
     **dict.fromkeys(("Settings", "estimate", "generate", "pick", "read"), "api"),

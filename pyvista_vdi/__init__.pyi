@@ -20,7 +20,6 @@ from pyvista_vdi.extensions.series.writer import SeriesWriter as SeriesWriter
 from pyvista_vdi.extensions.sets.generate import generate_set as generate_set
 from pyvista_vdi.extensions.sets.vdi_set import VDISet as VDISet
 from pyvista_vdi.generation.slices import Estimate as Estimate
-from pyvista_vdi.io.stores import open_volume as open_volume
 from pyvista_vdi.io.volumes import list_volumes as list_volumes
 from pyvista_vdi.io.volumes import read_volume as read_volume
 from pyvista_vdi.model.camera import Camera as Camera

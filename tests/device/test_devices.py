@@ -52,37 +52,6 @@ def test_selector_means_one_device(selector, name):
     assert devices.select(ALL, selector, "device=").name == name
 
 
-def test_every_device_is_selected_by_its_own_selector():
-    for info in ALL:
-        assert devices.select(ALL, info.selector, "device=") is info
-
-
-def test_absent_and_ambiguous_devices_list_what_exists():
-    with pytest.raises(NoDeviceError, match=r"device='radeon'.*H200 \(GPU, selected by '3:0'"):
-        devices.select(ALL, "radeon", "device=")
-    with pytest.raises(NoDeviceError, match=r"no device at all; install a CPU runtime"):
-        devices.select([], "radeon", "device=")
-    with pytest.raises(NoDeviceError, match=r"'nvidia' means 2 devices.*H200.*T4") as caught:
-        devices.select(ALL, "nvidia", "PYVISTA_VDI_DEVICE=")
-    assert "Iris" not in str(caught.value)
-
-
-def test_a_device_that_fails_its_probe_is_described_and_refused(runtime):
-    done = run_python(
-        "from pyvista_vdi.device import choice\n"
-        "from pyvista_vdi.errors import NoDeviceError\n"
-        "choice.run_probe = lambda runtime: 'it gave 3, not 4'\n"
-        "assert all(info.reason == 'it gave 3, not 4' for info in choice.list_devices())\n"
-        "print(choice.describe_devices())\n"
-        f"try:\n    choice.get_runtime({runtime.info.selector!r})\n"
-        "except NoDeviceError as exc:\n    print('caught', exc)\n"
-    )
-    assert done.returncode == 0, done.stderr
-    described, message = done.stdout.split("caught ")
-    assert "not used: it gave 3, not 4" in described
-    assert "not usable: it gave 3, not 4" in message
-
-
 def test_environment_names_the_device(runtime, monkeypatch):
     monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
     usable = [info for info in ocl.list_devices() if info.usable]
@@ -110,8 +79,9 @@ def test_every_form_of_device_gives_the_same_runtime(runtime):
     assert runtime.info.full_name in str(caught.value)
 
 
-@pytest.mark.parametrize("where", ["", "functions", "local memory", "atomic functions"])
-@pytest.mark.parametrize("column", range(4))
+@pytest.mark.parametrize(
+    ("where", "column"), [("", 0), ("functions", 3), ("local memory", 0), ("atomic functions", 0)]
+)
 def test_probe_notices_wrong_numbers(runtime, monkeypatch, where, column):
     download = type(runtime).download
 
@@ -130,19 +100,6 @@ def test_probe_notices_wrong_numbers(runtime, monkeypatch, where, column):
     found = choice.run_probe(runtime)
     assert where in found
     assert bool(found) == bool(where)
-
-
-def test_import_and_listing_leave_the_environment_as_it_was():
-    done = run_python(
-        "import os, sys; before = dict(os.environ)\n"
-        "import pyvista_vdi.device\n"
-        "assert 'pyopencl' not in sys.modules\n"
-        "assert dict(os.environ) == before\n"
-        "pyvista_vdi.device.list_devices()\n"
-        "changed = set(os.environ.items()) ^ set(before.items())\n"
-        "assert not [name for name, _ in changed if 'OCL' in name]"
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def test_no_device_says_what_was_found_and_the_remedy(tmp_path):

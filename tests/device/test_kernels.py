@@ -1,8 +1,6 @@
-"""Kernels and their arguments: by name, of the declared types, as the compiler sees them."""
+"""Kernels and their arguments: by name, and of the declared types."""
 
 from __future__ import annotations
-
-from importlib import import_module
 
 import numpy as np
 import pytest

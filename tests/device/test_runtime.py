@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-import re
-import sys
-import threading
-from concurrent.futures import ThreadPoolExecutor
-from importlib import resources
-
 import numpy as np
 import pytest
-from fresh_python import run_python
 from runtimes import fresh_runtime
 
 from pyvista_vdi import device as ocl
@@ -28,26 +21,6 @@ def texts(monkeypatch):
 
     monkeypatch.setattr(programs, "read_resource", read)
     return files
-
-
-def test_includes_are_expanded_once_with_line_marks(texts):
-    texts["vdi/main.cl"] = '#include "common/a.cl"\n#include "common/b.cl"\nint main_c;\n'
-    texts["common/a.cl"] = "int a;\n"
-    texts["common/b.cl"] = '  #  include "common/a.cl"\nint b;'
-    assert programs.expand("vdi/main.cl").splitlines()[len(programs.definitions()) :] == [
-        '#line 1 "vdi/main.cl"',
-        '#line 1 "common/a.cl"',
-        "int a;",
-        '#line 2 "vdi/main.cl"',
-        '#line 1 "common/b.cl"',
-        '#line 2 "common/b.cl"',
-        "int b;",
-        '#line 3 "vdi/main.cl"',
-        "int main_c;",
-    ]
-    texts["itself.cl"] = '#include "b.cl"\nint a;'
-    texts["b.cl"] = '#include "itself.cl"\nint b;'
-    assert programs.expand("itself.cl").count("int a;") == 1
 
 
 SCALE = """\
@@ -106,16 +79,6 @@ def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
     assert "unsafe" not in error.options
 
 
-def test_kernels_keep_to_what_every_compiler_takes():
-    """OpenCL C has no macros of any number of arguments; NVIDIA's compiler refuses them."""
-    folder = resources.files("pyvista_vdi.opencl")
-    kernels = [path for room in folder.iterdir() if room.is_dir() for path in room.iterdir()]
-    files = [path for path in kernels if path.name.endswith(".cl")]
-    texts = {path.name: re.sub("//.*", "", path.read_text()) for path in files}
-    assert len(texts) > 40
-    assert not [name for name, text in texts.items() if re.search(r"\.\.\.\)|__VA_ARGS__", text)]
-
-
 def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, monkeypatch):
     built = []
     build = programs.build
@@ -127,15 +90,6 @@ def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, mon
     assert len(built) == 2
     scale_file.write_text(SCALE + "\n// edited\n")
     assert runtime.kernel(scaling(scale_file), {"ADD": 0.25}) is not first
-
-
-def test_define_options():
-    assert programs.define_options({"B": True, "A": -2, "F": 1.5, "T": "ushort"}) == (
-        "-DA=(-2)",
-        "-DB=1",
-        "-DF=(0x1.8000000000000p+0f)",
-        "-DT=ushort",
-    )
 
 
 def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
@@ -169,24 +123,6 @@ def new_kernel(tmp_path):
     return ocl.KernelDeclaration(path, "twice")
 
 
-def test_different_programs_are_compiled_side_by_side_and_each_once(
-    runtime, new_kernel, monkeypatch
-):
-    """Two compilations wait for each other; four threads ask for each of the two programs."""
-    built, both, build = [], threading.Barrier(2, timeout=60), programs.build
-
-    def slow(*arguments):
-        built.append(arguments[-1])
-        both.wait()
-        return build(*arguments)
-
-    monkeypatch.setattr(programs, "build", slow)
-    with ThreadPoolExecutor(8) as pool:
-        kernels = list(pool.map(lambda i: runtime.kernel(new_kernel, {"N": i % 2}), range(8)))
-    assert len(built) == 2
-    assert len(set(kernels[::2])) == len(set(kernels[1::2])) == 1
-
-
 def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
     runtime, new_kernel, tmp_path, monkeypatch, caplog
 ):
@@ -217,14 +153,3 @@ def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
     kept.rmdir()
     monkeypatch.setenv("PYOPENCL_NO_CACHE", "1")
     assert [compiled(), compiled()] == [1, 1]
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="folders and variables of Linux")
-def test_a_device_is_there_without_a_home(runtime, tmp_path):
-    """PoCL has none where its cache cannot be written."""
-    code = f"from pyvista_vdi.device import get_runtime\nget_runtime({runtime.info.selector!r})"
-    nowhere = {"HOME": "/proc", "XDG_CACHE_HOME": "/proc/cache", "TMPDIR": str(tmp_path)}
-    done = run_python(code, **nowhere)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.count("\n") == 1
-    assert "cannot be written" in done.stderr
