@@ -16,13 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import stepped_vdis
-from stepped_vdis import SIZE, packed_steps, same, stepped_vdi
+from stepped_vdis import SIZE, packed_steps, same
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-
-#: What a file of the format before this one begins with.
-EARLIER = b"\x89VDIS\r\n\x1a" + bytes(40)
 
 
 @pytest.fixture(scope="module")
@@ -74,15 +71,6 @@ def test_a_step_is_a_vdi_file_and_a_file_is_the_folder_zipped(steps, saved, tmp_
     assert all_same(pvdi.read(saved), steps)
 
 
-def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
-    first = stepped_vdi()
-    camera = pvdi.Camera((0, 1, 50), (0, 0, 0), (0, 1, 0))
-    empty = pvdi.VDI(camera, (3, 2), np.zeros(7, int), [], [], np.empty((0, 3)), [], first.bounds)
-    told = stepped_vdi(metadata={"told": [1.5, None]})
-    steps = [step.with_precision("8-byte") for step in (first, empty, told, first)]
-    assert all_same(pvdi.read(pvdi.VDISeries(steps).save(tmp_path / "a.vdis")), steps)
-
-
 def test_what_was_appended_is_readable_at_once(steps, tmp_path):
     path = tmp_path / "a.vdis"
     with pvdi.SeriesWriter(path) as out:
@@ -119,8 +107,6 @@ def test_a_series_is_continued_replaced_or_kept(steps, tmp_path):
     whole = content_of(path)
     with pytest.raises(VDIFileError, match=r"is there already with 3 .*append=True.*overwrite"):
         pvdi.SeriesWriter(path)
-    with pytest.raises(InvalidArgumentError, match="pass one of them"):
-        pvdi.SeriesWriter(path, append=True, overwrite=True)
     with pytest.raises(VDIFileError, match="it is a folder"):
         pvdi.VDISeries(steps).save(path)
     with pvdi.SeriesWriter(path, append=True) as out:
@@ -140,17 +126,14 @@ def test_a_series_is_continued_replaced_or_kept(steps, tmp_path):
     assert not (path / "000001.vdi").exists()
 
 
-@pytest.mark.parametrize(
-    ("content", "read"),
-    [(b"not a series", "not a series"), (b"", "not a series"), (EARLIER, "earlier format.*anew")],
-)
-def test_files_of_others_are_named_and_stay(content, read, steps, tmp_path):
+@pytest.mark.parametrize("content", [b"not a series", b""])
+def test_files_of_others_are_named_and_stay(content, steps, tmp_path):
     path = tmp_path / "a.vdis"
     path.write_bytes(content)
-    with pytest.raises(VDIFileError, match=read):
+    with pytest.raises(VDIFileError, match="no series of VDIs"):
         pvdi.read(path)
     for way in ({}, {"append": True}, {"overwrite": True}):
-        with pytest.raises(VDIFileError, match="is one file"):
+        with pytest.raises(VDIFileError, match="cannot be written"):
             pvdi.SeriesWriter(path, **way)
     with pytest.raises(VDIFileError, match="something else: choose another name"):
         pvdi.VDISeries(steps).save(path)

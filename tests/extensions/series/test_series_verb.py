@@ -84,24 +84,6 @@ def _images(folder, times=(None, None, None)):
     return sorted(names)  # as a shell has them: step_10 is the first
 
 
-def _vtkhdf(folder):
-    h5py = pytest.importorskip("h5py")
-    pytest.importorskip("pyvista")
-    with h5py.File(folder / "run.vtkhdf", "w") as file:
-        group = file.create_group("VTKHDF")
-        extent = [end for n in STEPS.shape[:0:-1] for end in (0, n - 1)]
-        group.attrs.update(
-            {"Version": (2, 0), "WholeExtent": extent, "Direction": np.eye(3).ravel()}
-        )
-        group.attrs.update({"Origin": np.zeros(3), "Spacing": np.ones(3)})
-        group.attrs.create("Type", np.bytes_("ImageData"))
-        group["PointData/v"] = STEPS
-        group["PointData"].attrs.create("Scalars", np.bytes_("v"))
-        group["Steps/Values"] = TIMES
-        group["Steps"].attrs["NSteps"] = 3
-    return ["run.vtkhdf"]
-
-
 def _arrays(folder):
     names = [f"Step{number}.npy" for number in (8, 9, 10)]
     for name, values in zip(names, STEPS, strict=True):
@@ -114,14 +96,11 @@ KINDS = {
     "OME-Zarr that says times": (lambda folder: _store(folder, scale=0.25), [1, 1.25, 1.5]),
     "numbers in names": (_arrays, [0, 1, 2]),
     "numbers and times": (lambda folder: _images(folder, TIMES), TIMES),
-    "times of some": (lambda folder: _images(folder, (0.5, None, 1.0)), [0, 1, 2]),
-    "vtkhdf": (_vtkhdf, TIMES),
 }
 LOOK = ("--size", "12x9", "--cmap", "gray", "--opacity", "linear", "--clim", "0", "255")
 
 
 @pytest.mark.filterwarnings("ignore:.*axes with coordinates, which are not read")
-@pytest.mark.every(2)
 @pytest.mark.parametrize(("make", "times"), KINDS.values(), ids=KINDS)
 def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -130,9 +109,6 @@ def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monke
     steps = pvdi.read("run.vdis")
     assert list(steps.times) == times
     assert [round(255 * float(vdi.color.mean())) for vdi in steps] == pytest.approx(VALUES, abs=2)
-    given = (0.1, 0.2, 0.7)
-    run(capsys, "series", *files, "-o", "run.vdis", "--times", "0.1,0.2,0.7", *LOOK)
-    assert pvdi.read("run.vdis").times == given
 
 
 def test_what_is_done_with_names_and_times_is_said(capsys, tmp_path, monkeypatch):
@@ -142,12 +118,6 @@ def test_what_is_done_with_names_and_times_is_said(capsys, tmp_path, monkeypatch
     said = capsys.readouterr().err
     assert "step_2.vti before step_10.vti" in said
     assert "do not ascend" in said
-    explicit = ["step_10.vti", "step_2.vti", "step_9.vti"][::-1]  # an order that no shell gives
-    assert cli.main(["series", *explicit, "-o", "run.vdis", *LOOK]) == 0
-    assert "before" not in capsys.readouterr().err
-    colors = [float(vdi.color.mean()) for vdi in pvdi.read("run.vdis")]
-    assert colors[2] == max(colors)
-    assert colors[1] == min(colors)
 
 
 def test_to_single_files_and_back(series, capsys, tmp_path):
@@ -196,17 +166,3 @@ def test_mistakes(arguments, message, series, volumes, capsys, tmp_path, monkeyp
     names = [a.format(*volumes, series=series, vdi=vdi) for a in arguments.split()]
     assert message in run(capsys, *names, status=1)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_folder_becomes_one_file_and_is_not_replaced_by_one(series, capsys, tmp_path):
-    steps, folder = pvdi.read(series), tmp_path / "run.vdis"
-    with pvdi.SeriesWriter(folder) as out:
-        for step, time in zip(steps, steps.times, strict=True):
-            out.append(step, time)
-    run(capsys, "convert", f"{folder}/", "-o", tmp_path / "sent.vdis")
-    sent = pvdi.read(tmp_path / "sent.vdis")
-    assert sent.times == steps.times
-    assert all(one.equals(other) for one, other in zip(sent, steps, strict=True))
-    message = run(capsys, "convert", series, "-o", folder, status=1)
-    assert "it is a folder" in message
-    assert "3, times 0 to 2" in run(capsys, "info", folder)

@@ -8,7 +8,6 @@ import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
 from vtk_sources import ready_source, some_property
-from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
@@ -186,24 +185,6 @@ def test_a_mapper_draws_the_time_that_is_asked_of_the_source_or_before_it(vdis, 
             asked.UpdateTimeStep(time)
             plotter.render()
             assert actor.vdi.equals(vdis[step])
-
-
-@pytest.mark.gl
-def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate, drawn):
-    producer, source, plotter, actor = drawn
-    actor.GetMapper().SetInteractiveOffScreen(True)
-    plotter.show(auto_close=False)
-    asked = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
-    for generation, (algorithm, step) in enumerate(((producer, 2), (producer, 1), (source, 0)), 2):
-        # Asked for, and not made yet
-        algorithm.GetOutputInformation(0).Set(asked, TIMES[step])
-        gate.clear()
-        frame(plotter)
-        assert actor.status.stand_in
-        gate.set()
-        frames_until(plotter, lambda: not actor.status.stand_in)
-        assert actor.status.generation == generation
-        assert actor.vdi.equals(made_of(ball_at(step), actor.vdi.camera, actor.vdi.window_size))
 
 
 def test_a_series_of_a_source_with_times(vdis):
