@@ -92,11 +92,9 @@ def test_another_series_keeps_the_time_and_copies_play_by_themselves(plotter, se
 
 def test_what_has_no_times_is_refused(plotter, series):
     actor = plotter.add_vdi(small_vdi())
-    for use in (actor.play, actor.pause, lambda: actor.time, lambda: setattr(actor, "step", 0)):
+    for use in (actor.play, lambda: actor.time, lambda: setattr(actor, "step", 0)):
         with pytest.raises(InvalidArgumentError, match="shows no series"):
             use()
-    assert actor.series is None
-    assert not actor.playing
     one = plotter.add_vdi(series[:1], show_scalar_bar=False)
     for use, error, message in (
         (lambda: actor.mapper.SetSeries([1, 2]), InvalidArgumentError, "VDISeries"),
@@ -117,3 +115,38 @@ def test_closing_while_it_plays_leaves_nothing(no_leaks, series):
     assert not actor.playing
     assert not threads("series")
     del plotter, actor
+
+
+LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.9], "clim": (20, 220)}
+
+
+@pytest.fixture(scope="module")
+def saved(default_runtime, tmp_path_factory):
+    path = tmp_path_factory.mktemp("series") / "run.vdis"
+    camera = filling_camera((-1, 1, -1, 1, -1, 1), SIZE)
+    with pvdi.SeriesWriter(path, camera, SIZE, classification="deferred") as out:
+        for k in range(4):
+            ball = soft_ball(12)
+            ball["v"] = np.roll(ball["v"].reshape(12, 12, 12), k, axis=2).ravel()
+            out.append(ball, k / 4)
+    return path
+
+
+def test_steps_are_drawn_in_the_look_that_is_given_and_in_what_it_becomes(plotter, saved):
+    actor = plotter.add_vdi(str(saved), show_scalar_bar=False, regenerate="never", **LOOK)
+    actor.mapper.SetInteractiveOffScreen(True)
+    plotter.show(auto_close=False)
+    series = pvdi.read(saved)
+    for step in (0, 2):
+        actor.step = step
+        picture = frame(plotter)
+        of_one = picture_of(series[step].classified(**LOOK), plotter)
+        assert np.abs(picture - of_one).max() <= 1
+    values = actor.mapper.driver.input.deferred
+    assert values.equals(series[2])
+    actor.prop.GetScalarOpacity().AddPoint(60, 1.0)
+    changed = frame(plotter)
+    now = values.classified(volume_property=actor.prop)
+    assert np.abs(changed - picture_of(now, plotter)).max() <= 1
+    assert np.abs(changed - picture).max() > 8
+    assert actor.pick(60, 50).value > 0
