@@ -63,12 +63,12 @@ def black_view(size):
     return view
 
 
-def show_picture(picture, size, representation="Slice"):
+def show_picture(picture, size):
     """Show a VDIToImage so that its pixels are the view's."""
     width, height = size
     view = black_view(size)
     shown = simple.Show(picture, view, "UniformGridRepresentation")
-    shown.Representation = representation
+    shown.Representation = "Slice"
     simple.ColorBy(shown, ("POINTS", "RGBA"))
     shown.MapScalars = 0
     view.CameraParallelProjection = 1

@@ -6,7 +6,6 @@ import importlib.util
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -30,11 +29,6 @@ def plain_installation(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, verb.__name__, module)
     monkeypatch.setattr(module.sysconfig, "get_path", lambda name: str(package.parent))
     return package
-
-
-def test_paraview_prints_the_plugins_path(capsys):
-    out = run(capsys, "paraview")
-    assert Path(out.strip()).is_file()
 
 
 def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
