@@ -98,7 +98,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
         ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing 1 1 2 is for volumes"),
         ("view a.vdi --cmap bone --screenshot b.png", "a.vdi has its look, and --cmap bone"),
         ("render v.nrrd -o a.png", "v.nrrd is no VDI.*'pyvista-vdi generate v.nrrd -o FILE.vdi'"),
-        ("generate v.nrrd -o b.vti", "VTK writes its own files, .*; name a .vdi file here"),
+        ("generate v.nrrd -o b.vti", "cannot be written as a VDI: the name must end in .vdi"),
         (
             "generate v.nrrd -o b.vdi --transfer-function tf.json --cmap bone",
             "transfer_function stands in place of cmap",

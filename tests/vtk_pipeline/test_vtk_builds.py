@@ -55,7 +55,7 @@ def test_the_build_is_what_pyvista_would_choose(tmp_path, expected, chosen, pyvi
         (
             "vtkmodules",
             "libGL.so.1: cannot open shared object file",
-            "the system library libGL.so.1 is missing: on Debian and Ubuntu install 'libgl1'",
+            "the system library libGL.so.1 is missing: on Debian and Ubuntu apt install libgl1",
         ),
         ("vtkmodules", "No module named 'vtkmodules'", r'pip install "pyvista-vdi\[plot\]"'),
     ],
