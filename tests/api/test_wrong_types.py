@@ -71,7 +71,7 @@ ENTRIES = {
     "generate_series": lambda vdi: (
         pvdi.generate_series,
         {"volumes": [VOLUME], "camera": CAMERA, "window_size": SIZE, "transfer_function": TABLE},
-        ["times", "progress", "precision", "quality", "max_supersegments"],
+        ["times", "progress", "max_supersegments"],
     ),
     "generate_set": lambda vdi: (
         pvdi.generate_set,
