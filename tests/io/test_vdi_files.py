@@ -14,7 +14,7 @@ import pytest
 from extension_marks import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rewriting import check_changed_bytes, declaring, rewritten
+from rewriting import check_changed_bytes, declaring, described, rewritten
 from strategies import random_vdi
 
 from pyvista_vdi import VDI, Camera, io
@@ -151,7 +151,7 @@ def archive_with(text):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 5, "written_by": "pyvista-vdi 9.0"}, r"5, .* 9\.0'; .* up to version 4: upgr"),
+        ({"version": 5, "written_by": "pyvista-vdi 9.0"}, r"5, .* 9\.0'; .* versions 2 to 4: upgr"),
         ({"version": 1}, "version 1, which is not read any more .*anew"),
         ({"version": 2, "codec": "deflate"}, "version 2 has no codec 'deflate'"),
     ],

@@ -32,10 +32,8 @@ class Decoding(Job):
     """Work beside the frames, and not in turns with them: what it makes is what they wait for."""
 
     def done(self, paused: Callable[[], bool] = lambda: False) -> Any:
-        """Do the work on a queue of this thread's own, and return its result."""
-        runtime = get_runtime(self._device)
-        with runtime.queue_scope():
-            return self._work(runtime, self._report)
+        """Do the work, and return its result."""
+        return self._work(get_runtime(self._device), self._report)
 
 
 class SeveralInput(Input):

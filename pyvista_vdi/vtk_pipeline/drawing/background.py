@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.background import TRIAL_SIZE, Job, Worker, vdi_job
@@ -44,15 +44,10 @@ class Estimator:
                 request.volume, request.transfer_function, request.options, device=runtime
             )
             self._content = request.content
-        return self._estimator.estimate(
-            vdi,
-            view.camera,
-            view.size,
-            clipping_planes=shown.clipping_planes or None,
-            cropping=shown.cropping,
-            opacity_multiplier=shown.opacity_multiplier,
-            **more,
+        options = RenderOptions(
+            shown.clipping_planes or None, shown.cropping, shown.opacity_multiplier
         )
+        return self._estimator.estimate(vdi, view.camera, view.size, options, **more)
 
 
 class Background:

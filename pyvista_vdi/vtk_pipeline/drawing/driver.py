@@ -133,7 +133,7 @@ class Driver(Planner):
         actor, renderer = self._actor(), self.renderer()
         if renderer is None or not _is_drawing(renderer):
             self.warnings.warn(
-                "VDIMapper draws only behind its own VDIActor: use that in place of vtkVolume, "
+                "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume, "
                 "also for copies (VDIActor().ShallowCopy(actor))"
             )
             self._astray = True

@@ -14,8 +14,8 @@ _COMPOSITE = (
     "the volume itself by one of VTK's mappers for another"
 )
 _LIT = (
-    "it lights a volume while it is drawn, and a VDI is lit when it is generated: use shade "
-    "(SetShade of the property) and lights"
+    "it lights a volume while it is drawn, and a VDI is lit when it is generated: use "
+    "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
 )
 
 #: Methods of VTK's GPU volume mapper. What turns a thing off, or to nothing, is accepted.

@@ -278,7 +278,7 @@ def test_rows_do_not_depend_on_where_they_are_cut():
         others = blocks.neighbours(block)
         around = [seen.get(others.get(offset)) for offset in blocks.offsets]
         values = volume.array[blocks.own(block)]
-        pieces.append(task.second_pass(block, values, light, *around))
+        pieces.append(task.second_pass(block, values, light, None, *around))
     height = WINDOW[1]
     whole = task.merge(0, height, *pieces)
     for ranges in (ranges_of(height, 3), [(0, 1), (1, 30), (30, height)]):
@@ -303,6 +303,33 @@ def test_rows_of_a_piece():
     np.testing.assert_array_equal(part.runs, runs[1:4])
     assert piece.rows(0, 10).counts.shape == (0, 2)
     assert len(piece.rows(14, 20).runs) == 0
+
+
+@pytest.mark.parametrize(("radius", "view"), [(6.0, "all of it"), (20.0, "from inside")])
+def test_occlusion_is_that_of_one_piece(default_runtime, radius, view):
+    """Cells of one voxel and of two; what is out of sight darkens what is seen."""
+    volume = volume_of("uint8")
+    camera = VIEWS[view](volume)
+    arguments = (volume, camera, transfer_for(volume, "linear"))
+    bare = generate_vdi(volume, camera, WINDOW, arguments[-1])
+    whole, vdi = both_ways(*arguments, (12, 10, 9), ambient_occlusion=radius)
+    without, expected, found = (pvdi.render(each, camera) for each in (bare, whole, vdi))
+    assert np.abs(without - expected).max() > 0.1
+    # Opacities in the last cell before a neighbour are those of the last point: 0.3 / 255 measured
+    assert np.abs(found - expected).max() <= 1 / 255
+    assert vdi.metadata["ambient_occlusion"] == whole.metadata["ambient_occlusion"]
+
+
+def test_a_grid_of_occlusion_that_is_too_large_is_refused_before_anything_is_read():
+    da = pytest.importorskip("dask.array")
+    read = []
+    lazy = da.zeros((4096, 4096, 4096), np.uint8, chunks=512)
+    volume = Volume(lazy.map_blocks(lambda part: read.append(1) or part, meta=lazy._meta))
+    function = TransferFunction(np.ones((2, 3)), [0, 1], (0, 255))
+    camera = VIEWS["all of it"](volume)
+    with pytest.raises(DeviceMemoryError, match=r"radius of 8.*larger radius"):
+        generate_in_blocks(volume, camera, WINDOW, function, ambient_occlusion=8.0)
+    assert not read
 
 
 @pytest.mark.parametrize("limit", [10_000, 700_000, 1_600_000, 8_000_000])
