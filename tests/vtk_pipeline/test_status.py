@@ -36,24 +36,3 @@ def test_status_from_before_the_first_frame_on(plotter, gate, coarsest):
     assert "0° from the generating view, VDI no. 1, making the next: 0%" in text
     with pytest.raises(AttributeError):
         status.mode = "preview"
-
-
-def test_corner_text_is_of_the_frame_before(plotter, coarsest):
-    plotter.window_size = (241, 203)
-    actor = watched(plotter)
-    annotation = actor.show_status()
-    before = turned(plotter, 20, MOVING)[:60, :120]
-    after = frame(plotter, STILL)[:60, :120]
-    assert annotation.GetText(2).startswith("preview: 6%")
-    assert np.abs(before - after).max() > 100
-    frame(plotter)
-    assert "20° from" in annotation.GetText(2)
-    other = actor.show_status(corner="lower right")
-    plotter.render()
-    assert other.GetText(1).startswith("full")
-    with pytest.raises(InvalidArgumentError, match="corner must be .*got 'middle'"):
-        actor.show_status(corner="middle")
-    lone = pvdi.VDIActor()
-    lone.SetMapper(pvdi.VDIMapper())
-    with pytest.raises(InvalidArgumentError, match="nothing shows this actor yet"):
-        lone.show_status()

@@ -77,8 +77,10 @@ def test_first(plotter, gate):
 
 
 def test_ready(plotter, gate):
-    actor = watched(plotter, regenerate=lambda status: status.angle > 20)
-    before = turned(plotter, 40)
+    actor = watched(plotter)
+    turned(plotter, 40)
+    actor.mapper.GetSource().SetCamera(plotter.camera)
+    before = frame(plotter)
     assert (actor.status.progress, actor.status.generation) == (0.0, 1)
     gate.set()
     *earlier, last = frames_until(plotter, lambda: actor.status.generation == 2)

@@ -59,6 +59,31 @@ class VDIActorMethods:
         if mapper is not None:
             shader.AddObserver("UserEvent", lambda *_: mapper)
 
+    def SetProperty(self: Any, prop: Any) -> None:
+        """Set the volume property, from which the VDI is regenerated.
+
+        What is shared with a copy of this actor is not changed for the other.
+
+        Parameters
+        ----------
+        prop : vtkVolumeProperty
+            Changes to it are followed.
+
+        Raises
+        ------
+        UnsupportedError, InvalidArgumentError
+            If a VDI cannot honour it; the property before stays.
+        """
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.GetSource()
+        if source is not None and prop is not source.GetVolumeProperty():
+            mapper.own_source("its property").SetVolumeProperty(prop)
+        elif mapper is not None and (shown := mapper.driver.input) is not None:
+            mine = shown.classified_by(prop)
+            if mine is not shown:
+                mapper.SetInputData(mine)
+        super().SetProperty(prop)  # type: ignore[misc]
+
     def ShallowCopy(self: Any, other: Any) -> None:
         """Show what another actor shows, by a copy of its mapper, which is of one actor.
 
@@ -91,8 +116,8 @@ class VDIActorMethods:
         It is of the view that the first picture had; before that, of the view that it would have
         now; where a camera was given, of that. Making it is waited for. ``None`` where the mapper
         has no input, or where nothing shows the actor and nobody has said a view. Another one that
-        is set is shown from the next frame on, and takes the place of what made the one before: a
-        volume, which is let go of.
+        is set, a series or a set is shown from the next frame on, and takes the place of what made
+        the one before: a volume, which is let go of.
 
         Raises
         ------
@@ -103,16 +128,8 @@ class VDIActorMethods:
         return None if mapper is None else mapper.driver.vdi_asked_for()  # type: ignore[no-any-return]
 
     @vdi.setter
-    def vdi(self: Any, vdi: VDI) -> None:
-        mapper = self._mapper_for(" that could show a VDI")
-        given: Any = vdi
-        if isinstance(given, DeferredVDI):
-            raise InvalidVDIError(
-                "a DeferredVDI has no colours yet: set actor.vdi = vdi.classified(cmap=..., "
-                "opacity=...), or add it by plotter.add_vdi(vdi, cmap=..., opacity=...), whose "
-                "look can be changed"
-            )
-        mapper.SetVDI(vdi)
+    def vdi(self: Any, vdi: VDI | VDICollection) -> None:
+        self._mapper().SetVDI(vdi)
 
     @property
     def deferred(self: Any) -> DeferredVDI | None:
@@ -125,15 +142,8 @@ class VDIActorMethods:
 
     @property
     def vdi_set(self: Any) -> VDICollection | None:
-        """The set of which the nearest VDI is shown; ``None`` where a single one or a volume is.
-
-        Another one that is set is shown from the next frame on.
-        """
+        """The set of which the nearest VDI is shown; ``None`` where a single one or a volume is."""
         return self._collection(times=False)
-
-    @vdi_set.setter
-    def vdi_set(self: Any, vdi_set: VDICollection) -> None:
-        self._show(vdi_set, "vdi_set", times=False)
 
     def _collection(self: Any, *, times: bool) -> VDICollection | None:
         mapper = self.GetMapper()
@@ -141,26 +151,17 @@ class VDIActorMethods:
         shown = None if source is None else source.collection
         return shown if shown is not None and (shown.times is not None) == times else None
 
-    def _show(self: Any, given: VDICollection, name: str, *, times: bool) -> None:
-        if not isinstance(given, VDICollection) or (given.times is not None) != times:
-            kind = "VDISeries" if times else "VDISet"
-            raise InvalidArgumentError(
-                f"actor.{name} is a {kind}; got {type(given).__name__}: {kind}(vdis) makes one of "
-                "several VDIs"
-            )
-        self._mapper_for(" that could show it").SetInputData(given)
-
-    def _mapper_for(self: Any, what: str) -> Any:
-        """Return the mapper; without one, say what there cannot be."""
+    def _mapper(self: Any) -> Any:
+        """Return the mapper; InvalidArgumentError without one."""
         mapper = self.GetMapper()
         if mapper is None:
-            raise InvalidArgumentError(f"this actor has no mapper{what}")
+            raise InvalidArgumentError("this actor has no mapper: set a VDIMapper (SetMapper)")
         return mapper
 
     @property
     def status(self: Any) -> VDIStatus:
         """How the VDI was drawn in the last frame, and what goes on behind it."""
-        mapper = self._mapper_for(", so there is no status of it")
+        mapper = self._mapper()
         return mapper.driver.status()  # type: ignore[no-any-return]
 
     @property
@@ -171,47 +172,7 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        self._mapper_for(" whose opacity could be set").SetOpacityMultiplier(multiplier)
-
-    def show_status(self: Any, corner: str = "upper left") -> Any:
-        """Show :attr:`status`, as it was after the frame before, as a text in a corner.
-
-        Parameters
-        ----------
-        corner : {"lower left", "lower right", "upper left", "upper right"}
-            Which corner of the renderer that shows the actor.
-
-        Returns
-        -------
-        vtkCornerAnnotation
-            The text: it can be styled (``GetTextProperty()``), hidden and removed.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If there is no such corner, or no renderer shows the actor.
-        """
-        mapper, place = self.GetMapper(), corner.title().replace(" ", "")
-        if corner not in ("lower left", "lower right", "upper left", "upper right"):
-            raise InvalidArgumentError(f"corner must be 'upper left' or the like; got {corner!r}")
-        renderer = None if mapper is None else mapper.driver.renderer()
-        if renderer is None:
-            raise InvalidArgumentError("nothing shows this actor yet: add it to a renderer first")
-        annotation, actor = vtkCornerAnnotation(), weakly(self)
-        annotation.SetMaximumFontSize(14)
-        look = annotation.GetTextProperty()  # white on a shade: legible on any background
-        look.SetColor(1.0, 1.0, 1.0)
-        look.SetBackgroundColor(0.0, 0.0, 0.0)
-        look.SetBackgroundOpacity(0.5)
-        renderer.AddViewProp(annotation)
-
-        def write(*_: Any) -> None:
-            if actor() is not None:
-                lines = str(actor().status).replace(", ", "\n")
-                annotation.SetText(getattr(annotation, place), lines)
-
-        renderer.AddObserver("StartEvent", write)
-        return annotation
+        self._mapper().SetOpacityMultiplier(multiplier)
 
     def pick(self: Any, x: float, y: float, *, renderer: Any = None) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
@@ -301,18 +262,8 @@ class VDIActorMethods:
 
     @property
     def series(self: Any) -> VDICollection | None:
-        """The series that is shown; ``None`` where a single VDI or a volume is.
-
-        Another one that is set is shown from the next frame on, at the step nearest in time.
-        """
+        """The series that is shown; ``None`` where a single VDI or a volume is."""
         return self._collection(times=True)
-
-    @series.setter
-    def series(self: Any, series: VDICollection) -> None:
-        before = None if self.series is None else self.time
-        self._show(series, "series", times=True)
-        if before is not None:
-            self.time = before
 
     @property
     def time(self: Any) -> float:
@@ -396,7 +347,7 @@ class VDIActorMethods:
         self._player().pause()
 
     def _player(self: Any) -> Any:
-        shown = self._mapper_for(" that could show a series").driver.input
+        shown = self._mapper().driver.input
         if shown is None or shown.player is None:
             raise InvalidArgumentError(
                 "this actor shows no series, which alone has times: add one (plotter.add_vdi("
@@ -408,26 +359,10 @@ class VDIActorMethods:
 class VDIActor(VDIActorMethods, vtkVolume):
     """Shows a VDI in a VTK scene: ``renderer.AddVolume(actor)``.
 
-    Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``. Its volume
-    property has no effect here: the classification is in the VDI (see
-    ``VDISource.SetVolumeProperty``). Other coordinate systems than the world, and changes to its
+    Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``, and its
+    volume property is that of the source. Other coordinate systems than the world, and another
     shader, are refused by name.
     """
 
     def __init__(self) -> None:
         self._become_vdi_actor()
-
-    def SetProperty(self, prop: Any) -> None:
-        """Set the actor's volume property, which changes nothing, and warn if it is another one.
-
-        Another one than the source's, that is; with none of the source there is nothing to say.
-        """
-        super().SetProperty(prop)
-        mapper = self.GetMapper()
-        source = None if mapper is None else mapper.GetSource()
-        own = None if source is None else source.GetVolumeProperty()
-        if own is not None and own is not prop:
-            warn_external(
-                "VDIActor.SetProperty changes nothing: the VDI has the colours and opacities of "
-                "its source's property, which VDISource.SetVolumeProperty sets"
-            )

@@ -31,7 +31,7 @@ from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.filters.inputs import ROUNDING, Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
-from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus, Warnings
+from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
 from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
 
 _log = logging.getLogger(__name__)
@@ -97,19 +97,6 @@ class Planner:
         """Return all renderers that show the actor, by itself or as a part of an assembly."""
         there = [each for each in consumers(self._actor()) if each.IsA("vtkRenderer")]
         return list(dict.fromkeys(there))
-
-    def status(self) -> VDIStatus:
-        """Return how the last frame was drawn, and what goes on."""
-        raise NotImplementedError
-
-    def _user_asks(self) -> bool:
-        """Return what the user's function says of the frame's view."""
-        policy = self.settings.regenerate
-        try:
-            return callable(policy) and bool(policy(self.status()))
-        except Exception as error:
-            self.complain(error)
-            return False
 
     # What a frame shows
 
@@ -235,9 +222,6 @@ class Planner:
         if vdi is not None and request is not None:
             sighted = frame.showing(vdi, number_of(vdi))
             made = self._as_made(vdi, sighted, request)
-        by_policy = callable(settings.regenerate)
-        asks = by_policy and first and one_view and made is not None
-        asks = asks and not (watched and (self.making is not None or stamp in self.failed))
         previews = window.previews(settings)
         content, volume = None if wanted is None else wanted.content, "whole"
         bounds = () if wanted is None else wanted.volume.bounds
@@ -251,8 +235,7 @@ class Planner:
             screen=None if wanted is None else wanted.screen,
             chosen=source.view_is_chosen(wanted, request),
             draw=settings.draw,
-            regenerate="ask" if by_policy else settings.regenerate,  # type: ignore[arg-type]
-            wish=asks and self._user_asks(),
+            regenerate=settings.regenerate,
             bound=settings.regenerate_below,
             watched=watched,
             moving=previews,
@@ -455,7 +438,6 @@ class Planner:
             hand=moving and not still,
             settled=still and not moving,
             first_look=False,
-            wish=False,
             late=self._late(window),
             **self._going_on(),
         )

@@ -66,10 +66,9 @@ _METHODS = {
     ),
     "regenerate": _Method(
         "Regenerate",
-        'what decides that a view needs a VDI of its own: ``"auto"``, ``"never"`` or a callable',
+        'what decides that a view needs a VDI of its own: ``"auto"`` or ``"never"``',
         'By ``"auto"`` an estimate of the view\'s error does, where somebody watches; by '
-        '``"never"`` only ``actor.regenerate()``. A callable gets a '
-        ":class:`~pyvista_vdi.vtk_pipeline.VDIStatus` once per frame.",
+        '``"never"`` only ``actor.regenerate()``.',
         checked_policy,
     ),
     "regenerate_below": _Method(

@@ -109,10 +109,7 @@ class VDIStatus:
 
 
 class Warnings:
-    """Says each thing once, as a :class:`~pyvista_vdi.VDIWarning`.
-
-    Exceptions cannot pass through VTK's renderer.
-    """
+    """Says each thing once, as a VDIWarning: exceptions cannot pass through VTK's renderer."""
 
     def __init__(self) -> None:
         self._said: set[Hashable] = set()
@@ -121,15 +118,13 @@ class Warnings:
         self, message: str, error: BaseException | None = None, *, cause: Hashable = None
     ) -> None:
         """Warn, unless this, or its cause, was said before; a traceback goes to the log."""
-        if error is not None:
-            _log.debug("%s", message, exc_info=error)
-        if (cause or message) in self._said:
-            return
-        self._said.add(cause or message)
-        try:
-            warn_external(message)
-        except VDIWarning:  # warnings are errors: the log is what is left
-            _log.error(message)
+        _log.debug("%s", message, exc_info=error)
+        if (cause or message) not in self._said:
+            self._said.add(cause or message)
+            try:
+                warn_external(message)
+            except VDIWarning:  # warnings are errors: the log is what is left
+                _log.error(message)
 
     def forget(self) -> None:
         """Forget what was said, so that it is said again if it comes up again."""

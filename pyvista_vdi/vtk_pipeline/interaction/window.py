@@ -182,13 +182,6 @@ class Window:
         """Whether a frame has begun and not ended."""
         return self._started is not None
 
-    def render(self) -> None:
-        """Draw the window, as from its event loop."""
-        window = self._window()
-        interactor = None if window is None else window.GetInteractor()
-        if interactor is not None:
-            interactor.Render()
-
     # What is seen of it
 
     def watched_behind(self, settings: Any) -> bool:
