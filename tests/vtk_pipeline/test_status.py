@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from plugin_scenes import LOOKS, soft_ball
-from watched_windows import MOVING, STILL, frame, turned, watched
-
-import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
+from watched_windows import frame
 
 pytestmark = pytest.mark.gl
 

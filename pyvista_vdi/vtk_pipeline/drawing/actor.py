@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, warn_external
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
@@ -15,10 +15,8 @@ from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkCornerAnnotation,
     vtkOpenGLShaderProperty,
     vtkVolume,
-    weakly,
 )
 
 

@@ -267,8 +267,9 @@ class Driver(Planner):
             self.begin_at_rest(window)
         if not self.goes_on:
             self._timer.stop()
-        if swapped:
-            window.render()
+        renderer = self.renderer()
+        if swapped and renderer is not None:
+            renderer.GetRenderWindow().GetInteractor().Render()
 
     # Errors in a frame
 
