@@ -32,12 +32,6 @@ def slices_that_are_missing(plotter, tmp_path):
     read_volume(tmp_path)
 
 
-def an_effect_that_does_not_see_it(plotter, tmp_path):
-    plotter.add_vdi(VALUES, show_scalar_bar=False)
-    plotter.enable_ssao()
-    plotter.screenshot(return_img=True)
-
-
 def a_camera_that_looks_away(plotter, tmp_path):
     away = ((50, 5, 5), (90, 5, 5), (0, 0, 1))  # as PyVista's camera_position
     pvdi.generate(pvdi.Volume(VALUES), away, (8, 8))
@@ -46,7 +40,6 @@ def a_camera_that_looks_away(plotter, tmp_path):
 CASES = [
     a_camera_that_looks_away,
     slices_that_are_missing,
-    an_effect_that_does_not_see_it,
 ]
 
 

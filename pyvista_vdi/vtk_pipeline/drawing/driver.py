@@ -253,7 +253,7 @@ class Driver(Planner):
 
     def follow(self, window: Any) -> None:
         """Start the event loop's timer, if something goes on and no hand moves."""
-        if self.goes_on and not Window.of(window).moving(self.settings):
+        if self.goes_on and not Window.of(window).moving:
             period = PERIOD if self.input is None else self.input.period or PERIOD
             self._timer.start(window.GetInteractor(), period)
 

@@ -27,6 +27,8 @@ from pyvista_vdi.vtk_pipeline.vtk import (
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
 
+#: A window's desired update rate from which on a hand moves, 1/s, as for vtkSmartVolumeMapper.
+_INTERACTIVE = 1.0
 #: Frames per second to be kept in a window that nobody's hand moves.
 _RATE = 30.0
 
@@ -162,18 +164,19 @@ class Window:
 
     def rate(self, settings: Any) -> float:
         """Return the frames per second to be kept while a hand moves, also before it does."""
-        if settings.target or self.moving(settings):
+        if settings.target or self.moving:
             return float(settings.target or self._window().GetDesiredUpdateRate())
         interactor = self._window().GetInteractor()
         return _RATE if interactor is None else max(1.0, interactor.GetDesiredUpdateRate())
 
-    def moving(self, settings: Any) -> bool:
+    @property
+    def moving(self) -> bool:
         """Whether a hand moves, by VTK's convention."""
-        return bool(self._window().GetDesiredUpdateRate() >= settings.update_rate)
+        return bool(self._window().GetDesiredUpdateRate() >= _INTERACTIVE)
 
     def previews(self, settings: Any) -> bool:
         """Whether frames may have fewer rays now: a hand moves, and somebody watches."""
-        if not (settings.previews and self.moving(settings)):
+        if not (settings.previews and self.moving):
             return False
         return bool(self._window().GetShowWindow()) or settings.off_screen
 
@@ -255,7 +258,7 @@ class Window:
         started, self._started = self._started, None
         self._previewed = self.pace.frame.preview or given_up is not None
         seconds = None if started is None else now() - started
-        self.pace.ended(seconds, any(self.moving(driver.settings) for driver in self.drivers))
+        self.pace.ended(seconds, self.moving)
         self.of_frame.clear()
 
     def _camera_changed(self) -> None:
