@@ -14,7 +14,7 @@ import pytest
 from extension_marks import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rewriting import check_changed_bytes, declaring, rewritten
+from rewriting import check_changed_bytes, declaring, described, rewritten
 from strategies import random_vdi
 
 from pyvista_vdi import VDI, Camera, io
