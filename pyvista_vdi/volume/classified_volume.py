@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, padded
 from pyvista_vdi.device.constants import GROUP
@@ -24,7 +23,6 @@ from pyvista_vdi.volume.bricks import (
     too_small,
 )
 from pyvista_vdi.volume.kernels import (
-    CLASSIFIED,
     MACROCELL_DISTANCES,
     MACROCELL_VISIBILITY,
     SCALAR_MEDIA,
@@ -261,20 +259,20 @@ def _numbers(
     volume: Volume,
     table: _Table,
     part: GridPart | None,
-) -> NDArray[np.void]:
+) -> dict[str, Any]:
     """Return the numbers of a classified volume as kernels take them."""
     infinite, size = (math.inf,) * 4, (*volume.dimensions, 0)
-    return CLASSIFIED(
-        size=size,
-        held=size,
-        macrocells=(*macrocells_over(volume.dimensions), 0),
-        part_first=(0,) * 4 if part is None else (*part.first, 0),
-        part_lower=infinite if part is None else (*part.lower, 0),
-        part_upper=infinite if part is None else (*part.upper, 0),
-        entries=table.entries,
-        low=table.low,
-        per_scalar=table.per_scalar,
-    )
+    return {
+        "size": size,
+        "held": size,
+        "macrocells": (*macrocells_over(volume.dimensions), 0),
+        "part_first": (0,) * 4 if part is None else (*part.first, 0),
+        "part_lower": infinite if part is None else (*part.lower, 0),
+        "part_upper": infinite if part is None else (*part.upper, 0),
+        "entries": table.entries,
+        "low": table.low,
+        "per_scalar": table.per_scalar,
+    }
 
 
 def _visibility(

@@ -108,7 +108,7 @@ def test_too_large_a_buffer_is_refused_before_it_is_taken(small):
         with pytest.raises(DeviceMemoryError, match="'volume' needs 4.00 MiB"):
             small.upload(array, name="volume")
     with small.buffer((2**18,), name="one"), small.buffer((2**18 - 1,), name="two"):
-        with pytest.raises(DeviceMemoryError, match=r"'three' needs .* are in use already"):
+        with pytest.raises(DeviceMemoryError, match=r"'three' needs .* are in use: release"):
             small.buffer((2,), name="three")
         with small.buffer((1,), name="the rest"):
             assert small.allocated == before + 2**21

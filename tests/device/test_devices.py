@@ -28,7 +28,7 @@ IGPU = fake("Intel(R) OpenCL Graphics", "Iris", "GPU", (2, 0), unified_memory=Tr
 NV_A = fake("NVIDIA CUDA", "H200", "GPU", (3, 0), compute_units=132)
 NV_B = fake("NVIDIA CUDA", "T4", "GPU", (3, 1), compute_units=40)
 FPGA = fake("Intel(R) FPGA Emulation", "Emulator", "accelerator", (4, 0), compute_units=99)
-ALL = devices.with_selectors([POCL, INTEL, IGPU, NV_A, NV_B, FPGA])
+ALL = [POCL, INTEL, IGPU, NV_A, NV_B, FPGA]
 
 
 def test_preference_is_gpu_then_intel_cpu_then_other_cpu_then_accelerator():
@@ -40,12 +40,10 @@ def test_preference_is_gpu_then_intel_cpu_then_other_cpu_then_accelerator():
     ("selector", "name"),
     [
         ("0:0", POCL.name),
-        (" 3 : 1 ", "T4"),
+        (" 3:1 ", "T4"),
         ("t4", "T4"),
         ("NVIDIA CUDA / H200", "H200"),
-        ("cuda:1", "T4"),
         ("pocl", POCL.name),  # only the version says so
-        ("intel(r) opencl:0", INTEL.name),
         ("fpga", "Emulator"),
         ("Intel(R) Xeon(R)", INTEL.name),  # the exact name beats PoCL's, which contains it
     ],
@@ -56,7 +54,8 @@ def test_selector_means_one_device(selector, name):
 
 def test_environment_names_the_device(runtime, monkeypatch):
     monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
-    best = choice.default_device(ocl.list_devices())
+    usable = [info for info in ocl.list_devices() if info.usable]
+    best = min(usable, key=devices.preference)
     marked = f"* [{best.platform_index}:{best.device_index}] {best.full_name}"
     assert marked in ocl.describe_devices()
     monkeypatch.setenv("PYVISTA_VDI_DEVICE", runtime.info.selector)
@@ -69,15 +68,12 @@ def test_environment_names_the_device(runtime, monkeypatch):
 
 
 def test_every_form_of_device_gives_the_same_runtime(runtime):
-    device = devices.handles[runtime.info.index]
-    for form in (runtime, runtime.info, device):
+    for form in (runtime, runtime.info, runtime.info.selector, runtime.info.full_name):
         assert ocl.get_runtime(form) is runtime
-    with pytest.raises(NoDeviceError, match="does not exist in this process .*or a context"):
-        ocl.get_runtime(devices.opencl().Context([device]))
     with pytest.raises(InvalidArgumentError, match="device=3 of type int"):
         ocl.get_runtime(3)
-    with pytest.raises(NoDeviceError, match="does not exist in this process"):
-        ocl.get_runtime(replace(runtime.info, name="another"))
+    with pytest.raises(NoDeviceError, match="no such OpenCL device"):
+        ocl.get_runtime(replace(runtime.info, device_index=9))
     with pytest.raises(NoDeviceError, match="there is no such OpenCL device") as caught:
         ocl.get_runtime("quantum")
     assert runtime.info.full_name in str(caught.value)
@@ -122,5 +118,40 @@ def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
         installed = icd.intel_library() is not None
         assert ('pip install "pyvista-vdi[cpu]"' in text) != installed
         assert ("pocl-opencl-icd" in text) != installed
-        assert text.count(f"OCL_ICD_VENDORS={str(tmp_path)!r} is set and obeyed") == 1
-        assert ("unset it" in text) == installed
+        assert ("unset OCL_ICD_VENDORS" in text) == installed
+
+
+@pytest.mark.skipif(icd.intel_library() is None, reason="pip's driver is not installed")
+def test_pyopencl_imported_first_finds_pip_s_driver_or_says_which_import_to_move():
+    listed = "import pyvista_vdi\nprint(pyvista_vdi.describe_devices())\n"
+    asked = (
+        "import contextlib\nwith contextlib.suppress(pyopencl.Error): pyopencl.get_platforms()\n"
+    )
+    alone, first = run_python(listed), run_python("import pyopencl\n" + listed)
+    assert first.stdout == alone.stdout, first.stderr
+    late = run_python("import pyopencl\n" + asked + listed).stdout
+    assert late.count("move  import pyopencl  below the first use of a device") == 1, late
+    assert "pip install" not in late
+
+
+def test_once_listed_devices_come_without_a_lock():
+    """A finalizer that frees device memory may come here wherever its thread holds one."""
+    done = run_python(
+        "import contextlib, threading\n"
+        "made, make = [], threading.RLock\n"
+        "threading.RLock = lambda: made.append(make()) or made[-1]\n"
+        "from pyvista_vdi.device import devices\n"
+        "threading.RLock = make\n"
+        "devices.find_devices()\n"
+        "found = []\n"
+        "asks = threading.Thread(\n"
+        "    target=lambda: found.extend([devices.opencl().__name__, devices.find_devices()]),\n"
+        "    daemon=True)\n"
+        "with contextlib.ExitStack() as held:\n"
+        "    assert made\n"
+        "    for lock in made: held.enter_context(lock)\n"
+        "    asks.start()\n"
+        "    asks.join(60)\n"
+        "print(*found[:1])"
+    )
+    assert done.stdout == "pyopencl\n", done.stderr

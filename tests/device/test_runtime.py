@@ -17,8 +17,6 @@ def texts(monkeypatch):
     files: dict[str, str] = {}
 
     def read(path: str) -> str:
-        if path not in files:
-            raise FileNotFoundError(path)
         return files[path]
 
     monkeypatch.setattr(programs, "read_resource", read)
@@ -44,8 +42,7 @@ __kernel void spread(__global const float *x, __global float *y, const float4 v,
 
 def scaling(path):
     """The kernel ``scale`` of a file."""
-    arguments = {"x": "float*", "factor": "float", "n": "uint"}
-    return ocl.KernelDeclaration(path, "scale", **arguments)
+    return ocl.KernelDeclaration(path, "scale")
 
 
 @pytest.fixture
@@ -62,7 +59,7 @@ def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
     wrong = "".join(f"    missing_it{n}();\n" for n in range(40))
     texts["vdi/bad.cl"] = f'#include "common/good.cl"\n\n__kernel void bad()\n{{\n{wrong}}}\n'
     with pytest.raises(KernelBuildError) as caught:
-        runtime.kernel("vdi/bad.cl", "bad", {"N": 3})
+        runtime.kernel(ocl.KernelDeclaration("vdi/bad.cl", "bad"), {"N": 3})
     error = caught.value
     assert "vdi/bad.cl:5" in error.log
     assert "missing_it0" in str(error)
@@ -75,7 +72,7 @@ def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
     assert not list(tmp_path.glob("*.cl"))
     # Where the device can, divisions are rounded correctly; and nothing is relaxed
     cl = devices.opencl()
-    device = devices.handles[runtime.info.index]
+    device = devices.handles[runtime.info.selector]
     offered = device.single_fp_config & cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
     assert ("-cl-fp32-correctly-rounded-divide-sqrt" in error.options) == bool(offered)
     assert "relaxed" not in error.options
@@ -86,19 +83,18 @@ def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, mon
     built = []
     build = programs.build
     monkeypatch.setattr(programs, "build", lambda *a: built.append(a[4]) or build(*a))
-    first = runtime.kernel(scale_file, "scale", {"ADD": 0.25})
-    assert runtime.kernel(scale_file, "scale", {"ADD": 0.25}) is first
-    assert runtime.kernel(scale_file, "scale", {"ADD": 0.5}) is not first
-    runtime.kernel(scale_file, "spread", {"ADD": 0.5})
+    first = runtime.kernel(scaling(scale_file), {"ADD": 0.25})
+    assert runtime.kernel(scaling(scale_file), {"ADD": 0.25}) is first
+    assert runtime.kernel(scaling(scale_file), {"ADD": 0.5}) is not first
+    runtime.kernel(ocl.KernelDeclaration(scale_file, "spread"), {"ADD": 0.5})
     assert len(built) == 2
     scale_file.write_text(SCALE + "\n// edited\n")
-    assert runtime.kernel(scale_file, "scale", {"ADD": 0.25}) is not first
+    assert runtime.kernel(scaling(scale_file), {"ADD": 0.25}) is not first
 
 
 def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
     """Also signs of 0, arrays changed in place, buffers in the place of those that have gone."""
-    kinds = {"x": "float*", "y": "float*", "v": "float4", "t": "local float*"}
-    spread = ocl.KernelDeclaration(scale_file, "spread", **kinds)
+    spread = ocl.KernelDeclaration(scale_file, "spread")
     vector = np.array([1, 2, 3, 4], np.float32)
     with runtime.upload(np.arange(8, dtype=np.float32)) as x, runtime.buffer(x.shape) as y:
         launch = runtime.bind(spread, {"ADD": 0}, x=x, y=y, v=vector, t=4)
@@ -124,7 +120,7 @@ def new_kernel(tmp_path):
     """A file that no cache knows."""
     path = tmp_path / "new.cl"
     path.write_text(f"// {tmp_path}\n__kernel void twice(__global float *x) {{ *x *= 2; }}")
-    return path
+    return ocl.KernelDeclaration(path, "twice")
 
 
 def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
@@ -140,7 +136,7 @@ def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
 
     def compiled():
         before = len(told)
-        fresh_runtime(runtime).kernel(new_kernel, "twice")
+        fresh_runtime(runtime).kernel(new_kernel, {})
         return len(told) - before
 
     assert compiled() == 1

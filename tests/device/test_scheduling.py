@@ -163,11 +163,6 @@ __kernel void index(__global uint *x, const uint wide)
 """
 
 
-def index_of(path):
-    """The kernel ``index`` of a file."""
-    return ocl.KernelDeclaration(path, "index", x="uint*", wide="uint")
-
-
 @pytest.fixture
 def kernels(tmp_path):
     path = tmp_path / "kernels.cl"
@@ -187,7 +182,7 @@ def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch,
     with runtime.buffer((n,), np.uint32) as x:
         with runtime.background():
             runtime.fill(x, 0)
-            runtime.bind(index_of(kernels), x=x, wide=size[0])(size, group)
+            runtime.bind(KernelDeclaration(kernels, "index"), x=x, wide=size[0])(size, group)
         np.testing.assert_array_equal(runtime.download(x), np.arange(1, n + 1))
     assert sum(pieces) == n
     assert n <= 4096 or len(pieces) > 1

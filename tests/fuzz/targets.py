@@ -36,8 +36,8 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import VDI, Camera, DeferredVDI, TransferFunction, Volume, cli, io
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import VDIError, VDIWarning
-from pyvista_vdi.extensions.series import files as series_files
-from pyvista_vdi.extensions.sets import files as set_files
+from pyvista_vdi.extensions.series import series as series_files
+from pyvista_vdi.extensions.sets import vdi_set as set_files
 from pyvista_vdi.extensions.web import source as served
 from pyvista_vdi.extensions.web.page import DATA_TYPE
 from pyvista_vdi.extensions.web.page import page as page_of
@@ -764,18 +764,13 @@ class _Session:
 # -- what clients of a server say ------------------------------------------------------------------
 
 _CAMERA = {"position": [0, -5, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "view_angle": 30}
-_VIEW = {"type": "view", "camera": _CAMERA, "size": [64, 48], "moving": True}
+_VIEW = {"type": "view", "camera": _CAMERA, "size": [64, 48]}
 _SAID = (
     _VIEW,
     {**_VIEW, "camera": {**_VIEW["camera"], "parallel_scale": 2.0}},
-    {"type": "look", "cmap": "bone", "opacity": [0, 0.5, 1], "clim": [0, 1]},
-    {"type": "look", "opacity": "linear"},
     {"type": "time", "step": 1},
 )
-_OFFERS = (
-    {"steps": 2, "cmaps": ["bone", "hot"], "opacities": ["linear"]},
-    {"steps": 1, "cmaps": [], "opacities": []},
-)
+_OFFERS = ({"steps": 2}, {"steps": 1})
 
 
 def served_messages(data: bytes) -> None:
@@ -797,16 +792,6 @@ def served_messages(data: bytes) -> None:
 def _check_wish(wish: served.Wish, offer: Mapping[str, Any]) -> None:
     assert type(wish.step) is int
     assert 0 <= wish.step < offer["steps"]
-    look = dict(wish.look)
-    assert look.get("cmap") in (None, *offer["cmaps"])
-    if isinstance(opacity := look.get("opacity"), tuple):
-        assert offer["cmaps"]
-        assert 2 <= len(opacity) <= served.MAX_OPACITIES
-        assert all(0 <= value <= 1 for value in opacity)
-    else:
-        assert opacity in (None, *offer["opacities"])
-    if clim := look.get("clim"):
-        assert -np.inf < clim[0] < clim[1] < np.inf
     hash(wish)  # what is made is looked up by it
     if wish.view is not None:
         assert all(1 <= edge <= served.MAX_PICTURE_EDGE for edge in wish.view.size)

@@ -97,7 +97,7 @@ def ome(written, tmp_path):
 
 def test_spacing_axes_levels_time_and_channel(image):
     path, version = image
-    volume = pvdi.open_volume(path, time=1, channel=2)
+    volume = pvdi.read_volume(path, time=1, channel=2)
     assert isinstance(volume, pvdi.Volume)
     assert volume.chunked
     assert volume.store.kind == f"OME-Zarr {version}"
@@ -112,7 +112,7 @@ def test_spacing_axes_levels_time_and_channel(image):
     np.testing.assert_array_equal(volume.array[box], VALUES[1, 2][box])
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(volume)).array[box], VALUES[1, 2][box])
     for level in (1, 2):
-        coarse = pvdi.open_volume(path, level=level, channel=1)
+        coarse = pvdi.read_volume(path, level=level, channel=1)
         assert coarse.level == level
         assert coarse.spacing == tuple(s * 2**level for s in (0.25, 0.5, 2.0))
         np.testing.assert_array_equal(
@@ -126,12 +126,11 @@ def test_spacing_axes_levels_time_and_channel(image):
         ({"level": 3}, r"from 0, the finest, to 2"),
         ({"time": 2}, r"has 2 along time, 0 to 1; got 2"),
         ({"channel": "dapi"}, r"no channel 'dapi'"),
-        ({"window_size": (9, 9)}, r"give both"),
     ],
 )
 def test_what_is_not_there_is_named(asked, message, ome):
     with pytest.raises(InvalidArgumentError, match=message):
-        pvdi.open_volume(ome, **asked)
+        pvdi.read_volume(ome, **asked)
 
 
 def with_transformation(entry):
@@ -154,7 +153,7 @@ def with_transformation(entry):
 def test_metadata_that_cannot_be_followed_are_refused(edit, error, message, ome):
     change(ome, edit)
     with pytest.raises(error, match=message):
-        pvdi.open_volume(ome)
+        pvdi.read_volume(ome)
 
 
 def test_zarr_array_and_group(tmp_path):
@@ -165,11 +164,15 @@ def test_zarr_array_and_group(tmp_path):
         zarr.open(str(tmp_path / "x.zarr" / name), shape=values.shape, **kind)[...] = values
     group["b"].attrs["spacing"] = [3.0, 2.0, 1.0]
     with pytest.raises(InvalidVolumeError, match=r"holds several: open one of .*x\.zarr::a, "):
-        pvdi.open_volume(tmp_path / "x.zarr")
+        pvdi.read_volume(tmp_path / "x.zarr")
+    deep = group.create_group("deep")
+    for name in ("c", "d"):
+        zarr.open(str(tmp_path / "x.zarr" / "deep" / name), mode="w", shape=(4, 4, 4), dtype="u2")
+    with pytest.raises(InvalidVolumeError, match=r"open one of .*x\.zarr::deep/c, .*::deep/d"):
+        pvdi.read_volume(f"{tmp_path}/x.zarr::{deep.path}")
     for path in (f"{tmp_path}/x.zarr::b", tmp_path / "x.zarr" / "b"):
-        volume = pvdi.open_volume(path)
+        volume = pvdi.read_volume(path)
         assert volume.spacing == (1.0, 2.0, 3.0)
-        assert volume.why == "the only one"
         np.testing.assert_array_equal(volume.load().array, VALUES[0, 1])
 
 
@@ -179,7 +182,7 @@ def test_hdf5(tmp_path):
     with h5py.File(path, "w") as file:
         one = file.create_dataset("deep/one", data=VALUES[0], chunks=(1, 4, 8, 8))
         one.attrs["element_size_um"] = [2.0, 0.5, 0.25]
-    volume = pvdi.open_volume(path, channel=1)  # the only one
+    volume = pvdi.read_volume(path, channel=1)  # the only one
     assert volume.store.axes == ("t", "z", "y", "x")  # or of channels: nobody says it
     assert len(volume.store.times) == len(VALUES[0])
     np.testing.assert_array_equal(volume.at_time(0).load().array, VALUES[0, 0])
@@ -195,16 +198,23 @@ def test_hdf5(tmp_path):
         for label, dimension in zip("tzyx", three.dims, strict=True):
             dimension.label = label
     with pytest.raises(InvalidVolumeError, match=r"holds several.*x\.h5::deep/one") as kept:
-        pvdi.open_volume(path)
+        pvdi.read_volume(path)
     with h5py.File(path, "a"):
         assert kept.value  # which holds no file open
     with pytest.raises(InvalidVolumeError, match=r"no array 'four'"):
-        pvdi.open_volume(f"{path}::/four")
-    between = pvdi.open_volume(f"{path}::/two", time=1)  # time lies between z and y
+        pvdi.read_volume(f"{path}::/four")
+    between = pvdi.read_volume(f"{path}::/two", time=1)  # time lies between z and y
     np.testing.assert_array_equal(between.load().array, VALUES[0, 1])
-    labelled = pvdi.open_volume(f"{path}::/three", time=1)
+    labelled = pvdi.read_volume(f"{path}::/three", time=1)
     np.testing.assert_array_equal(labelled.load().array, VALUES[1, 0])
     again = pickle.loads(pickle.dumps(labelled))
     np.testing.assert_array_equal(again.load().array, VALUES[1, 0])
     np.testing.assert_array_equal(copy.deepcopy(again).store.levels[0].array, VALUES[:, 0])
-    assert (again.time, again.spacing, again.why) == (1, labelled.spacing, labelled.why)
+    assert (again.time, again.spacing) == (1, labelled.spacing)
+
+
+@pytest.mark.parametrize(("name", "library"), [("x.zarr", "zarr"), ("x.h5", "h5py")])
+def test_an_absent_library_is_named(name, library, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, library, None)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'pyvista-vdi\["):
+        pvdi.read_volume(name)

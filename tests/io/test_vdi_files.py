@@ -19,8 +19,8 @@ from strategies import random_vdi
 
 from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
+from pyvista_vdi.io.vdi_file.writer import coarser
 
 CODECS = ("lz4", "zstd", "deflate", "none")
 PRECISIONS = ("exact", "8-byte")

@@ -16,7 +16,7 @@ from pyvista_vdi.extensions.series.archive import SERIES, Archive, head_bytes, n
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import check_range, checked_time, times_of
 from pyvista_vdi.io import check_write_options
-from pyvista_vdi.io.vdi_file.description import to_json
+from pyvista_vdi.io.vdi_file.layout import to_json
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI

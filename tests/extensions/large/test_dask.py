@@ -18,7 +18,7 @@ from distributed import Client, LocalCluster
 from drawing import generate_in_blocks
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
-from pyvista_vdi import Volume, generate, open_volume
+from pyvista_vdi import Volume, generate, read_volume
 from pyvista_vdi.errors import (
     Cancelled,
     DeviceError,
@@ -230,7 +230,7 @@ def test_a_worker_that_has_not_the_store_is_named(client, scene, in_folders, kin
     (_, *rest), options = scene
     STORES["zarr" if kind == "dask" else kind](in_folders("here", "none"), volume_of("uint8").array)
     path = "/proc/self/cwd/s"  # as of a mount that is not the same on all machines
-    opened = Volume(da.from_zarr(path)) if kind == "dask" else open_volume(path)
+    opened = Volume(da.from_zarr(path)) if kind == "dask" else read_volume(path)
     bad = list(client.nthreads())[1]
     with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.* cannot be read there"):
         generate_in_blocks(opened, *rest, client=client, **options)
@@ -242,7 +242,7 @@ def test_relative_paths_are_this_process_s(client, scene, in_folders, kind, defa
     (_, *rest), options = scene
     array, here = volume_of("uint8").array, in_folders("none", "none")
     STORES[kind](here, array)
-    opened = open_volume("s")
+    opened = read_volume("s")
     whole = generate_in_blocks(opened, *rest, **options)
     assert generate_in_blocks(opened, *rest, client=client, **options).equals(whole)
     if kind == "hdf5":
@@ -250,7 +250,7 @@ def test_relative_paths_are_this_process_s(client, scene, in_folders, kind, defa
     changed = np.where(array > 100, 0, array)
     STORES[kind](here, changed)
     if kind == "hdf5":
-        opened = open_volume("s")
+        opened = read_volume("s")
     found = generate_in_blocks(opened, *rest, client=client, **options)
     expected = generate_in_blocks(Volume(changed), *rest, chunks=(16, 16, 16), **options)
     assert found.equals(expected)
