@@ -361,7 +361,15 @@ def test_the_page_has_these_events():
     assert [each for each in rows if each not in ("event", "---")] == list(EVENTS)
 
 
-DRIVES = ("time", "threading", "asyncio", "Worker", "weakref", "weakly", "vtkWeakReference")
+DRIVES = (
+    "time",
+    "threading",
+    "asyncio",
+    "BackgroundThread",
+    "weakref",
+    "weakly",
+    "vtkWeakReference",
+)
 #: Where there may be threads, locks, clocks and weak references: what drives the frames of a mapper
 #: and a window; what VTK's objects, which observers and lights would keep in cycles, must not be
 #: kept alive by; and, of plotters, what they hold, their bar and the source that steps are read of.

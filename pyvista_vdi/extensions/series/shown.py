@@ -17,7 +17,7 @@ from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.background import Job, Worker
+from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
@@ -79,7 +79,7 @@ class SeriesInput(Input):
         self._broken: set[int] = set()
         self._unsaid: list[Exception] = []  # why they are
         self._seconds = 0.0  # that a step takes to be ready
-        self._worker = Worker("pyvista-vdi series")
+        self._worker = BackgroundThread("pyvista-vdi series")
         self._kept: DeferredInput | None = None  # of the step, where it keeps values
 
     @property

@@ -13,7 +13,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.background import Worker
+from pyvista_vdi.quality.background import BackgroundThread
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 
 #: How many of the VDIs nearest to a view are read.
@@ -39,7 +39,7 @@ class SetInput(Input):
         self._lock = threading.Lock()
         self._ready: dict[int, VDI] = {}
         self._broken: set[int] = set()
-        self._decoder = Worker("pyvista-vdi set")
+        self._decoder = BackgroundThread("pyvista-vdi set")
         self._kept: dict[int, DeferredInput] = {}  # of what is drawn, where it keeps values
 
     def vdi(self) -> VDI | None:
