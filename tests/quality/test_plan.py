@@ -22,7 +22,7 @@ def turned(degrees):
 
 MADE = Made(1, BOUNDS, "a", HOME, pixels=1e4)
 #: A frame that somebody watches, at rest, of a volume whose VDI is that of this view.
-SEEN = Seen(HOME, "a", BOUNDS, HOME, watched=True, made=MADE, seconds=0.03)
+SEEN = Seen(HOME, "a", HOME, watched=True, made=MADE, seconds=0.03)
 AWAY = replace(SEEN, view=turned(40), made=replace(MADE, angle=40.0))
 POOR = replace(AWAY, estimate=ViewEstimate(1, turned(40), 0.5))
 
