@@ -194,12 +194,12 @@ def test_info_of_a_volume(folder, capsys):
     arguments = ("info", folder / "v.nrrd", "--spacing", "1", "2", "3", "--origin", "0", "0", "5")
     out = run(capsys, *arguments)
     lines = {name: text.strip() for name, text in (x.split("  ", 1) for x in out.splitlines())}
-    volume = read_volume(folder / "v.nrrd")
+    volume = pvdi.read_volume(folder / "v.nrrd")
     nx, ny, nz = volume.dimensions
     assert lines["dimensions"] == f"[{nx}, {ny}, {nz}]"
     assert lines["spacing"] == "[1.0, 2.0, 3.0]"
     assert lines["origin"] == "[0.0, 0.0, 5.0]"
-    about = json.loads(outcome(capsys, *arguments, "--json")[1])
+    about = json.loads(run(capsys, *arguments, "--json"))
     assert about["range"] == [*volume.finite_range()]
     assert about["dimensions"] == [nx, ny, nz]
 
@@ -233,7 +233,7 @@ def test_a_page_is_taken_as_a_vdi_is(folder, capsys, default_runtime, tmp_path):
         for source, picture in zip((page, file), pictures, strict=True):
             run(capsys, verb, source, option, picture)
         assert pictures[0].read_bytes() == pictures[1].read_bytes()
-    about = [json.loads(outcome(capsys, "info", name, "--json")[1]) for name in (page, file)]
+    about = [json.loads(run(capsys, "info", name, "--json")) for name in (page, file)]
     own = ("path", "file_bytes")
     one, other = ({k: v for k, v in state.items() if k not in own} for state in about)
     assert one == {**other, "codec": "deflate", "format_version": 4}

@@ -141,18 +141,6 @@ OF_A_VERB = {
     ("set", "--output"): tuple(name.format(".vdiset") for name in NO_TARGET),
     ("compare", "--out"): ("v.npy", "v.npy/a"),
     ("tradeoff", "--out"): ("v.npy", "v.npy/a"),
-    ("view", "--screenshot"): tuple(name.format(".png") for name in NO_TARGET),
-    **{
-        (verb, "--output"): tuple(name.format(suffix) for name in NO_TARGET)
-        for suffix, verbs in {
-            ".vdi": "generate convert",
-            ".png": "render",
-            ".gif": "turntable movie",
-            ".vdis": "series",
-            ".vdiset": "set",
-        }.items()
-        for verb in verbs.split()
-    },
 }
 #: Files in place of the verb's first.
 FILES = {

@@ -14,8 +14,8 @@ from pyvista_vdi.device import Runtime
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.background import TRIAL_SIZE, Job, Worker, vdi_job
-from pyvista_vdi.quality.pictures import Estimate
+from pyvista_vdi.quality.background import TRIAL_SIZE, BackgroundThread, Job, vdi_job
+from pyvista_vdi.quality.plan import ViewEstimate
 from pyvista_vdi.quality.rate import FLOOR, reduced
 from pyvista_vdi.quality.view_error import ViewError, ViewErrorEstimator
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
@@ -64,7 +64,7 @@ class Background:
     def __init__(self) -> None:
         self.kind: Literal["vdi", "estimate", "trial"] | None = None
         self.request: Request | None = None
-        self._worker = Worker("pyvista-vdi generation")
+        self._worker = BackgroundThread("pyvista-vdi generation")
         # The thread knows the worker alone, so that this can be collected while it works
         finalizer = weakref.finalize(self, self._worker.clear)
         finalizer.atexit = False  # the worker's own end waits for the thread as well
@@ -108,13 +108,13 @@ class Background:
     def estimate(
         self, by: Estimator, number: int, vdi: VDI, request: Request, view: View, shown: Any
     ) -> None:
-        """Estimate the error of a VDI in a view."""
+        """ViewEstimate the error of a VDI in a view."""
 
-        def judge(runtime: Runtime, _: Callable[[float], None]) -> Estimate:
+        def judge(runtime: Runtime, _: Callable[[float], None]) -> ViewEstimate:
             with runtime.aside():  # loads SciPy, the first time: a quarter of a second
                 from skimage.metrics import structural_similarity  # noqa: F401
             error = by.estimate(request, runtime, vdi, view, shown)
-            return Estimate(number, view, error.ssim, error.contrast)
+            return ViewEstimate(number, view, error.ssim, error.contrast)
 
         self._put("estimate", request, Job(judge, request.device))
 

@@ -20,8 +20,17 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.costs import Costs
-from pyvista_vdi.quality.pictures import Estimate, Made, Pictures
-from pyvista_vdi.quality.plan import SETTLED, Making, Plan, Seen, lacking, plan
+from pyvista_vdi.quality.plan import (
+    SETTLED,
+    Made,
+    Making,
+    Pictures,
+    Plan,
+    Seen,
+    ViewEstimate,
+    lacking,
+    plan,
+)
 from pyvista_vdi.quality.view_error import magnification
 from pyvista_vdi.vtk_pipeline.drawing.background import Background, Estimator
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, consumers
@@ -76,7 +85,7 @@ class Planner:
         """Forget all that was seen, and what is being made."""
         self.background.drop()
         self.making: Making | None = None
-        self.estimate: Estimate | None = None
+        self.estimate: ViewEstimate | None = None
         self.pictures, self.costs = Pictures(), Costs()
         self.view: View | None = None  # of the last frame
         self.seen: Seen | None = None  # the last frame that somebody watched
@@ -231,7 +240,6 @@ class Planner:
         seen = Seen(
             view=view,
             content=content,
-            bounds=bounds,
             screen=None if wanted is None else wanted.screen,
             chosen=source.view_is_chosen(wanted, request),
             draw=settings.draw,
@@ -379,8 +387,8 @@ class Planner:
 
     def _judged(
         self, source: SourceInput, frame: Frame, sighted: Frame | None
-    ) -> Estimate | Literal[False]:
-        """Estimate the error of the VDI in the frame's view now; False if it cannot be."""
+    ) -> ViewEstimate | Literal[False]:
+        """ViewEstimate the error of the VDI in the frame's view now; False if it cannot be."""
         made = source.source.GetCurrentRequest()
         assert sighted is not None and sighted.vdi is not None and frame.view is not None  # noqa: PT018
         assert made is not None
@@ -388,7 +396,7 @@ class Planner:
         of = (number_of(vdi), frame.view)
         detail = magnification(vdi, frame.camera, frame.full_size)
         if made.screen == frame.view and detail <= 1 + ROUNDING:
-            return Estimate(*of, ssim=1.0, options=options)
+            return ViewEstimate(*of, ssim=1.0, options=options)
         runtime, background = get_runtime(made.device), frame.renderer.GetBackground()
         try:
             error = self._estimator.estimate(
@@ -397,7 +405,7 @@ class Planner:
         except VDIError:  # no memory for it, say: the volume's picture is right
             _log.debug("the error of a view cannot be estimated", exc_info=True)
             return False
-        return Estimate(*of, ssim=error.ssim, contrast=error.contrast, options=options)
+        return ViewEstimate(*of, ssim=error.ssim, contrast=error.contrast, options=options)
 
     # Between frames
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
+from pyvista_vdi.model.checks import Number
 from pyvista_vdi.model.render_options import (
     TRANSMITTANCE_CUTOFF,
     checked_bound,
