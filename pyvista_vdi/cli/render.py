@@ -79,8 +79,6 @@ def view(options: argparse.Namespace) -> int:
         actor = plotter.add_vdi(shown, **how)
         aim(plotter.camera, first)
         plotter.renderer.reset_camera_clipping_range()
-        if options.status:
-            actor.show_status(plotter)
         if options.time is not None:
             actor.time = options.time
         if target is not None:

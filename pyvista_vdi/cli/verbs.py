@@ -40,7 +40,6 @@ time
 target_fps  RATE  kept by fewer pixels; 0: every frame is full (default: 30)
 regenerate  {auto,never}      make another VDI where it does not serve the view
 draw        {auto,vdi,volume}  what is raycast where the volume is at hand
-status      -     show in a corner how it is drawn: pixels, frames per second, angle
 look:
 """
 

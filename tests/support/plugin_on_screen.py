@@ -92,7 +92,6 @@ def previews_and_screenshots():
 def new_vdi_appears_by_itself():
     """At rest a VDI is made behind the frames, and shown without a frame being asked for."""
     plotter, actor = scene(regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9999))
-    actor.show_status(plotter)
     plotter.show(interactive_update=True, auto_close=False)
     old = actor.vdi
     hand = Hand(plotter)
