@@ -54,7 +54,6 @@ WRONG = {
     "--azimuth": NO_NUMBER,
     "--background": ("x", "''", "0,0", "0,0,2", "0,0,nan", "#12"),
     "--camera-json": NO_JSON,
-    "--check": (),  # depends on what is installed
     "--classification": NO_CHOICE,
     "--clim": ("x 1", "0 nan", "inf 1", "2 1"),
     "--cmap": ("nothing", "''", "1", "nan"),

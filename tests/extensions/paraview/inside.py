@@ -38,6 +38,10 @@ def brain():
     return volume, *functions()
 
 
+def functions_of(array):
+    return simple.GetColorTransferFunction(array), simple.GetOpacityTransferFunction(array)
+
+
 def functions():
     color = simple.GetColorTransferFunction("ImageScalars")
     color.ColorSpace = "RGB"
@@ -167,93 +171,33 @@ def volume(folder):
     simple.SaveData(str(folder / "screen.vdi"), source)
 
 
-def scene(folder):
-    """Show a VDI in a scene in place of ParaView's own volume, and take it away again."""
-    source = brain_source()
-    other = black_view(SIZE)
-    view = black_view(SIZE)
-    show_volume(source, view)
-    ball = simple.Show(simple.Sphere(Center=[90, 20, 90], Radius=40), view)
-    ball.Ambient, ball.Diffuse = 1, 0
-    take_view(source, view)
-
-    def shot(name, where=view):
-        simple.SaveScreenshot(str(folder / f"{name}.png"), where, ImageResolution=SIZE)
-
-    in_scene = simple.VDIInScene(Input=source)
-    for name, turn in (("own", 0), ("turned", 10)):
-        view.GetActiveCamera().Azimuth(turn)
-        simple.Hide(in_scene, view)
-        simple.Show(source.Input, view)
-        shot(f"volume_{name}")
-        simple.Hide(source.Input, view)
-        shot(f"nothing_{name}")
-        outline = simple.Show(in_scene, view)
-        outline.Opacity = 0
-        shot(f"scene_{name}")
-    shot("other", other)
-    simple.Delete(other)
-    simple.Delete(in_scene)
-    del in_scene, outline
-    shot("deleted")
-
-
 def deferred(folder):
     """Edit the colours and opacities of values, from a file and from a source of them."""
     asked = json.loads((folder / "asked.json").read_text())
     reader = simple.OpenDataFile(str(folder / "kept.vdi"))
     simple.SaveData(str(folder / "again.vdi"), reader)
-    in_scene = simple.VDIInScene(Input=reader)
-
-    def show():
-        view = black_view(SIZE)
-        shown = simple.Show(in_scene, view)
-        shown.Opacity = 0
-        view.CameraPosition = asked["camera"]["position"]
-        view.CameraFocalPoint = asked["camera"]["focal_point"]
-        view.CameraViewUp = asked["camera"]["view_up"]
-        view.CameraViewAngle = asked["camera"]["view_angle"]
-        return view, shown
-
-    view, shown = show()
     picture = simple.VDIToImage(Input=reader)
-    table = shown.LookupTable  # what the colour map editor edits
-    ends = [table.RGBPoints[0], table.RGBPoints[-4]]
-    found = {"array": list(shown.ColorArrayName), "range": ends}
+    picture.UpdatePipeline()
+    # What the colour map editor edits
+    table, opacity = functions_of("v")
+    found = {"range": [table.RGBPoints[0], table.RGBPoints[-4]]}
     table.ColorSpace = "RGB"
 
     source = brain_source()
-    source.ColorFunction, source.OpacityFunction = table, table.ScalarOpacityFunction
+    source.ColorFunction, source.OpacityFunction = table, opacity
     source.Classification = "deferred"
     source.ValueRange = [20, 133]
-    source.Importance = [20, 1, 133, 2]
     simple.SaveData(str(folder / "source.vdi"), source)
     made = source.GetClientSideObject().GetOutputDataObject(0).GetMTime()
     of_source = simple.VDIToImage(Input=source)
-    of_source.ColorFunction, of_source.OpacityFunction = table, table.ScalarOpacityFunction
+    of_source.ColorFunction, of_source.OpacityFunction = table, opacity
     for i, look in enumerate(asked["looks"]):
-        table.RGBPoints, table.ScalarOpacityFunction.Points = look
-        simple.SaveScreenshot(str(folder / f"scene_{i}.png"), view, ImageResolution=SIZE)
+        table.RGBPoints, opacity.Points = look
         for name, image in (("file", picture), ("source", of_source)):
             image.UpdatePipeline()
             save_pixels(image, folder / f"{name}_{i}.npy")
     found["idle"] = source.GetClientSideObject().GetOutputDataObject(0).GetMTime() == made
     (folder / "found.json").write_text(json.dumps(found))
-
-    # Another view with a colour map of its own; and both again, from a state
-    _, other = show()
-    of_array = ("POINTS", found["array"][1])
-    simple.ColorBy(other, of_array, separate=True)
-    own = simple.GetColorTransferFunction(of_array[1], other, separate=True)
-    opacity = simple.GetOpacityTransferFunction(of_array[1], other, separate=True)
-    own.ColorSpace = "RGB"
-    own.RGBPoints, opacity.Points = asked["looks"][0]
-    simple.SaveState(str(folder / "state.pvsm"))
-    simple.ResetSession()
-    simple.LoadState(str(folder / "state.pvsm"))
-    for name, view in zip(("last", "first"), simple.GetRenderViews(), strict=True):
-        view.UseFXAA = 0  # no part of ParaView's states
-        simple.SaveScreenshot(str(folder / f"{name}.png"), view, ImageResolution=SIZE)
 
 
 def in_time(folder):
@@ -270,27 +214,20 @@ def in_time(folder):
 
 def settings(folder):
     """Say what the properties became, and what a change of them did."""
-    scalars, color, opacity = brain()
-    source = simple.VDISource(Input=scalars)
+    scalars, color, _ = brain()
+    source = simple.VDISource(Input=scalars)  # it follows the array's functions
     source.WindowSize = [60, 40]
     client = source.SMProxy.GetClientSideObject()
     progress, found = [], {}
     client.AddObserver("ProgressEvent", lambda caller, event: progress.append(caller.GetProgress()))
 
     source.UpdatePipeline()
-    vdi = vdi_from_image(fetched(source))
-    found["grey by default"] = bool((vdi.color[:, :1] == vdi.color).all() and len(vdi.color))
     found["progress"] = len(progress) > 0 and progress[-1] == 1.0
     made = client.GetOutputDataObject(0).GetMTime()
     source.UpdatePipeline()
     found["idle"] = client.GetOutputDataObject(0).GetMTime() == made  # nothing was done again
     found["points before"] = fetched(source).GetNumberOfPoints()
 
-    source.SMProxy.InvokeCommand("TakeTransferFunctions")
-    found["functions"] = [
-        source.ColorFunction.SMProxy is color.SMProxy,
-        source.OpacityFunction.SMProxy is opacity.SMProxy,
-    ]
     picture = simple.VDIToImage(Input=source)
     picture.UpdatePipeline()
     colored = fetched(picture).GetPointData().GetArray("premultiplied").GetRange(2)[1]
@@ -319,72 +256,30 @@ def settings(folder):
     (folder / "settings.json").write_text(json.dumps(found))
 
 
-def series(folder):
-    """Write three VDIs, open them as one series, and show each step."""
-    source = simple.VDISource(Input=simple.Wavelet(), WindowSize=[60, 40])
-    for step, longest in enumerate((3, 5, 9)):
-        source.MaxSupersegments = longest
-        simple.SaveData(str(folder / f"x_{step}.vdi"), source)
-    reader = simple.OpenDataFile([str(folder / f"x_{step}.vdi") for step in range(3)])
-    picture = simple.VDIToImage(Input=reader, Azimuth=30)
-    view = black_view((60, 40))
-    shown = simple.Show(picture, view)
-    found = {
-        "times": list(reader.TimestepValues),
-        "shown": [shown.Representation.GetData(), list(shown.ColorArrayName), shown.MapScalars],
-        "longest": [],
-    }
-    scene = simple.GetAnimationScene()
-    scene.UpdateAnimationUsingDataTimeSteps()
-    for time in range(3):
-        scene.AnimationTime = time
-        simple.Render(view)
-        found["longest"].append(int(vdi_from_image(fetched(reader)).counts.max()))
-        save_pixels(picture, folder / f"step_{time}.npy")
-    shown.MapScalars = 1  # stays as it is set
-    simple.Show(reader, simple.CreateRenderView())
-    found["set by hand"] = shown.MapScalars
-    one = simple.OpenDataFile(str(folder / "x_1.vdi"))
-    found["times of one"] = list(one.TimestepValues)
-    (folder / "series.json").write_text(json.dumps(found))
-
-
 def animation(folder):
-    """Play a series among the objects of a view, and as a picture; then one that grows."""
+    """Show the steps of a series as pictures, as the animation's time goes."""
     reader = simple.OpenDataFile(str(folder / "ball.vdis"))
     picture = simple.VDIToImage(Input=reader, Azimuth=20)
     view = black_view(SIZE)
-    outline = simple.Show(simple.VDIInScene(Input=reader), view)
-    outline.Opacity = 0
-    camera = json.loads((folder / "camera.json").read_text())
-    view.CameraPosition = camera["position"]
-    view.CameraFocalPoint = camera["focal_point"]
-    view.CameraViewUp = camera["view_up"]
-    view.CameraViewAngle = camera["view_angle"]
+    shown = simple.Show(picture, view)
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
     found = {
         "reader": reader.SMProxy.GetXMLName(),
         "times": list(reader.TimestepValues),
         "scene": list(scene.TimeKeeper.TimestepValues),
+        "picture": [shown.Representation.GetData(), list(shown.ColorArrayName), shown.MapScalars],
         "shown": [],
     }
-    simple.SaveAnimation(str(folder / "played.png"), view, ImageResolution=SIZE)
     for i, time in enumerate(json.loads((folder / "times.json").read_text())):
         scene.AnimationTime = time
-        simple.SaveScreenshot(str(folder / f"scene_{i}.png"), view, ImageResolution=SIZE)
-        picture.UpdatePipeline(time)
+        simple.Render(view)
         save_pixels(picture, folder / f"picture_{i}.npy")
         data = reader.GetClientSideObject().GetOutputDataObject(0).GetInformation()
         found["shown"].append(data.Get(vtkDataObject.DATA_TIME_STEP()))
-    # The same with ParaView's outlines kept, so that nothing is executed again
-    simple.GetSettingsProxy("GeneralSettings").CacheGeometryForAnimation = 1
-    for name, time in (("kept", 0.5), ("kept", 4.0), ("kept_0", 0.5)):
-        scene.AnimationTime = time
-        simple.SaveScreenshot(str(folder / f"{name}.png"), view, ImageResolution=SIZE)
-    (folder / "more.vdis").replace(folder / "ball.vdis")
-    simple.ReloadFiles(reader)
-    found["reloaded"] = list(reader.TimestepValues)
+    shown.MapScalars = 1  # stays as it is set
+    simple.Show(reader, simple.CreateRenderView())
+    found["set by hand"] = shown.MapScalars
     (folder / "animation.json").write_text(json.dumps(found))
 
 
@@ -395,15 +290,9 @@ def temporal(folder):
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = (5, 4, 3), (0, 0, 0), (0, 0, 1)
     simple.SetActiveView(view)
     source.SMProxy.InvokeCommand("TakeActiveView")
-    simple.Show(simple.VDIInScene(Input=source), view).Opacity = 0
-    scene = simple.GetAnimationScene()
-    scene.UpdateAnimationUsingDataTimeSteps()
-    (folder / "times.json").write_text(json.dumps(list(scene.TimeKeeper.TimestepValues)))
     for time in (2, 0, 1):
-        scene.AnimationTime = time
-        simple.SaveScreenshot(str(folder / f"scene_{time}.png"), view, ImageResolution=SIZE)
-    simple.SaveData(str(folder / "usual.vdis"), source)
-    simple.SaveData(str(folder / "made.vdis"), source, Precision="exact")
+        source.UpdatePipeline(time)
+        simple.SaveData(str(folder / f"made_{time}.vdi"), source)
 
 
 def mistakes(folder):

@@ -48,10 +48,6 @@ SCREEN = (240, 180)
 #: An opacity and a colour in eight bits each, their product in eight bits: 1.5 / 255 at most.
 BLENDED = 2 / 255
 
-#: SSIM of a VDI in a scene against ParaView's own volume there: measured 0.9998 from the generating
-#: view, 0.9967 turned by 10 degrees, 0.89 without either.
-LIKE_THE_VOLUME = {"own": 0.998, "turned": 0.99}
-
 
 def _missing():
     if shutil.which("pvpython") is None:
@@ -220,30 +216,12 @@ def test_vdi_looks_like_paraviews_own_volume(paraview, tmp_path):
 
 
 @pytest.mark.slow
-def test_vdi_in_a_scene_stands_for_paraviews_own_volume(paraview, tmp_path):
-    """With a ball half inside it: seen where its outline is visible, and gone with its filter."""
-    paraview("scene", tmp_path)
-    for name, least in LIKE_THE_VOLUME.items():
-        judge, found, without = (
-            screenshot(tmp_path / f"{kind}_{name}.png") for kind in ("volume", "scene", "nothing")
-        )
-        assert compare_images(judge, found).ssim > least
-        assert compare_images(judge, without).ssim < 0.95
-    assert screenshot(tmp_path / "other.png").max() == 0
-    np.testing.assert_array_equal(
-        screenshot(tmp_path / "deleted.png"), screenshot(tmp_path / "nothing_turned.png")
-    )
-
-
-@pytest.mark.slow
 def test_settings_reach_the_vdi(paraview, tmp_path):
     paraview("settings", tmp_path)
     found = json.loads((tmp_path / "settings.json").read_text())
-    assert found["grey by default"]
     assert found["progress"]
     assert found["points before"] == 60 * 40
     assert found["idle"]
-    assert found["functions"] == [True, True]
     before, after = found["blue"]
     assert before > 0.1
     assert after == 0.0  # the colour function has no blue any more
@@ -257,23 +235,8 @@ def test_settings_reach_the_vdi(paraview, tmp_path):
     assert camera["parallel_scale"] == pytest.approx(50 * 72 / 40)
 
 
-def test_a_series_is_one_source_with_time_steps(paraview, tmp_path, default_runtime):
-    paraview("series", tmp_path)
-    found = json.loads((tmp_path / "series.json").read_text())
-    assert found["times"] == [0, 1, 2]
-    assert found["times of one"] == []
-    assert found["longest"] == [3, 5, 9]
-    # Colours are shown as they are, without a table, until somebody wants one
-    assert found["shown"] == ["Slice", ["POINTS", "RGBA"], 0]
-    assert found["set by hand"] == 1
-    for step in range(3):
-        vdi = pvdi.read(tmp_path / f"x_{step}.vdi")
-        expected = pvdi.render(vdi, vdi.camera.azimuth(30))
-        assert_pixels_alike(pixels(tmp_path / f"step_{step}.npy", (60, 40)), expected)
-
-
 def test_colour_map_editor_acts_on_values(paraview, tmp_path, default_runtime):
-    """Of a file, in a scene and as a picture; and of a source, which generates nothing again."""
+    """Of a file, and of a source, which generates nothing again."""
     looks = [([[0, 0.2, 1], [1, 0.5, 0]], [0.0, 0.8]), ([[1, 1, 1], [0.9, 0, 0.3]], [0.0, 0.3])]
     low, high = 30.0, 220.0
     ball, camera = soft_ball(12), filling_camera((-1, 1, -1, 1, -1, 1), SCREEN)
@@ -281,8 +244,7 @@ def test_colour_map_editor_acts_on_values(paraview, tmp_path, default_runtime):
         ball, camera, SCREEN, classification="deferred", value_range=(low, high), scalars="v"
     )
     kept.save(tmp_path / "kept.vdi")
-    seen_from = camera.azimuth(10)
-    asked = {"camera": seen_from.to_dict(), "looks": []}
+    asked = {"looks": []}
     for colors, (first, last) in looks:
         points = [low, *colors[0], high, *colors[1]], [low, first, 0.5, 0, high, last, 0.5, 0]
         asked["looks"].append(points)
@@ -290,22 +252,16 @@ def test_colour_map_editor_acts_on_values(paraview, tmp_path, default_runtime):
     assert paraview("deferred", tmp_path).strip() == ""
 
     found = json.loads((tmp_path / "found.json").read_text())
-    assert found == {"array": ["POINTS", "v"], "range": [low, high], "idle": True}
+    assert found == {"range": [low, high], "idle": True}
     assert pvdi.read(tmp_path / "again.vdi").equals(kept)
     brain = pvdi.read(tmp_path / "source.vdi")
     assert brain.value_range == (20, 133)
-    assert brain.importance == ((20, 1), (133, 2))
     for i, (colors, opacities) in enumerate(looks):
         table = pvdi.TransferFunction(colors, opacities, (low, high))
-        expected = over_black(pvdi.render(kept, seen_from, SCREEN, transfer_function=table))
-        assert_alike(screenshot(tmp_path / f"scene_{i}.png"), expected)
         front = pvdi.render(kept, camera, SCREEN, transfer_function=table)
         assert_pixels_alike(pixels(tmp_path / f"file_{i}.npy", SCREEN), front)
         front = pvdi.render(brain, brain.camera, transfer_function=table)
         assert_pixels_alike(pixels(tmp_path / f"source_{i}.npy", SCREEN), front)
-    for name, i in (("first", 0), ("last", 1)):  # from a state, each view by its own colour map
-        again = screenshot(tmp_path / f"{name}.png")
-        np.testing.assert_array_equal(again, screenshot(tmp_path / f"scene_{i}.png"))
 
 
 def ball_at(step):
@@ -325,71 +281,48 @@ def save_steps(folder):
     return balls
 
 
-def assert_alike(found, expected):
-    """Two pictures over black, border pixels and the rounding to bytes apart."""
-    assert expected.max() > 0.2
-    apart = np.abs(found - expected).max(axis=2)
-    assert (apart > BLENDED).mean() <= SHARE_OF_BORDER_PIXELS, apart.max()
-
-
-@pytest.mark.slow
 def test_a_series_plays_with_paraviews_animation(paraview, tmp_path, default_runtime):
-    """In a scene, as a picture and in a saved animation: the step nearest to the time."""
+    """As a picture: the step nearest to the time."""
     times, camera = (0.5, 1.0, 4.0), filling_camera(ball_at(0).bounds, SCREEN)
     look = {"volume_property": ramp(), "window_size": SCREEN}
-    pvdi.generate_series([ball_at(i) for i in range(4)], camera, times=(*times, 5.0), **look).save(
-        tmp_path / "more.vdis"
+    pvdi.generate_series([ball_at(i) for i in range(3)], camera, times=times, **look).save(
+        tmp_path / "ball.vdis"
     )
-    series = pvdi.read(tmp_path / "more.vdis")[:3]
-    series.save(tmp_path / "ball.vdis")
-    seen_from = camera.azimuth(10)
-    (tmp_path / "camera.json").write_text(json.dumps(seen_from.to_dict()))
+    series = pvdi.read(tmp_path / "ball.vdis")
     asked = {4.0: 2, 0.5: 0, 2.4: 1, 2.7: 2, 1.0: 1}
     (tmp_path / "times.json").write_text(json.dumps(list(asked)))
     assert paraview("animation", tmp_path).strip() == ""
     found = json.loads((tmp_path / "animation.json").read_text())
-    assert found["reader"] == "VDISeriesReader"
+    assert found["reader"] == "VDIReader"
     assert found["times"] == found["scene"] == list(times)
     assert found["shown"] == [times[step] for step in asked.values()]
-    assert found["reloaded"] == [*times, 5.0]
-    expected = [over_black(pvdi.render(vdi, seen_from, SCREEN)) for vdi in series]
+    # Colours are shown as they are, without a table, until somebody wants one
+    assert found["picture"] == ["Slice", ["POINTS", "RGBA"], 0]
+    assert found["set by hand"] == 1
     for i, step in enumerate(asked.values()):
-        assert_alike(screenshot(tmp_path / f"scene_{i}.png"), expected[step])
         turned = pvdi.render(series[step], camera.azimuth(20), SCREEN)
         assert_pixels_alike(pixels(tmp_path / f"picture_{i}.npy", SCREEN), turned)
-    assert_alike(screenshot(tmp_path / "kept_0.png"), expected[0])
-    played = sorted(tmp_path.glob("played*.png"))
-    assert len(played) == 3
-    for path, picture in zip(played, expected, strict=True):
-        assert_alike(screenshot(path), picture)
 
 
 @pytest.mark.slow
 def test_vdis_are_made_of_the_time_that_paraview_shows(paraview, tmp_path, default_runtime):
     balls = save_steps(tmp_path)
     assert paraview("temporal", tmp_path).strip() == ""
-    assert json.loads((tmp_path / "times.json").read_text()) == [0, 1, 2]
-    series, usual = (pvdi.read(tmp_path / name) for name in ("made.vdis", "usual.vdis"))
-    assert series.times == usual.times == (0, 1, 2)
-    for made, small in zip(series, usual, strict=True):
-        assert (made.precision, small.precision) == ("exact", "8-byte")
-        assert small.equals(made.with_precision("8-byte"))
-    for step, made in enumerate(series):
-        expected = pvdi.generate(balls[step], made.camera, SCREEN, volume_property=ramp())
+    for step, ball in enumerate(balls):
+        made = pvdi.read(tmp_path / f"made_{step}.vdi")
+        expected = pvdi.generate(ball, made.camera, SCREEN, volume_property=ramp())
         np.testing.assert_array_equal(made.offsets, expected.offsets)
         np.testing.assert_allclose(made.optical_depth, expected.optical_depth, atol=1e-4)
-        picture = over_black(pvdi.render(expected, made.camera, SCREEN))
-        assert_alike(screenshot(tmp_path / f"scene_{step}.png"), picture)
 
 
 def test_mistakes_are_said_and_nothing_breaks(paraview, tmp_path):
     said = paraview("mistakes", tmp_path)
     assert json.loads((tmp_path / "mistakes.json").read_text()) == [0, 30 * 20]
-    assert "VDISource: the camera's position and focal point are the same point" in said
-    assert "VDIToImage: this vtkImageData is not a VDI" in said
-    assert f"VDIReader: {tmp_path}/absent.vdi cannot be read" in said
-    assert f"VDIWriter: {tmp_path}/no folder/x.vdi cannot be written" in said
-    assert "VDISource: vtkUnstructuredGrid is not a uniform grid" in said
+    assert "VDISourceFilter: the camera's position and focal point are the same point" in said
+    assert "VDIToImageFilter: this vtkImageData is not a VDI" in said
+    assert f"VDIFileReader: {tmp_path}/absent.vdi cannot be read" in said
+    assert f"VDIFileWriter: {tmp_path}/no folder/x.vdi cannot be written" in said
+    assert "VDISourceFilter: vtkUnstructuredGrid is not a uniform grid" in said
     assert "Resample To Image" in said
     assert len(said.splitlines()) == 5
 
