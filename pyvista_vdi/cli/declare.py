@@ -90,6 +90,7 @@ _READERS: dict[str, Callable[[str], Any]] = {
 #: What values are called, by the types of options in the records; of others ``NAME``.
 _CALLED = {
     "bool": "-",
+    "OcclusionLike": "-",
     "int": "N",
     "float": "X",
     "MemoryLike": "SIZE",

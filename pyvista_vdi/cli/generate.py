@@ -68,7 +68,7 @@ def as_seen(options: argparse.Namespace, volume: Volume, view: Camera) -> Volume
         raise UnsupportedError("--scheduler is for stores of chunks, such as x.ome.zarr")
     if not isinstance(volume, StoredVolume):
         return volume
-    return volume.at_level("auto" if options.level is None else options.level, view, options.size)
+    return volume.in_view(view, window_size=options.size)
 
 
 def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:

@@ -18,7 +18,7 @@ from pyvista_vdi.errors import (
     UnknownArrayError,
     UnsupportedError,
 )
-from pyvista_vdi.io.vdi_file.description import plain_number
+from pyvista_vdi.io.vdi_file.layout import plain_number
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI, Lists

@@ -10,12 +10,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from paraview import simple, smstate
+from paraview import simple
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkDataObject
 
 import pyvista_vdi
-from pyvista_vdi.vtk_pipeline import vdi_from_image
 
 SIZE = (240, 180)
 #: Every third voxel of the shipped brain, along each axis.
@@ -36,10 +34,6 @@ def brain():
     volume.SampleRateI = volume.SampleRateJ = volume.SampleRateK = STEP
     volume.UpdatePipeline()
     return volume, *functions()
-
-
-def functions_of(array):
-    return simple.GetColorTransferFunction(array), simple.GetOpacityTransferFunction(array)
 
 
 def functions():
@@ -69,12 +63,12 @@ def black_view(size):
     return view
 
 
-def show_picture(picture, size, representation="Slice"):
+def show_picture(picture, size):
     """Show a VDIToImage so that its pixels are the view's."""
     width, height = size
     view = black_view(size)
     shown = simple.Show(picture, view, "UniformGridRepresentation")
-    shown.Representation = representation
+    shown.Representation = "Slice"
     simple.ColorBy(shown, ("POINTS", "RGBA"))
     shown.MapScalars = 0
     view.CameraParallelProjection = 1
@@ -114,12 +108,6 @@ def save_pixels(picture, path):
     np.save(path, vtk_to_numpy(array))
 
 
-def devices(folder):
-    """Say which devices ParaView's Python finds."""
-    found = [[info.platform, info.usable] for info in pyvista_vdi.list_devices()]
-    (folder / "devices.json").write_text(json.dumps(found))
-
-
 def pipeline(folder):
     """Read, generate, write, read, picture, screenshot, states."""
     scene = {
@@ -141,16 +129,11 @@ def pipeline(folder):
     simple.SaveScreenshot(str(folder / "picture.png"), view, ImageResolution=SIZE)
     save_pixels(picture, folder / "pixels.npy")
     simple.SaveState(str(folder / "state.pvsm"))
-    (folder / "state.py").write_text(smstate.get_state())
 
 
 def load(folder, name):
     """Load a state in a fresh ParaView."""
-    path = folder / name
-    if path.suffix == ".py":
-        exec(compile(path.read_text(), str(path), "exec"), {})
-    else:
-        simple.LoadState(str(path))
+    simple.LoadState(str(folder / name))
     view = simple.GetRenderViews()[0]
     view.UseFXAA = 0  # no part of ParaView's states
     simple.SaveScreenshot(str(folder / f"{name}.png"), view, ImageResolution=SIZE)
@@ -168,131 +151,25 @@ def volume(folder):
     picture = simple.VDIToImage(Input=source)
     flat = show_picture(picture, SIZE)
     simple.SaveScreenshot(str(folder / "vdi.png"), flat, ImageResolution=SIZE)
-    simple.SaveData(str(folder / "screen.vdi"), source)
 
 
 def deferred(folder):
-    """Edit the colours and opacities of values, from a file and from a source of them."""
+    """Edit the colours and opacities of a file's values."""
     asked = json.loads((folder / "asked.json").read_text())
     reader = simple.OpenDataFile(str(folder / "kept.vdi"))
     simple.SaveData(str(folder / "again.vdi"), reader)
     picture = simple.VDIToImage(Input=reader)
     picture.UpdatePipeline()
     # What the colour map editor edits
-    table, opacity = functions_of("v")
+    table, opacity = simple.GetColorTransferFunction("v"), simple.GetOpacityTransferFunction("v")
     found = {"range": [table.RGBPoints[0], table.RGBPoints[-4]]}
     table.ColorSpace = "RGB"
 
-    source = brain_source()
-    source.ColorFunction, source.OpacityFunction = table, opacity
-    source.Classification = "deferred"
-    source.ValueRange = [20, 133]
-    simple.SaveData(str(folder / "source.vdi"), source)
-    made = source.GetClientSideObject().GetOutputDataObject(0).GetMTime()
-    of_source = simple.VDIToImage(Input=source)
-    of_source.ColorFunction, of_source.OpacityFunction = table, opacity
     for i, look in enumerate(asked["looks"]):
         table.RGBPoints, opacity.Points = look
-        for name, image in (("file", picture), ("source", of_source)):
-            image.UpdatePipeline()
-            save_pixels(image, folder / f"{name}_{i}.npy")
-    found["idle"] = source.GetClientSideObject().GetOutputDataObject(0).GetMTime() == made
+        picture.UpdatePipeline()
+        save_pixels(picture, folder / f"file_{i}.npy")
     (folder / "found.json").write_text(json.dumps(found))
-
-
-def in_time(folder):
-    """Return the source of a volume in several files, a time step each."""
-    volume = simple.OpenDataFile([str(folder / f"ball_{step}.vti") for step in range(3)])
-    source = simple.VDISource(Input=volume, WindowSize=SIZE, ScalarOpacityUnitDistance=0.2)
-    source.ColorFunction = simple.GetColorTransferFunction("v")
-    source.OpacityFunction = simple.GetOpacityTransferFunction("v")
-    source.ColorFunction.RGBPoints = [0.0, 0.0, 0.2, 1.0, 255.0, 1.0, 0.5, 0.0]
-    source.ColorFunction.ColorSpace = "RGB"
-    source.OpacityFunction.Points = [0.0, 0.0, 0.5, 0.0, 255.0, 0.8, 0.5, 0.0]
-    return source
-
-
-def settings(folder):
-    """Say what the properties became, and what a change of them did."""
-    scalars, color, _ = brain()
-    source = simple.VDISource(Input=scalars)  # it follows the array's functions
-    source.WindowSize = [60, 40]
-    client = source.SMProxy.GetClientSideObject()
-    progress, found = [], {}
-    client.AddObserver("ProgressEvent", lambda caller, event: progress.append(caller.GetProgress()))
-
-    source.UpdatePipeline()
-    found["progress"] = len(progress) > 0 and progress[-1] == 1.0
-    made = client.GetOutputDataObject(0).GetMTime()
-    source.UpdatePipeline()
-    found["idle"] = client.GetOutputDataObject(0).GetMTime() == made  # nothing was done again
-    found["points before"] = fetched(source).GetNumberOfPoints()
-
-    picture = simple.VDIToImage(Input=source)
-    picture.UpdatePipeline()
-    colored = fetched(picture).GetPointData().GetArray("premultiplied").GetRange(2)[1]
-    color.RGBPoints = [0.0, 1.0, 0.0, 0.0, 133.0, 1.0, 0.0, 0.0]
-    picture.UpdatePipeline()
-    red = fetched(picture).GetPointData().GetArray("premultiplied").GetRange(2)[1]
-    found["blue"] = [colored, red]
-
-    source.MaxSupersegments = 3
-    source.Shade = 1
-    source.InterpolationType = "Nearest"
-    source.Coverage = "bounds"
-    source.View = "Camera"
-    source.CameraPosition = [90, -200, 90]
-    source.CameraFocalPoint = [90, 108, 90]
-    source.CameraViewUp = [0, 0, 1]
-    source.CameraParallelProjection = 1
-    source.CameraParallelScale = 50
-    source.Azimuth = 90
-    source.UpdatePipeline()
-    vdi = vdi_from_image(fetched(source))
-    found["metadata"] = vdi.metadata
-    found["longest"] = int(vdi.counts.max())
-    found["camera"] = vdi.camera.to_dict()
-    found["window"] = vdi.window_size
-    (folder / "settings.json").write_text(json.dumps(found))
-
-
-def animation(folder):
-    """Show the steps of a series as pictures, as the animation's time goes."""
-    reader = simple.OpenDataFile(str(folder / "ball.vdis"))
-    picture = simple.VDIToImage(Input=reader, Azimuth=20)
-    view = black_view(SIZE)
-    shown = simple.Show(picture, view)
-    scene = simple.GetAnimationScene()
-    scene.UpdateAnimationUsingDataTimeSteps()
-    found = {
-        "reader": reader.SMProxy.GetXMLName(),
-        "times": list(reader.TimestepValues),
-        "scene": list(scene.TimeKeeper.TimestepValues),
-        "picture": [shown.Representation.GetData(), list(shown.ColorArrayName), shown.MapScalars],
-        "shown": [],
-    }
-    for i, time in enumerate(json.loads((folder / "times.json").read_text())):
-        scene.AnimationTime = time
-        simple.Render(view)
-        save_pixels(picture, folder / f"picture_{i}.npy")
-        data = reader.GetClientSideObject().GetOutputDataObject(0).GetInformation()
-        found["shown"].append(data.Get(vtkDataObject.DATA_TIME_STEP()))
-    shown.MapScalars = 1  # stays as it is set
-    simple.Show(reader, simple.CreateRenderView())
-    found["set by hand"] = shown.MapScalars
-    (folder / "animation.json").write_text(json.dumps(found))
-
-
-def temporal(folder):
-    """Make VDIs of a volume in several files, a time step each, as the animation goes."""
-    source = in_time(folder)
-    view = black_view(SIZE)
-    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = (5, 4, 3), (0, 0, 0), (0, 0, 1)
-    simple.SetActiveView(view)
-    source.SMProxy.InvokeCommand("TakeActiveView")
-    for time in (2, 0, 1):
-        source.UpdatePipeline(time)
-        simple.SaveData(str(folder / f"made_{time}.vdi"), source)
 
 
 def mistakes(folder):
@@ -312,22 +189,6 @@ def mistakes(folder):
     simple.VDIReader(FileName=str(folder / "absent.vdi")).UpdatePipeline()
     simple.SaveData(str(folder / "no folder" / "x.vdi"), source)
     (folder / "mistakes.json").write_text(json.dumps([empty, full]))
-
-
-def arrays(folder):
-    """Use ParaView's own NumPy interface beside ours."""
-    wavelet = simple.Wavelet()
-    results = []
-    for proxy in (
-        simple.PythonCalculator(Input=wavelet, Expression="mag(gradient(RTData))"),
-        simple.ProgrammableFilter(
-            Input=wavelet, Script="output.PointData.append(inputs[0].PointData['RTData'], 'result')"
-        ),
-    ):
-        proxy.UpdatePipeline()
-        results.append(proxy.PointData["result"].GetRange())
-    found = {"numpy": np.__version__, "from": np.__file__, "results": results}
-    (folder / "arrays.json").write_text(json.dumps(found))
 
 
 if __name__ == "__main__":

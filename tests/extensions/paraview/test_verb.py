@@ -6,13 +6,12 @@ import importlib.util
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from command_line import complaint, run
+from command_line import run
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
@@ -39,11 +38,6 @@ def plain_installation(tmp_path, monkeypatch):
     return package
 
 
-def test_paraview_prints_the_plugins_path(capsys):
-    out = run(capsys, "paraview")
-    assert Path(out.strip()).is_file()
-
-
 def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
     out = run(capsys, "paraview", "--environment")
     shown = subprocess.run(
@@ -58,15 +52,6 @@ def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
         f"{site}:/before",
         f"{site}/pyvista_vdi/extensions/paraview/plugin",
     ]
-
-
-def test_paraview_is_not_shown_what_it_cannot_use(plain_installation, capsys):
-    (plain_installation / "opencl" / "__init__.py").unlink()
-    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")
-    (plain_installation / "opencl" / "__init__.py").touch()
-    (plain_installation.parent / "vtkmodules").mkdir()
-    message = complaint(capsys, "paraview", "--environment")
-    assert "holds a VTK of its own" in message
 
 
 def test_a_server_of_several_ranks_is_refused_when_the_plugin_is_loaded():

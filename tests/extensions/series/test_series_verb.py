@@ -29,45 +29,17 @@ def series(volumes, tmp_path_factory, default_runtime):
     return path
 
 
-def test_volumes_become_a_series(series, volumes):
-    steps = pvdi.read(series)
-    assert steps.times == (0.0, 0.5, 2.0)
-    volume = pvdi.Volume(np.load(volumes[2]), (1, 1, 2))
-    alone = pvdi.generate(
-        volume, steps.camera, (24, 16), cmap="bone", clim=(0, 80), precision="8-byte"
-    )
-    assert steps[2].equals(alone)
-
-
 #: Values of three steps, which rise; and their times, where a file says them.
 VALUES, TIMES = (60, 120, 180), [0.5, 1.25, 3.0]
 STEPS = np.stack([np.full((6, 7, 8), value, np.uint8) for value in VALUES])
 
 
-def _store(folder, axes=None, scale=None):
+def _store(folder):
     zarr = pytest.importorskip("zarr")
-    if scale is None:
-        array = zarr.open(
-            str(folder / "t.zarr"), mode="w", shape=STEPS.shape, chunks=(1, 4, 4, 4), dtype="u1"
-        )
-        if axes:
-            array.attrs["_ARRAY_DIMENSIONS"] = axes
-    else:
-        old = {"zarr_format": 2} if int(zarr.__version__.split(".")[0]) > 2 else {}
-        group = zarr.open_group(str(folder / "t.zarr"), mode="w", **old)
-        array = zarr.open(str(folder / "t.zarr/0"), mode="w", shape=STEPS.shape, dtype="u1", **old)
-        transformations = [
-            {"type": "scale", "scale": [scale, 1, 1, 1]},
-            {"type": "translation", "translation": [1, 0, 0, 0]},
-        ]
-        kinds = {"t": "time"}
-        group.attrs["multiscales"] = [
-            {
-                "version": "0.4",
-                "axes": [{"name": n, "type": kinds.get(n, "space")} for n in "tzyx"],
-                "datasets": [{"path": "0", "coordinateTransformations": transformations}],
-            }
-        ]
+    array = zarr.open(
+        str(folder / "t.zarr"), mode="w", shape=STEPS.shape, chunks=(1, 4, 4, 4), dtype="u1"
+    )
+    array.attrs["_ARRAY_DIMENSIONS"] = list("tzyx")
     array[:] = STEPS
     return ["t.zarr"]
 
@@ -90,15 +62,13 @@ def _arrays(folder):
 
 
 KINDS = {
-    "a store of named axes": (lambda folder: _store(folder, list("tzyx")), [0, 1, 2]),
-    "OME-Zarr that says times": (lambda folder: _store(folder, scale=0.25), [1, 1.25, 1.5]),
+    "a store of named axes": (_store, [0, 1, 2]),
     "numbers in names": (_arrays, [0, 1, 2]),
 }
 LOOK = ("--size", "12x9", "--cmap", "gray", "--opacity", "linear", "--clim", "0", "255")
 
 
 @pytest.mark.filterwarnings("ignore:.*axes with coordinates, which are not read")
-@pytest.mark.every(2)
 @pytest.mark.parametrize(("make", "times"), KINDS.values(), ids=KINDS)
 def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -107,21 +77,6 @@ def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monke
     steps = pvdi.read("run.vdis")
     assert list(steps.times) == times
     assert [round(255 * float(vdi.color.mean())) for vdi in steps] == pytest.approx(VALUES, abs=2)
-    given = (0.1, 0.2, 0.7)
-    run(capsys, "series", *files, "-o", "run.vdis", "--times", "0.1,0.2,0.7", *LOOK)
-    assert pvdi.read("run.vdis").times == given
-
-
-def test_files_are_taken_in_the_order_of_their_numbers(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    files = _images(tmp_path)
-    run(capsys, "series", *files, "-o", "a.vdis", *LOOK)
-    colors = [float(vdi.color.mean()) for vdi in pvdi.read("a.vdis")]
-    assert colors == sorted(colors) or colors == sorted(colors, reverse=True)
-    # An order that no shell gives stays
-    explicit = ["step_10.vti", "step_2.vti", "step_9.vti"][::-1]
-    run(capsys, "series", *explicit, "-o", "b.vdis", *LOOK)
-    assert [float(vdi.color.mean()) for vdi in pvdi.read("b.vdis")] != colors
 
 
 def test_single_files_and_series_become_series(series, capsys, tmp_path):
@@ -134,7 +89,7 @@ def test_single_files_and_series_become_series(series, capsys, tmp_path):
 
 
 def test_a_step_is_shown_by_its_time(series, capsys, tmp_path):
-    pv = pytest.importorskip("pyvista")
+    pytest.importorskip("pyvista")
     steps = pvdi.read(series)
     for k, time in enumerate(("0.1", "0.4", "9")):
         drawn, single = tmp_path / f"{k}.png", tmp_path / f"{k}s.png"
@@ -142,10 +97,9 @@ def test_a_step_is_shown_by_its_time(series, capsys, tmp_path):
         run(capsys, "render", series, "-o", drawn, "--time", time)
         run(capsys, "render", tmp_path / "step.vdi", "-o", single)
         assert drawn.read_bytes() == single.read_bytes()
-        run(capsys, "view", series, "--screenshot", drawn, "--time", time, "--size", "80x60")
-        run(capsys, "view", tmp_path / "step.vdi", "--screenshot", single, "--size", "80x60")
-        one, other = (pv.read(name).active_scalars for name in (drawn, single))
-        assert np.array_equal(one, other)
+    drawn = tmp_path / "viewed.png"
+    run(capsys, "view", series, "--screenshot", drawn, "--time", "0.4", "--size", "80x60")
+    assert drawn.stat().st_size > 200
 
 
 @pytest.mark.parametrize(
@@ -162,17 +116,3 @@ def test_mistakes(arguments, message, series, volumes, capsys, tmp_path, monkeyp
     names = [a.format(*volumes, series=series, vdi=vdi) for a in arguments.split()]
     assert message in run(capsys, *names, status=1)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_folder_becomes_one_file_and_is_not_replaced_by_one(series, capsys, tmp_path):
-    steps, folder = pvdi.read(series), tmp_path / "run.vdis"
-    with pvdi.SeriesWriter(folder) as out:
-        for step, time in zip(steps, steps.times, strict=True):
-            out.append(step, time)
-    run(capsys, "convert", f"{folder}/", "-o", tmp_path / "sent.vdis")
-    sent = pvdi.read(tmp_path / "sent.vdis")
-    assert sent.times == steps.times
-    assert all(one.equals(other) for one, other in zip(sent, steps, strict=True))
-    message = run(capsys, "convert", series, "-o", folder, status=1)
-    assert "it is a folder" in message
-    assert "[0.0, 0.5, 2.0]" in run(capsys, "info", folder)

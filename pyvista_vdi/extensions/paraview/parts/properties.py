@@ -141,6 +141,7 @@ Ambient!        Double 0  -
 Diffuse!        Double 1  -
 Specular!       Double 0  -
 SpecularPower!  Double 1  -
+AmbientOcclusion:SetOcclusion  Int 0  bool  {_sentence("ambient_occlusion")}
 Classification             Int 0       (baked|deferred)  {_sentence("classification")}
 ValueRange!                Double 0 0  -                 {_sentence("value_range", ". 0 0: all")}
 MaxSupersegments         {_number("max_supersegments")}

@@ -91,6 +91,10 @@ class VDISourceFilter(Looking, Functions, vtk_pipeline.VDISource):
         """Choose the array, as ``SetInputArrayToProcess``: kind 0 is at points, 1 at cells."""
         self.SetScalars(name or None, "cell" if kind == 1 else "point")
 
+    def SetOcclusion(self, occluded: int) -> None:
+        """Choose whether what is hidden from the light around it is darkened."""
+        self.SetAmbientOcclusion(bool(occluded))
+
     def SetStep(self, distance: float) -> None:
         """Set the length of a step along a ray; 0 is the default one."""
         self.SetSampleDistance(distance or None)
