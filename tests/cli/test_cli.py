@@ -123,7 +123,7 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
             "view a.vdi --cmap bone --screenshot b.png",
             "--cmap=bone is for .*a.vdi has its look",
         ),
-        ("render v.nrrd -o a.png", "v.nrrd is no VDI.*'pyvista-vdi generate v.nrrd -o FILE.vdi'"),
+        ("render v.nrrd -o a.png", "v.nrrd is not a VDI file.*'pyvista-vdi generate'"),
         ("generate v.nrrd -o b.vti", "cannot be written as a VDI: the name must end in .vdi"),
         (
             "generate v.nrrd -o b.vdi --transfer-function tf.json --cmap bone",
