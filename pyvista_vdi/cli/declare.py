@@ -184,7 +184,7 @@ _GROUPS = {
         tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale
         transfer_function""",
     "deferral": """[classified afterwards] Values are kept; convert, render and view take the look.
-        classification value_range importance""",
+        classification value_range""",
 }
 _GROUPS["table"] = f"{_GROUPS['look']} transfer_function"
 

@@ -70,7 +70,7 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
 def refuse_with_values(options: argparse.Namespace) -> None:
     """Refuse, before a volume is read, what does not go with when scalars are classified."""
     if options.classification != "deferred":
-        refuse(options, ("value_range", "importance"), "--classification deferred")
+        refuse(options, ("value_range",), "--classification deferred")
         return
     why = "--classification deferred keeps values, which have no colours yet: "
     found = format_named(options.output)

@@ -174,14 +174,11 @@ def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) ->
         return
     opacity = looked_up(transfer_function, values)[1] * np.gradient(values)
     kept = (values >= low) & (values <= high)
-    if deferred.importance is not None:
-        points, weights = np.transpose(deferred.importance)
-        kept &= np.interp(values, points, weights) > 0
     outside = opacity[~kept].sum()
     if outside > 1e-3 * opacity.sum():
         warn_external(
-            f"the transfer function shows values outside {low:g} to {high:g}, or of importance 0, "
-            f"which this VDI does not keep: {outside / opacity.sum():.1%} of its opacity from "
+            f"the transfer function shows values outside {low:g} to {high:g}, which this "
+            f"VDI does not keep: {outside / opacity.sum():.1%} of its opacity from "
             f"{least:g} to {largest:g}; generate with a wider value_range, or lower the opacity "
             "there"
         )

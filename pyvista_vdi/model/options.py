@@ -321,22 +321,14 @@ class Deferral(Options):
         "All by default. What is outside is empty.",
         takes="RangeLike | None",
     )
-    importance: Any = option(
-        None,
-        "how much errors count over the range, where deferred",
-        "Points (scalar, weight), or weights at equal distances; 1 by default, and 0 is empty.",
-        takes="ArrayLike | None",
-        setting=True,
-    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("value_range", "importance"):
-            if getattr(self, name) is not None and self.classification != "deferred":
-                raise InvalidArgumentError(
-                    f"{name}={getattr(self, name)!r} says what is kept to be classified "
-                    f"afterwards: give classification='deferred' as well, or leave {name} out"
-                )
+        if self.value_range is not None and not self.deferred:
+            raise InvalidArgumentError(
+                f"value_range={self.value_range!r} says what is kept to be classified afterwards: "
+                "give classification='deferred' as well, or leave value_range out"
+            )
         low, high = (0, 1) if self.value_range is None else as_range(self.value_range)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise InvalidArgumentError(

@@ -76,7 +76,6 @@ WRONG = {
     "--generations": NO_COUNT,
     "--half-angle": (*NOT_ABOVE_0, "181"),
     "--host": ("'no such host'", "999.1.1.1"),
-    "--importance": ("x", "''", "1,nan", "5"),
     "--interpolation": NO_CHOICE,
     "--lists": NOT_ABOVE_0,
     "--max-bytes": NOT_ABOVE_0,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.arguments import takes
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_floats, as_range, not_taken
+from pyvista_vdi.model.checks import as_float, as_range, not_taken
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.types import (
@@ -327,12 +327,9 @@ class SourceSettings(OptionMethods, Classifying):
         InvalidArgumentError
             If one is out of range, or they contradict each other.
         """
-        given: dict[str, Any] = {}  # lists, which tell whether others are the same
-        if deferral.importance is not None:
-            given["importance"] = as_floats(deferral.importance).tolist()
-        if deferral.value_range is not None:
-            given["value_range"] = as_range(deferral.value_range)
-        self._change("_deferral", replace(deferral, **given))
+        if deferral.value_range is not None:  # a pair tells whether another is the same
+            deferral = replace(deferral, value_range=as_range(deferral.value_range))
+        self._change("_deferral", deferral)
 
     def GetDeferral(self) -> Deferral:
         """Return when scalars are classified."""

@@ -226,7 +226,6 @@ def deferred(folder):
     source.ColorFunction, source.OpacityFunction = table, table.ScalarOpacityFunction
     source.Classification = "deferred"
     source.ValueRange = [20, 133]
-    source.Importance = [20, 1, 133, 2]
     simple.SaveData(str(folder / "source.vdi"), source)
     made = source.GetClientSideObject().GetOutputDataObject(0).GetMTime()
     of_source = simple.VDIToImage(Input=source)

@@ -20,7 +20,6 @@ TIMES = (0.0, 0.5, 2.0, 4.0)
 KEPT = {
     "classification": "deferred",
     "value_range": RANGE,
-    "settings": pvdi.Settings(importance=[1, 2]),
 }
 LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.8], "clim": (40, 170)}
 
@@ -113,16 +112,3 @@ def test_a_run_goes_on_with_values_of_the_same_range_only(alone, saved, tmp_path
             out.append(alone[0])
     with pytest.raises(InvalidVDIError, match="number 1 keeps values from 0"):
         pvdi.VDISeries([alone[0], other])
-
-
-def test_a_run_goes_on_with_the_same_importance_only(alone, saved, tmp_path):
-    path = shutil.copytree(saved, tmp_path / "run.vdis")
-    with (
-        pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT | {"settings": None}) as out,
-        pytest.raises(InvalidArgumentError, match=r"importance is \(\(20\.0, 1\.0\), .*None"),
-    ):
-        out.append(next(volumes()), 9.0)
-    assert len(pvdi.read(path)) == 4
-    with pvdi.SeriesWriter(path, CAMERA, SIZE, append=True, **KEPT) as out:
-        out.append(next(volumes()), 9.0)
-    assert len(pvdi.read(path)) == 5

@@ -142,13 +142,6 @@ _ARRAYS = (
     '<Property name="Input" function="Input" /></RequiredProperties></ArrayListDomain>'
     "<Documentation>The array that is classified.</Documentation></StringVectorProperty>"
 )
-_IMPORTANCE = (
-    '<DoubleVectorProperty name="Importance" command="AddImportance" repeatable="1" '
-    'clean_command="ClearImportance" repeat_command="1" number_of_elements="0" '
-    'number_of_elements_per_command="2" panel_visibility="advanced"><Documentation>'
-    f"{_sentence('importance', ': pairs of a scalar and a weight')}</Documentation>"
-    f"{_visible_where('Classification')}</DoubleVectorProperty>"
-)
 _FOLLOW = "Use the transfer functions that ParaView has for this array, and follow their changes."
 SOURCE_XML = properties(f"""
 {_ARRAYS}
@@ -162,7 +155,6 @@ Specular!       Double 0  -
 SpecularPower!  Double 1  -
 Classification             Int 0       (baked|deferred)  {_sentence("classification")}
 ValueRange@Classification  Double 0 0  -                 {_sentence("value_range", ". 0 0: all")}
-{_IMPORTANCE}
 MaxSupersegments         {_number("max_supersegments")}
 SampleDistance:SetStep!  {_number("sample_distance", ". 0: the default")}
 Tolerance!               {_number("tolerance")}

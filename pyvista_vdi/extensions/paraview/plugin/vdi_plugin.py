@@ -92,7 +92,6 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
         self._looks = Looks()
         self._deferred = False
         self._value_range: tuple[float, float] | None = None
-        self._importance: list[tuple[float, float]] = []
 
     SetAzimuth, SetElevation = sets("_azimuth"), sets("_elevation")
 
@@ -116,16 +115,6 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
 
     # Two that are equal mean all
     SetValueRange = sets("_value_range", lambda low, high: (low, high) if low != high else None)
-
-    def AddImportance(self, scalar: float, weight: float) -> None:
-        """Append a point to the importance by which a deferred VDI is cut."""
-        self._importance.append((scalar, weight))
-        self.Modified()
-
-    def ClearImportance(self) -> None:
-        """Begin anew."""
-        self._importance.clear()
-        self.Modified()
 
     def SetStep(self, distance: float) -> None:
         """Set the length of a step along a ray; 0 is the default one."""
@@ -156,8 +145,7 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
         image = require_image(vtkDataObject.GetData(inputs[0], 0))
         self._set_view()
         self._set_looks(image)
-        kept = ("deferred", self._value_range, self._importance or None)
-        self.SetDeferral(*kept if self._deferred else ())
+        self.SetDeferral(*("deferred", self._value_range) if self._deferred else ())
         super()._execute(inputs, outputs)
 
     def _set_view(self) -> None:
