@@ -25,6 +25,14 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 
+#: What has gone, and what is done in its place.
+_GONE = {
+    "skip_empty": "what is empty is passed by, without being asked",
+    "status": "call show_status(plotter) of the actor",
+    "resample": "make a uniform grid by PyVista, pyvista.ImageData(...).sample(grid)",
+    "mask": "make the opacity of what is left out 0, or set its points' ghosts (vtkGhostType) to 2",
+}
+
 
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
@@ -40,7 +48,7 @@ def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) ->
         suggestion = own if own in known else near[0] if near else None
         hint = f"did you mean {suggestion!r}?" if suggestion else f"known are {', '.join(known)}"
         if own not in known:
-            hint = next(filter(None, elsewhere), "") or hint
+            hint = _GONE.get(name) or next(filter(None, elsewhere), "") or hint
             if "settings" in known and own in options and options[own].setting:
                 hint = f"pass it by settings=pyvista_vdi.Settings({own}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")

@@ -19,7 +19,6 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
     UnsupportedError,
 )
-from pyvista_vdi.model.standard_cases import filling_camera
 
 VALUES = np.random.default_rng(5).integers(0, 250, (2, 3, 8, 16, 24)).astype(np.uint16)
 AXES = [
@@ -122,66 +121,17 @@ def test_spacing_axes_levels_time_and_channel(image):
         )
 
 
-def test_opacities_of_all_levels_refer_to_the_finest(image):
-    finest, coarsest = (pvdi.read_volume(image[0], level=k) for k in (0, 2))
-    expected = pvdi.Volume(VALUES[0, 0], finest.spacing).default_unit_distance
-    again = pickle.loads(pickle.dumps(coarsest))
-    for volume in (finest, coarsest, coarsest.load(), again):
-        assert volume.default_unit_distance == expected
-
-
-def test_level_of_a_view(image):
-    path, _ = image
-    finest = pvdi.read_volume(path)
-    assert finest.describe() == "level 0 of 3: 24 x 16 x 8 points"
-    view = filling_camera(finest.bounds, (4, 1))
-    chosen = pvdi.read_volume(path, time=1).in_view(view, window_size=(4, 1))
-    assert chosen.level == 1
-    assert chosen.in_view(filling_camera(finest.bounds, (40, 10)), window_size=(40, 10)).level == 0
-    assert chosen.at_level(1).time == 1
-    assert pvdi.read_volume(path, level=0).in_view(view, window_size=(4, 1)).level == 0
-
-
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
         ({"level": 3}, r"from 0, the finest, to 2"),
-        ({"level": "best"}, r"got 'best'"),
         ({"time": 2}, r"has 2 along time, 0 to 1; got 2"),
-        ({"channel": -1}, r"has 3 along channel"),
         ({"channel": "dapi"}, r"no channel 'dapi'"),
     ],
 )
 def test_what_is_not_there_is_named(asked, message, ome):
     with pytest.raises(InvalidArgumentError, match=message):
         pvdi.read_volume(ome, **asked)
-
-
-def test_channels_by_name(ome):
-    file = ome / ".zattrs"
-    attributes = json.loads(file.read_text())
-    attributes["omero"] = {"channels": [{"label": n} for n in ("dapi", "gfp", "red")]}
-    file.write_text(json.dumps(attributes))
-    volume = pvdi.read_volume(ome, channel="gfp")
-    assert volume.name == "gfp"
-    np.testing.assert_array_equal(volume.load().array, VALUES[0, 1])
-
-
-def test_transformations_of_the_whole_image_come_last(ome):
-    more = [
-        {"type": "scale", "scale": [1, 1, 1, 1, 2]},
-        {"type": "translation", "translation": [0, 0, 0, 0, 5]},
-    ]
-    change(ome, lambda image: image.update(coordinateTransformations=more))
-    volume = pvdi.read_volume(ome)
-    assert volume.spacing == (0.5, 0.5, 2.0)
-    assert volume.origin == (65.0, 20.0, 10.0)
-
-
-def test_lengths_in_several_units_are_refused(ome):
-    change(ome, lambda image: image["axes"][2].update(unit="nanometer"))
-    with pytest.raises(UnsupportedError, match="x.ome.zarr.*nanometer, micrometer, micrometer"):
-        pvdi.read_volume(ome)
 
 
 def with_transformation(entry):
@@ -198,34 +148,13 @@ def with_transformation(entry):
             "z, y, x must be among them",
         ),
         (lambda i: i.pop("axes"), InvalidVolumeError, "break OME-Zarr .KeyError: 'axes'"),
-        (lambda i: i.update(datasets=[{"path": "7"}]), InvalidVolumeError, "break OME-Zarr"),
         (with_transformation({"type": "affine"}), UnsupportedError, "type 'affine'"),
-        (
-            with_transformation({"type": "scale", "scale": [1, 2]}),
-            InvalidVolumeError,
-            "2 numbers for 5 axes",
-        ),
     ],
 )
 def test_metadata_that_cannot_be_followed_are_refused(edit, error, message, ome):
     change(ome, edit)
     with pytest.raises(error, match=message):
         pvdi.read_volume(ome)
-
-
-def test_nothing_is_read_when_a_store_is_opened(image, tmp_path):
-    """Chunks that cannot be decoded are only missed when they are asked for."""
-    path = Path(shutil.copytree(image[0], tmp_path / "x.ome.zarr"))
-    files = (file for file in path.rglob("*") if file.is_file() and file.name[0] != ".")
-    chunks = [file for file in files if file.name != "zarr.json"]
-    assert len(chunks) > 80
-    for file in chunks:
-        file.write_bytes(b"rubbish")
-    volume = pvdi.read_volume(path, time=1)
-    view = filling_camera(volume.bounds, (4, 1))
-    assert volume.in_view(view, window_size=(4, 1)).level == 1
-    with pytest.raises(InvalidVolumeError, match=r"x\.ome\.zarr.*copy it from its source"):
-        volume.load()
 
 
 def test_zarr_array_and_group(tmp_path):

@@ -89,6 +89,8 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
         super().__init__()
         self._azimuth = self._elevation = 0.0
         self._kind = "point"
+        self._occluded = False
+        self._occlusion_radius = 0.0
         self._looks = Looks()
         self._deferred = False
         self._value_range: tuple[float, float] | None = None
@@ -115,6 +117,16 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
 
     # Two that are equal mean all
     SetValueRange = sets("_value_range", lambda low, high: (low, high) if low != high else None)
+
+    def SetOcclusion(self, occluded: int) -> None:
+        """Choose whether what is hidden from the light around it is darkened."""
+        self._occluded = bool(occluded)
+        self.SetOcclusionRadius(self._occlusion_radius)
+
+    def SetOcclusionRadius(self, radius: float) -> None:
+        """Set how far around a point that is looked for; 0 is the default radius."""
+        self._occlusion_radius = radius
+        self.SetAmbientOcclusion((radius or True) if self._occluded else None)
 
     def SetStep(self, distance: float) -> None:
         """Set the length of a step along a ray; 0 is the default one."""
@@ -382,7 +394,7 @@ class VDIReader(vtk_pipeline.VDIReader):
     def _execute(self, inputs: Any, outputs: Any) -> None:
         time = wanted_time(outputs.GetInformationObject(0)) or 0.0
         if self._files:  # the last file that is not after the time
-            self._path = self._files[min(max(int(time), 0), len(self._files) - 1)]
+            self._set["file_name"] = self._files[min(max(int(time), 0), len(self._files) - 1)]
         super()._execute(inputs, outputs)
         if len(self._files) > 1:
             image = vtkImageData.GetData(outputs, 0)
