@@ -167,7 +167,8 @@ def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) ->
         return
     low, high = deferred.value_range
     # Sample at the function's nodes, too, which may span a small part of the volume's range
-    nodes = np.linspace(*transfer_function.scalar_range, len(transfer_function.opacities))
+    first, last = transfer_function.scalar_range
+    nodes = np.linspace(first, last, len(transfer_function.opacities))
     places = np.concatenate([np.linspace(least, largest, 4097), nodes.clip(least, largest)])
     values = np.unique(places)
     if len(values) < 2:
