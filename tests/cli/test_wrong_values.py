@@ -69,7 +69,6 @@ WRONG = {
     "--background": ("x", "0,0", "0,0,2", "0,0,nan", "#12"),
     "--device": ("nothing", "99", "-1"),
     "--host": ("'no such host'", "999.1.1.1"),
-    "--importance": ("x", "''", "1,nan", "5"),
     "--opacity": ("nothing", "''", "0,x", "0,nan", "0,1e999"),
     "--size": ("x", "''", "12", "0x3", "-1x3", "12xnan", "99999x3", "3x2x1"),
     "--sweep": ("nothing", "''", "lists=x", "lists=0", "precision=x", "skip-empty=1"),
