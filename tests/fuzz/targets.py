@@ -630,10 +630,7 @@ class _Session:
 
     def render(self) -> None:
         size = self.size()
-        samples = self.choices.pick((None, None, 1, 30, 0, "x", 2.5, float("inf")))
-        image = pvdi.render(
-            *(self.vdi, self.camera, size), **self.cuts(size), preview_samples=samples
-        )
+        image = pvdi.render(*(self.vdi, self.camera, size), **self.cuts(size))
         self.check_image(image, size or self.vdi.window_size)
 
     def render_volume(self) -> None:
