@@ -136,7 +136,7 @@ LENGTHY = {
     "model": "packing",
     "plotting": "add_vdi as_added dial shown volume_files",
     "quality": "view_error",
-    "raycasting": "aligned_view cropping multi_vdi_oracle occupancy packets picking_oracle "
+    "raycasting": "aligned_view cropping multi_vdi_oracle occupancy packets picking_oracle preview "
     "raycast_oracle skipping",
     "reference": "reference",
     "series": "on_device series_files",

@@ -267,6 +267,8 @@ def frame_options(bounds: Any, camera: pvdi.Camera, size: tuple[int, int]) -> di
         "no-skip": {},
         "all": {"opaque_depth": ends, "clipping_planes": [plane], "cropping": (third, "fence")},
         "cutoff": {"settings": pvdi.Settings(transmittance_cutoff=0.5)},
+        "preview-30": {"preview_samples": 30, "opaque_depth": ends, "clipping_planes": [plane]},
+        "preview-9000": {"preview_samples": 9000},
     }
 
 
@@ -290,7 +292,7 @@ def frame_cases() -> Cases:
         vdi = drawn(name, precision)
         own = vdi.camera  # in its own window, a small one, and one in which packets may pay
         views = ((own, vdi.window_size), (own.azimuth(12), (90, 70)), (own.azimuth(85), (230, 210)))
-        if name == "wide":
+        if option == "preview-9000" or name == "wide":
             views = ((own, (40, 30)), (own.azimuth(20), (30, 20)))
         return [
             pvdi.render(vdi, view, size, **frame_options(vdi.bounds, view, size)[option])

@@ -68,6 +68,15 @@ inline Kept kept_parts(const Real *first, const Real *last, Real r_first, Real r
     return kept;
 }
 
+// Whether r lies in a kept part.
+inline Int is_kept(const Kept *kept, Real r)
+{
+    Int inside = 0;
+    for (int n = 0; n < MOST_KEPT; ++n)
+        inside = inside || (r >= kept->from[n] && r < kept->to[n]);
+    return inside;
+}
+
 // The part of [from, to] that lies in the n-th kept part; empty where not *from < *to.
 inline void cut_to_part(const Kept *kept, int n, Real *from, Real *to)
 {

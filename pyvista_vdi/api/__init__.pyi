@@ -73,9 +73,9 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI | DeferredVDI | VD
 def render(
     vdi: ShownLike | Sequence[ShownLike], camera: CameraLike, window_size: WindowSize | None = None,
     *, clipping_planes: ArrayLike | Sequence[ArrayLike | None] | None = None, cropping: CroppingLike
-    | None = None, opacity_multiplier: float | Sequence[float] = 1.0, settings: Settings | None =
-    None, opaque_depth: ArrayLike | None = None, model_transforms: Sequence[ArrayLike] | None =
-    None, device: DeviceLike | None = None, **look: Any,
+    | None = None, opacity_multiplier: float | Sequence[float] = 1.0, preview_samples: int | None =
+    None, settings: Settings | None = None, opaque_depth: ArrayLike | None = None, model_transforms:
+    Sequence[ArrayLike] | None = None, device: DeviceLike | None = None, **look: Any,
 ) -> NDArray[np.float32]: ...
 def render_depth(
     vdi: ShownLike, camera: CameraLike, window_size: WindowSize | None = None, *, clipping_planes:

@@ -109,11 +109,12 @@ def render(
     elif look:
         refuse_unknown(look, "render", _names(render))
     if isinstance(vdi, list | tuple) or model_transforms is not None:
-        cutoff = {"transmittance_cutoff": options.pop("transmittance_cutoff")}
-        if RenderOptions.checked(**cutoff).given:
-            raise InvalidArgumentError(
-                "transmittance_cutoff is for a single VDI: leave it out for several"
-            )
+        remedies = {
+            "preview_samples": "give several a smaller window_size",
+            "transmittance_cutoff": "leave it out for several",
+        }
+        for name in RenderOptions.checked(**{name: options.pop(name) for name in remedies}).given:
+            raise InvalidArgumentError(f"{name} is for a single VDI: {remedies[name]}")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
         several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]

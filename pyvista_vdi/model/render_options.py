@@ -22,6 +22,8 @@ from pyvista_vdi.model.types import Coverage, Draw, Policy
 #: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
 #: more than that.
 TRANSMITTANCE_CUTOFF = 1e-6
+#: Most samples of a ray in a preview: each has a half, and float32 counts halves up to 2^24.
+MAX_PREVIEW_SAMPLES = 2**23
 
 #: Origin and normal of each plane; the side that the normal points to is kept.
 Planes: TypeAlias = tuple[tuple[float, ...], ...]
@@ -91,6 +93,15 @@ class RenderOptions(SceneOptions):
     Options that compare equal give the same picture of the same view.
     """
 
+    preview_samples: int | None = option(
+        None,
+        "look a VDI up at so many points of each ray",
+        "An approximation (paper section 5); a smaller ``window_size`` is the better one. For a "
+        "single VDI only.",
+        check=Number(
+            f"a whole number from 1 to {MAX_PREVIEW_SAMPLES}", 1, MAX_PREVIEW_SAMPLES, whole=True
+        ),
+    )
     transmittance_cutoff: float = option(
         TRANSMITTANCE_CUTOFF,
         "a ray ends where less light than this is left, 0 to below 1",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pyvista_vdi.device import KernelDeclaration, Runtime
-from pyvista_vdi.device.constants import COLUMN_ITEMS, GROUP, part_columns
+from pyvista_vdi.device.constants import COLUMN_ITEMS, GROUP, block_items, part_columns
 from pyvista_vdi.model.float32_limits import summation
 from pyvista_vdi.raycasting import kernels
 from pyvista_vdi.raycasting.packets import LANES
@@ -37,6 +37,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     ==========  =====================================================  ========================
     asked for   where                                                  kernel
     ==========  =====================================================  ========================
+    a preview   everywhere                                             ``preview``
     segments    CPU; lists suit blocks                                 ``segments``, LANES=16
     segments    elsewhere                                              ``segments``
     first hits  everywhere                                             ``first_hits``
@@ -53,7 +54,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     """
     prepared, options = scene.prepared, scene.options
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
-    compensated = summation(prepared.most_media)
+    compensated = summation(options.preview_samples or prepared.most_media)
     sums: dict[str, int | str] = {"COMPENSATED": compensated}
     walk: dict[str, int | str] = {
         "CROPPED": int(bool(scene.cropped.forms)),
@@ -61,6 +62,12 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     }
     double_float, cropped = prepared.double_float, walk["CROPPED"]
     suit_blocks = not double_float and not prepared.long_offsets
+
+    if options.preview_samples is not None:
+        switches = {**lists, **sums, "CROPPED": cropped}
+        counts = {"counts": prepared.occupancy.counts, "samples": options.preview_samples}
+        items = block_items(*scene.size)
+        return Variant(kernels.PREVIEW, switches, items, GROUP, counts, whole=True)
 
     # What rays cross of one of several VDIs
     if scene.segments:

@@ -8,6 +8,7 @@ SEGMENTS = KernelDeclaration("multi_vdi/segments.cl", "segments")
 MERGE = KernelDeclaration("multi_vdi/merge.cl", "merge")
 # A ray in a work-item
 FIRST_HITS = KernelDeclaration("raycasting/first_hits.cl", "first_hits")
+PREVIEW = KernelDeclaration("raycasting/preview.cl", "preview")
 # Sixteen rays in a work-item, on CPUs
 RAYCAST_PACKETS = KernelDeclaration("raycasting/packets.cl", "raycast_packets")
 RAYCAST_ALIGNED_VIEW = KernelDeclaration("raycasting/aligned_view.cl", "raycast_aligned_view")

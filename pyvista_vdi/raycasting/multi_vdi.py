@@ -38,7 +38,8 @@ class PlacedVDI:
     """A VDI and where it is in a scene.
 
     The ``model_transform`` of ``camera``, the new view, says where this VDI's model frame is.
-    ``options`` say how it looks; several VDIs have no other cutoff than the default.
+    ``options`` say how it looks; several VDIs have neither previews nor another cutoff than the
+    default.
     """
 
     vdi: VDI
@@ -232,7 +233,7 @@ def owned_image(
 
 def _merged(options: RenderOptions) -> RenderOptions:
     """Return the options of a VDI that is merged with others: all end at the same transmittance."""
-    return options.replace(transmittance_cutoff=TRANSMITTANCE_CUTOFF)
+    return options.replace(transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None)
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def digest(runtime, **options):
     parts = [vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth]
     parts.append(raycast_volume(scene, function, frame))
     for new in turned(camera, scene):
-        for shown in ({}, {"skip_empty": False}):
+        for shown in ({}, {"skip_empty": False}, {"preview_samples": 20}):
             parts.append(render_vdi(vdi, new, SIZE, device=runtime, **shown))
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 

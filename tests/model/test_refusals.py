@@ -21,6 +21,7 @@ from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import (
+    MAX_PREVIEW_SAMPLES,
     RenderOptions,
 )
 
@@ -115,6 +116,8 @@ REFUSED = {
         ({"clipping_planes": [[0, 0, 0, 0, 0, 0]]}, "plane"),
         ({"cropping": (1, 2, 3)}, "cropping"),
         ({"opacity_multiplier": -1}, "opacity_multiplier"),
+        ({"preview_samples": "8"}, "preview_samples must be .* got '8'"),
+        ({"preview_samples": MAX_PREVIEW_SAMPLES + 1}, "preview_samples must be"),
         ({"transmittance_cutoff": 1}, "transmittance_cutoff must be a number from 0"),
     ],
     TransferFunction: [

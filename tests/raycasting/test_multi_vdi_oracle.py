@@ -220,6 +220,7 @@ CUTOFF = pvdi.Settings(transmittance_cutoff=0.1)
         ([ONE, ONE], {"clipping_planes": 5}, "for each of the 2 VDIs"),
         ([ONE, ONE], {"cropping": BOUNDS}, "a list with an entry for each of the 2 VDIs"),
         ([ONE, ONE], {"opacity_multiplier": [1.0]}, "or one for each of the 2 VDIs"),
+        ([ONE, ONE], {"preview_samples": 9}, "preview_samples is for a single VDI"),
         ([ONE, ONE], {"settings": CUTOFF}, "transmittance_cutoff is for a single VDI"),
     ],
 )
