@@ -8,7 +8,7 @@ from plugin_scenes import CLASSIFICATION, soft_ball
 from watched_windows import finish, frame, picture_of, turned
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
+from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.model.standard_cases import filling_camera
 
 
@@ -77,16 +77,6 @@ def test_a_set_from_a_file_is_read_ahead_as_far_as_memory_goes(plotter, made, tm
         finish("set")
     assert len(held.on_devices()) == 1 + 3  # as many as are blended
     np.testing.assert_array_equal(frame(plotter), picture_of(held.collection, plotter))
-
-
-def test_a_set_makes_no_vdi_at_rest(plotter, made):
-    actor, n = shown(plotter, made), len(made)
-    for _ in range(3):
-        frame(plotter)
-        finish("set")
-    assert (len(made), actor.status.stand_in) == (n, False)
-    with pytest.raises(InvalidArgumentError, match="without a volume"):
-        actor.regenerate()
 
 
 DEFERRED = {"classification": "deferred", "value_range": (1, 250), "precision": "8-byte"}

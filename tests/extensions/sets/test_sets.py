@@ -86,18 +86,13 @@ def test_of_two_eyes_in_a_line_the_one_at_that_distance_is_nearest(made, around)
 def test_weights_add_up_and_nothing_jumps_on_a_path(made, around):
     # In steps of .05 degrees a distance changes by that at most, a share by twice that over the
     # reach: at least a few hundredths of a degree but where three others are as near
-    previous = None
-    for azimuth in np.arange(0, 20, 0.05):
-        view = around.azimuth(azimuth)
-        weights = made.weights(view)
-        assert weights[0][0] == made.nearest(view)
-        assert sum(w for _, w in weights) == pytest.approx(1)
+    path = [made.weights(around.azimuth(azimuth)) for azimuth in np.arange(0, 20, 0.05)]
+    dense = np.zeros((len(path), len(made)))
+    for step, weights in enumerate(path):
         assert 1 <= len(weights) <= 3
-        dense = np.zeros(len(made))
-        dense[[i for i, _ in weights]] = [w for _, w in weights]
-        if previous is not None:
-            assert np.abs(dense - previous).max() < 0.1
-        previous = dense
+        dense[step, [i for i, _ in weights]] = [w for _, w in weights]
+    assert np.allclose(dense.sum(axis=1), 1)
+    assert np.abs(np.diff(dense, axis=0)).max() < 0.1
 
 
 def test_a_picture_is_the_weighted_mean(made, around):
@@ -111,9 +106,8 @@ def test_a_picture_is_the_weighted_mean(made, around):
 
 
 def test_pick_depth_and_a_joint_scene_are_those_of_the_nearest(made, around):
-    view = around.azimuth(20)
+    view, middle = around.azimuth(20), (SIZE[0] // 2, SIZE[1] // 2)
     nearest = made[made.nearest(view)]
-    middle = (SIZE[0] // 2, SIZE[1] // 2)
     assert pvdi.pick(made, view, middle) == pvdi.pick(nearest, view, middle, SIZE)
     assert np.array_equal(pvdi.render_depth(made, view), pvdi.render_depth(nearest, view, SIZE))
     together = pvdi.render([made, made[0]], view, window_size=SIZE)
@@ -122,16 +116,8 @@ def test_pick_depth_and_a_joint_scene_are_those_of_the_nearest(made, around):
 
 def test_a_vdi_of_a_set_is_what_generate_makes(made, volume):
     vdi = made[0]
-    alone = pvdi.generate(
-        volume,
-        vdi.camera,
-        vdi.window_size,
-        transfer_function=_table(),
-        max_supersegments=8,
-        settings=pvdi.Settings(view_cone=30),
-        precision="8-byte",
-    )
-    assert vdi.precision == "8-byte"
+    how = {"settings": pvdi.Settings(view_cone=30), "precision": "8-byte", "max_supersegments": 8}
+    alone = pvdi.generate(volume, vdi.camera, vdi.window_size, transfer_function=_table(), **how)
     assert vdi.equals(alone)
 
 
