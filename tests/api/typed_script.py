@@ -57,7 +57,7 @@ def with_pyvista(plotter: pv.Plotter, grid: pv.ImageData) -> pvdi.VDI:
 
 def of_several(folder: Path, volumes: list[pvdi.Volume], camera: pvdi.Camera) -> None:
     """Make VDIs of several times, and of several views."""
-    series = pvdi.generate_series(volumes, camera, (64, 48), cmap="bone", quality="high")
+    series = pvdi.generate_series(volumes, camera, (64, 48), cmap="bone")
     with pvdi.SeriesWriter(folder / "a.vdis", camera, (64, 48), level=3, clim=(0, 9)) as out:
         out.append(volumes[0], 0.5)
     views = pvdi.generate_set(volumes[0], [camera], lists=0.5)
