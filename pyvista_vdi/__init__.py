@@ -16,6 +16,7 @@ from pyvista_vdi.plotting import registration
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
+    "AmbientOcclusion": "model.ambient_occlusion",
     "Camera": "model.camera",
     "DeferredVDI": "model.deferred",
     "Cropping": "model.cropping",
@@ -23,7 +24,6 @@ _HOMES = {
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
-    "Report": "device.report",
     "Shading": "model.lighting",
     "TransferFunction": "model.transfer_function",
     "VDI": "model.vdi",
@@ -35,7 +35,6 @@ _HOMES = {
     "describe_devices": "device",
     "list_devices": "device",
     "list_volumes": "io.volumes",
-    "open_volume": "io.stores",
     "presets": "model.presets",
     "read_volume": "io.volumes",
     **dict.fromkeys(("Settings", "estimate", "generate", "pick", "read"), "api"),

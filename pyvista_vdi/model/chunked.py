@@ -61,7 +61,7 @@ class ChunkedArray:
                 )
             raise InvalidVolumeError(
                 f"a volume is a three-dimensional array; got shape {tuple(source.shape)}: choose "
-                "time and channel (pyvista_vdi.open_volume does), or index the array"
+                "time and channel (pyvista_vdi.read_volume does), or index the array"
             )
         if any(math.isnan(n) for n in self._array.shape):
             raise InvalidVolumeError(

@@ -395,7 +395,7 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source.SetInputDataObject(data)
     source.SetScalars(name, preference)
     source.SetOptions(asked.options)
-    source.SetTarget(asked.target)
+    source.SetDial(**asked.target.given)
     source.SetDevice(asked.making.device)
     source.SetProgressCallback(progress_callback(asked.making.progress_bar))
     if asked.making.camera is not None:

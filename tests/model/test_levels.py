@@ -21,10 +21,8 @@ FROM_TEN = Camera(position=(0, 0, 10), focal_point=(0, 0, 0), view_up=(0, 1, 0),
     [(1000, 0), (145, 0), (143, 1), (73, 1), (71, 2), (37, 2), (35, 3), (9, 3)],
 )
 def test_level_is_the_coarsest_that_is_no_coarser_than_half_a_list(lists, level):
-    found, why = required_level(LEVELS, FROM_TEN, (lists, lists), "mm")
-    assert found == level
-    assert "half a list's width" in why
-    assert f"{9 / lists:.3g} mm" in why
+    for size in ((lists, lists), (2 * lists, lists)):
+        assert required_level(LEVELS, FROM_TEN, size) == level
 
 
 def test_only_what_is_in_the_window_is_near():
@@ -42,8 +40,6 @@ def test_only_what_is_in_the_window_is_near():
 
 def test_in_the_volume_the_finest_and_past_it_the_coarsest():
     inside = FROM_TEN.replace(position=(0, 0, 0.5), focal_point=(0, 0, -1))
-    assert required_level(LEVELS, inside, (9, 9)) == (0, "the finest, as V_O is in the volume")
+    assert required_level(LEVELS, inside, (9, 9)) == 0
     away = FROM_TEN.replace(focal_point=(0, 0, 20))
-    level, why = required_level(LEVELS, away, (9000, 9000))
-    assert level == 3
-    assert "sees nothing" in why
+    assert required_level(LEVELS, away, (9000, 9000)) == 3

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pyvista_vdi import VDI, Camera
-from pyvista_vdi.io.vdi_file.codes import packed_of_stored, stored_rows
+from pyvista_vdi.io.vdi_file.reader import packed_of_stored
+from pyvista_vdi.io.vdi_file.writer import stored_rows
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
 
 BOUNDS = (-1, 1, -1, 1, -1, 1)

@@ -18,7 +18,7 @@ from pyvista_vdi.errors import VDIError, VDIFileError, warn_external
 from pyvista_vdi.extensions.deep_exr.samples import media
 from pyvista_vdi.extensions.deep_exr.view import bounds_of_lists, camera_of, view_matrices
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.vdi_file.description import describe, from_json, number, to_json
+from pyvista_vdi.io.vdi_file.layout import describe, from_json, number, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.vdi import VDI

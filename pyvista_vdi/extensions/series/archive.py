@@ -19,7 +19,7 @@ from pyvista_vdi.io.files import format_named, opened
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader, writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
-from pyvista_vdi.io.vdi_file.description import from_json, to_json
+from pyvista_vdi.io.vdi_file.layout import from_json, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.classification import IN_PLACE, Look

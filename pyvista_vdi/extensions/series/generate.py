@@ -52,7 +52,7 @@ def generate_series(
     ----------
     volumes : iterable or VTK source
         The steps: each what :func:`pyvista_vdi.generate` takes. They are taken one by one. Or a VTK
-        or PyVista source that has time steps; or what :func:`pyvista_vdi.open_volume` returned for
+        or PyVista source that has time steps; or what :func:`pyvista_vdi.read_volume` returned for
         a store that has. Of a multi-scale store, steps are of the level that the view requires,
         unless another was asked for.
     camera : pyvista.Camera or vtkCamera or Camera

@@ -16,7 +16,7 @@ from pyvista_vdi.extensions.series.archive import SERIES, Archive, head_bytes, n
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import check_range, checked_time, times_of
 from pyvista_vdi.io import check_write_options
-from pyvista_vdi.io.vdi_file.description import to_json
+from pyvista_vdi.io.vdi_file.layout import to_json
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
@@ -238,6 +238,6 @@ def _locked(folder: Path) -> IO[bytes]:
 
 def _view_and_look(vdi: Any) -> dict[str, Any]:
     """Return what is the same in all steps of a series that is continued."""
-    said = {n: vdi.metadata.get(n) for n in ("transfer_function", "lights")}
+    said = {n: vdi.metadata.get(n) for n in ("transfer_function", "lights", "ambient_occlusion")}
     names = ("camera", "window_size", "value_range", "importance")
     return {n: getattr(vdi, n, None) for n in names} | json.loads(to_json(said))  # type: ignore[no-any-return]

@@ -38,12 +38,15 @@ def read_volume(
 
     The format is known by the name, or else by the content. Coordinates are the file's own:
     those of NIfTI grow to the right, the front and the head, those of DICOM and of most MetaImages
-    to the left, the back and the head. A store is opened, not read: see :func:`open_volume`.
+    to the left, the back and the head. Of a store only the
+    metadata are read now, and its voxels chunk by chunk, where a part is needed: it is a
+    :class:`StoredVolume` (docs/large_volumes.md).
 
     Parameters
     ----------
     path : path-like
-        Any file of the table in ``docs/files.md``; ``"x.h5::/path"`` is an array in a store.
+        Any file of the table in ``docs/files.md``; a store, ``"x.zarr"``, ``"x.ome.zarr"``
+        (OME-Zarr 0.4 or 0.5), or an HDF5 file; ``"x.h5::/path"`` is an array in it.
     array, series : int or str, optional
         Which one, by its number or its name, where a file holds several; both mean the same.
     channel : int or str, optional
@@ -51,7 +54,7 @@ def read_volume(
     time : int, optional
         Which time step, where there are several.
     level : int or "auto", optional
-        Level of a store's multi-scale image; 0, the finest, by default.
+        Level of a store's multi-scale image, 0 is the finest; by default it is left to the view.
     spacing, origin : (float, float, float), optional
         In place of those of the file, along x, y and z.
 

@@ -116,13 +116,12 @@ def accessors(
     name: str,
     what: str,
     default: Any = None,
-    check: Callable[[Any], Any] = lambda value: value,
+    check: Callable[..., Any] = lambda value: value,
 ) -> tuple[Callable[..., None], Callable[..., Any]]:
     """Return an algorithm's Set and Get of a setting; ``check`` returns a value as it is kept."""
 
-    def setter(self: Any, *value: Any) -> None:
-        # Several numbers may come one by one
-        self._change(name, check(value[0] if len(value) == 1 else value), default)
+    def setter(self: Any, *value: Any, **named: Any) -> None:
+        self._change(name, check(*value, **named), default)
 
     def getter(self: Any) -> Any:
         return self._set.get(name, default)

@@ -18,7 +18,7 @@ from pyvista_vdi.errors import (
     UnknownArrayError,
     UnsupportedError,
 )
-from pyvista_vdi.io.vdi_file.description import plain_number
+from pyvista_vdi.io.vdi_file.layout import plain_number
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI, Lists
@@ -53,10 +53,10 @@ def require_image(data: Any) -> vtk.vtkImageData:
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
         )
     raise UnsupportedError(
-        f"{type(data).__name__} is not a uniform grid, which is all that a VDI is "
-        "made from: resample a grid (pyvista.ImageData(...).sample(grid), or in ParaView "
-        "Resample To Image), take the blocks of a composite one by one, and voxelise a "
-        "surface by PyVista (surface.voxelize_binary_mask())"
+        f"{type(data).__name__} is not a uniform grid, which is all that a VDI is made from: "
+        "resample a grid (pyvista.ImageData(...).sample(grid), vtkResampleToImage, or in ParaView "
+        "Resample To Image), take the blocks of a composite one by one, and voxelise a surface by "
+        "PyVista (surface.voxelize_binary_mask())"
     )
 
 
@@ -73,7 +73,8 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         )
     dimensions = image.GetDimensions()
     name = array.GetName() or "values"
-    of_cells = is_of_cells(image, array)
+    points = image.GetPointData()
+    of_cells = all(points.GetArray(i) is not array for i in range(points.GetNumberOfArrays()))
     if of_cells:
         if min(dimensions) < 2:
             raise InvalidVolumeError(
@@ -87,41 +88,16 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         to_points.SetInputData(cells)
         to_points.Update()
         array = to_points.GetOutput().GetPointData().GetScalars()
-    direction = image.GetDirectionMatrix()
+    direction, first = image.GetDirectionMatrix(), [0.0, 0.0, 0.0]
+    image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
     return Volume(
         as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
         image.GetSpacing(),
-        first_point(image),
+        first,
         [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
         name=name,
         blanked=_blanked(image, of_cells),
     )
-
-
-def is_of_cells(data: Any, array: vtk.vtkDataArray) -> bool:
-    """Whether an array of a data set's is none of its points'."""
-    points = data.GetPointData()
-    return all(points.GetArray(i) is not array for i in range(points.GetNumberOfArrays()))
-
-
-def first_point(image: vtk.vtkImageData) -> list[float]:
-    """Return where the first point of an image lies, whatever its extent begins with."""
-    first: list[float] = [0.0, 0.0, 0.0]
-    image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
-    return first
-
-
-def ghosts_of(image: vtk.vtkImageData) -> dict[str, NDArray[np.uint8]]:
-    """Return the ghost arrays that mark anything, of "point" and "cell", (nz, ny, nx)."""
-    nx, ny, nz = image.GetDimensions()
-    found = {}
-    for kind, array, shape in (
-        ("point", image.GetPointGhostArray(), (nz, ny, nx)),
-        ("cell", image.GetCellGhostArray(), (nz - 1, ny - 1, nx - 1)),
-    ):
-        if array is not None and (values := as_numpy(array)).any():
-            found[kind] = values.reshape(shape)
-    return found
 
 
 def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
@@ -134,9 +110,15 @@ def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | Non
     """
     own = image.GetPointData().GetArray(BLANKED)
     blanked = None if own is None else as_numpy(own).reshape(image.GetDimensions()[::-1])
-    for kind, marks in ghosts_of(image).items():
-        cells = kind == "cell" and of_cells
-        texels = np.pad(marks > 0, (0, 1)) if kind == "cell" and not cells else marks > 0
+    nx, ny, nz = image.GetDimensions()
+    for cells, array, shape in (
+        (False, image.GetPointGhostArray(), (nz, ny, nx)),
+        (True, image.GetCellGhostArray(), (nz - 1, ny - 1, nx - 1)),
+    ):
+        if array is None or not (marks := as_numpy(array).reshape(shape) > 0).any():
+            continue
+        texels = np.pad(marks, (0, 1)) if cells and not of_cells else marks
+        cells &= of_cells
         points = [n + cells for n in texels.shape]
         texels = np.pad(texels, 1, mode="edge")
         octants = np.zeros(points, np.uint8)

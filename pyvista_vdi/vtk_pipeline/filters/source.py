@@ -18,7 +18,6 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.arguments import takes
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats, as_range, not_taken, one_of
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
@@ -109,9 +108,19 @@ def checked_options(options: GenerationOptions) -> GenerationOptions:
     return options
 
 
-def checked_size(size: Any) -> tuple[int, int] | None:
-    """Return a window's size; ``None`` as it is."""
-    return None if size is None else check_window_size(size)
+def checked_size(*size: Any) -> tuple[int, int] | None:
+    """Return a window's size, given as two numbers or as a pair; ``None`` as it is."""
+    return None if size == (None,) else check_window_size(size[0] if len(size) == 1 else size)
+
+
+def checked_deferral(*given: Any, **named: Any) -> Deferral:
+    """Return when scalars are classified; lists in it tell whether others are the same."""
+    found, lists = Deferral(*given, **named), {}
+    if found.importance is not None:
+        lists["importance"] = as_floats(found.importance).tolist()
+    if found.value_range is not None:
+        lists["value_range"] = as_range(found.value_range)
+    return replace(found, **lists)
 
 
 class VDISource(OptionMethods, Classifying):
@@ -158,10 +167,20 @@ class VDISource(OptionMethods, Classifying):
         GenerationOptions(),
         checked_options,
     )
-    SetTarget, GetDial = accessors(
+    SetDial, GetDial = accessors(
         "target",
-        "what the VDI is to reach, a ``QualityTarget``; ``None`` where nothing is to be chosen",
-        check=lambda target: target or None,
+        "what the VDI is to reach, by the arguments of ``QualityTarget``; without any, nothing. It "
+        "chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to "
+        "have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata['dial']`` says what",
+        check=lambda *given, **named: QualityTarget(*given, **named) or None,
+    )
+    SetDeferral, GetDeferral = accessors(
+        "deferral",
+        "when scalars are classified, by the arguments of ``Deferral``; without any, as the VDI is "
+        "made. ``'deferred'`` makes a ``DeferredVDI``: of the volume property, which may be left "
+        "out, only the interpolation counts then",
+        Deferral(),
+        checked_deferral,
     )
     SetDevice, GetDevice = accessors("device", "the OpenCL device; ``None`` is the default one")
     SetMetadata, GetMetadata = accessors(
@@ -170,7 +189,6 @@ class VDISource(OptionMethods, Classifying):
     SetProgressCallback, GetProgressCallback = accessors(
         "progress", "a callable that gets the fraction done; if it returns ``False`` the work stops"
     )
-    _, GetDeferral = accessors("deferral", "when scalars are classified", Deferral())
 
     def __init__(self) -> None:
         super().__init__(
@@ -290,40 +308,6 @@ class VDISource(OptionMethods, Classifying):
     def _is_shaded(self) -> bool:
         prop = self.GetVolumeProperty()
         return prop is not None and bool(prop.GetShade())
-
-    @takes(target=QualityTarget, order=("quality",), flat=True)
-    def SetDial(self, target: QualityTarget) -> None:
-        """Choose settings by what the VDI is to reach; without arguments, no longer.
-
-        It chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to
-        have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata["dial"]`` says what it
-        chose.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If one is out of range, or they contradict each other.
-        """
-        self.SetTarget(target)
-
-    @takes(deferral=Deferral, order=Deferral.declared, flat=True)
-    def SetDeferral(self, deferral: Deferral) -> None:
-        """Choose when scalars are classified; without arguments, as the VDI is made.
-
-        ``"deferred"`` makes a :class:`~pyvista_vdi.DeferredVDI`: of the volume property, which may
-        be left out, only the interpolation counts then.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If one is out of range, or they contradict each other.
-        """
-        given: dict[str, Any] = {}  # lists, which tell whether others are the same
-        if deferral.importance is not None:
-            given["importance"] = as_floats(deferral.importance).tolist()
-        if deferral.value_range is not None:
-            given["value_range"] = as_range(deferral.value_range)
-        self._change("deferral", replace(deferral, **given), Deferral())
 
     # What is made
 

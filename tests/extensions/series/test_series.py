@@ -82,13 +82,13 @@ def store(volumes, tmp_path):
 
 def test_steps_of_a_store_are_made_chunk_by_chunk(store, camera, default_runtime):
     looks = {"transfer_function": _table()}
-    steps = [pvdi.open_volume(store, time=k) for k in range(4)]
+    steps = [pvdi.read_volume(store, time=k) for k in range(4)]
     expected = [pvdi.generate(step, camera, SIZE, precision="8-byte", **looks) for step in steps]
     assert all("blocks" in vdi.metadata for vdi in expected)
     for volumes, times in (
         (steps, None),
         (steps[2], None),
-        (pvdi.open_volume(store), (1, 2, 3, 5)),
+        (pvdi.read_volume(store), (1, 2, 3, 5)),
     ):
         series = pvdi.generate_series(volumes, camera, SIZE, times, **looks)
         assert series.times == (times or (0, 1, 2, 3))
@@ -98,7 +98,7 @@ def test_steps_of_a_store_are_made_chunk_by_chunk(store, camera, default_runtime
 def test_workers_make_the_steps(store, volumes, camera, default_runtime, tmp_path):
     distributed = pytest.importorskip("distributed")
     looks = {"transfer_function": _table()}
-    steps = [pvdi.open_volume(store, time=k) for k in range(2)]
+    steps = [pvdi.read_volume(store, time=k) for k in range(2)]
     expected = pvdi.generate_series(steps, camera, SIZE, **looks)
     with (
         distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=":0") as cluster,
