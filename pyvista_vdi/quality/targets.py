@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -44,19 +44,9 @@ _LIST_BYTES, _SUPERSEGMENT_BYTES, _HEADER_BYTES = 4, 8, 16
 
 @dataclass(frozen=True)
 class Setting:
-    """One rung of the ladder.
+    """One rung of the ladder."""
 
-    Attributes
-    ----------
-    lists : float
-        Lists along an edge of the VDI's window, over the pixels of the window asked for.
-    max_supersegments : int
-        Longest list.
-    precision : str
-        Of the supersegments, see :meth:`VDI.with_precision`.
-    """
-
-    lists: float
+    lists: float  # along an edge of the VDI's window, over the pixels of the window asked for
     max_supersegments: int
     precision: Precision = "8-byte"
 
@@ -171,42 +161,43 @@ def generate_to_target(request: GenerationRequest, target: QualityTarget) -> VDI
         vdi = generate_vdi(LADDER[rung].applied_to(request))
         return _described(vdi, rung, target, request.window_size, {"ssim": ssim}, [])
     trials = _Trials(request, target.target_angle)
-    if target.quality is None and target.ssim is not None:
-        goal, least = target.ssim, 2 if target.ssim >= SSIM_WITHOUT_SQUARES else 0
-        rung = _first(least, rung, lambda k: trials[k].ssim >= goal)
+    # A name means its rung, a number the first that reaches it
+    goal = 0.0 if target.ssim is None or target.quality is not None else target.ssim
+    if goal > 0:
+        least = 2 if goal >= SSIM_WITHOUT_SQUARES else 0
+        rung = _first(least, rung, lambda k: trials.ssim(k) >= goal)
     wanted, missed = rung, []
     # Limits come before the goal, and of the limits bytes before frames per second
     if (most := target.max_bytes) is not None:
-        rung = _first(0, rung + 1, lambda k: trials[k].nbytes > most) - 1
+        rung = _first(0, rung + 1, lambda k: bytes_of(trials.vdi(k)) > most) - 1
         if rung < 0:
             missed.append(
                 f"max_bytes={most} cannot be kept: the smallest VDI that a target chooses has "
-                f"{trials[0].nbytes} bytes; allow more, or ask for a smaller window"
+                f"{bytes_of(trials.vdi(0))} bytes; allow more, or ask for a smaller window"
             )
     if (rate := target.full_fps) is not None:
-        rung = _first(0, max(rung, 0) + 1, lambda k: trials[k].fps < rate) - 1
+        rung = _first(0, max(rung, 0) + 1, lambda k: trials.fps(k) < rate) - 1
         if rung < 0:
             width, height = request.window_size
             missed.append(
                 f"{rate:g} full frames per second cannot be reached on this device: for {width} x "
-                f"{height} pixels it is {trials[0].fps:.3g} at most; ask for fewer, or for a "
+                f"{height} pixels it is {trials.fps(0):.3g} at most; ask for fewer, or for a "
                 "smaller window (a plotter keeps target_fps while the view moves by drawing fewer "
                 "pixels)"
             )
     rung = max(rung, 0)
-    made, given = trials[rung], target.to_dict()
-    if target.ssim is not None and (rung < wanted or made.ssim < target.ssim):
+    vdi, ssim, given = trials.vdi(rung), trials.ssim(rung), target.to_dict()
+    if target.ssim is not None and (rung < wanted or ssim < goal):
         limits = " and ".join(f"{n}={given[n]}" for n in ("max_bytes", "full_fps") if n in given)
         asked = next(f"{n}={given[n]!r}" for n in ("quality", "target_ssim") if n in given)
-        if rung < wanted or target.quality is None:
-            missed.append(
-                f"{asked} is not reached at {target.target_angle:g} degrees: the SSIM is "
-                f"{made.ssim:.3f} for "
-                + (f"what is within {limits}; allow more" if rung < wanted else "the best settings")
-                + ", ask for less, or for a smaller angle"
-            )
-    predicted = {"ssim": round(made.ssim, 4), "bytes": made.nbytes, "fps": float(f"{made.fps:.3g}")}
-    return _described(made.vdi, rung, target, request.window_size, predicted, missed)
+        missed.append(
+            f"{asked} is not reached at {target.target_angle:g} degrees: SSIM is {ssim:.3f} for "
+            + (f"what is within {limits}; allow more" if rung < wanted else "the best settings")
+            + ", ask for less, or for a smaller angle"
+        )
+    fps = float(f"{trials.fps(rung):.3g}")
+    predicted = {"ssim": round(ssim, 4), "bytes": bytes_of(vdi), "fps": fps}
+    return _described(vdi, rung, target, request.window_size, predicted, missed)
 
 
 def _first(low: int, high: int, holds: Callable[[int], bool]) -> int:
@@ -245,7 +236,7 @@ class _Trials:
     """VDIs of the rungs, each made when it is asked for, and what they give in the target view."""
 
     def __init__(self, request: GenerationRequest, angle: float) -> None:
-        size, self._made = request.window_size, dict[int, _Trial]()
+        size = request.window_size
         if min(size) < SSIM_WINDOW:
             raise InvalidArgumentError(
                 f"a window of {size[0]} x {size[1]} pixels has no SSIM to choose settings by: it "
@@ -254,40 +245,28 @@ class _Trials:
         self.request = request.replace(device=get_runtime(request.device))
         camera = turned(request.camera, request.volume.bounds, angle)
         self.view = FrameRequest(camera, size, device=self.request.device)
+        self.vdi, self.ssim, self.fps = cache(self._vdi), cache(self._ssim), cache(self._fps)
 
     @cached_property
-    def estimator(self) -> ViewErrorEstimator:
-        """What judges pictures."""
-        asked = self.request
+    def _estimator(self) -> ViewErrorEstimator:
+        asked, device = self.request, self.request.device
         return ViewErrorEstimator(
-            asked.volume, asked.transfer_function, asked.options, device=asked.device
+            asked.volume, asked.transfer_function, asked.options, device=device
         )
 
-    def __getitem__(self, rung: int) -> _Trial:
-        if rung not in self._made:
-            self._made[rung] = _Trial(self, generate_vdi(LADDER[rung].applied_to(self.request)))
-        return self._made[rung]
+    def _vdi(self, rung: int) -> VDI:
+        return generate_vdi(LADDER[rung].applied_to(self.request))
 
-
-class _Trial:
-    """What a VDI gives."""
-
-    def __init__(self, trials: _Trials, vdi: VDI) -> None:
-        self.vdi, self.nbytes, self._trials = vdi, bytes_of(vdi), trials
-
-    @cached_property
-    def ssim(self) -> float:
+    def _ssim(self, rung: int) -> float:
         """Estimate for the target view."""
-        view = self._trials.view
-        return self._trials.estimator.estimate(self.vdi, view.camera, view.size).ssim
+        return self._estimator.estimate(self.vdi(rung), self.view.camera, self.view.size).ssim
 
-    @cached_property
-    def fps(self) -> float:
+    def _fps(self, rung: int) -> float:
         """Full frames per second."""
         seconds = []
         for _ in range(_FRAMES):
             start = time.perf_counter()
-            render_vdi(self.vdi, self._trials.view)
+            render_vdi(self.vdi(rung), self.view)
             seconds.append(max(time.perf_counter() - start, 1e-9))
         return 1 / min(seconds)
 

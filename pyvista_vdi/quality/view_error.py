@@ -72,27 +72,11 @@ class ViewError:
 class ViewErrorEstimator:
     """Estimates the error of VDIs of one volume; keeps the volume on the device.
 
-    Parameters
-    ----------
-    volume : Volume
-        What the VDIs stand for.
-    transfer_function : TransferFunction
-        How it is to look.
-    medium : MediumOptions, optional
-        How the volume is sampled: as it was when the VDIs were generated, but for the lights,
-        which are those of the view that is judged.
-    tiles : int
-        Tiles of an estimate, at least 2. All there are, if that is fewer.
-    tile_size : int
-        Edge of a tile in pixels, at least 11. What SSIM compares around a pixel reaches five
-        pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    **changes
-        Options by name, in place of those in ``medium``.
+    The volume is sampled as ``medium`` and ``changes`` of its options say: as it was when the VDIs
+    were generated, but for the lights, which are those of the view that is judged. An estimate
+    takes ``tiles`` of ``tile_size`` pixels along each edge; what SSIM compares around a pixel
+    reaches five pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
 
-    Notes
-    -----
     The picture is cut into cells as large as what a tile tells, inside the rectangle around the
     bounds (elsewhere both pictures are empty, and SSIM is 1). Both pictures are rendered at a
     fifth of the pixels along each edge to guess each cell's loss, 1 - SSIM, up to a factor. A
@@ -197,14 +181,12 @@ class ViewErrorEstimator:
 
 
 def angle_from_generating_view(vdi: VDI, camera: Any) -> float:
-    """Return by how much a view has turned about the VDI's model since it was generated.
+    """Return by how much a view has turned about the VDI's model, degrees from 0 to 180.
 
-    It is the angle, degrees from 0 to 180, between the directions from the centre of the bounds to
-    the two eyes, each taken to the model frame by its own camera's model transform, and compared as
-    that of the VDI's ``camera`` shows them. Moving the eye towards the centre, turning it about its
-    own place and moving the model along with the camera are no turn. In parallel projection the eye
-    is infinitely far against the direction of projection; that also stands in for an eye at the
-    very centre.
+    It is the angle between the directions from the centre of the bounds to the two eyes, each taken
+    to the model frame by its own camera's model transform, and compared as that of the VDI's
+    ``camera`` shows them. In parallel projection the eye is infinitely far against the direction of
+    projection; that also stands in for an eye at the very centre.
     """
     shown = vdi.camera.model_transform[:3, :3]
     old, new = (
