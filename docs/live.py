@@ -25,7 +25,7 @@ BACKGROUND = (0.1, 0.1, 0.15)
 
 
 def make_brain(size: tuple[int, int]) -> pvdi.VDI:
-    """Return the shipped brain, from its left and above."""
+    """Return the shipped brain, from its left and above, with dark furrows."""
     volume = examples.load_brain()
     x, y, z = volume.center
     camera = pvdi.Camera((x - 260, y + 260, z + 170), (x, y, z), (0, 0, 1))
@@ -34,6 +34,7 @@ def make_brain(size: tuple[int, int]) -> pvdi.VDI:
         size,
         cmap="bone",
         opacity=[0, 0, 0, 0.6, 1, 1],
+        ambient_occlusion=pvdi.AmbientOcclusion(strength=0.15),
         max_supersegments=10,
     )
 

@@ -16,6 +16,7 @@ from pyvista_vdi.plotting import registration
 
 #: Where each public name lives; loaded when it is first used (PEP 562).
 _HOMES = {
+    "AmbientOcclusion": "model.ambient_occlusion",
     "Camera": "model.camera",
     "DeferredVDI": "model.deferred",
     "Cropping": "model.cropping",

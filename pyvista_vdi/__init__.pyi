@@ -22,6 +22,7 @@ from pyvista_vdi.extensions.sets.vdi_set import VDISet as VDISet
 from pyvista_vdi.generation.slices import Estimate as Estimate
 from pyvista_vdi.io.volumes import list_volumes as list_volumes
 from pyvista_vdi.io.volumes import read_volume as read_volume
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion as AmbientOcclusion
 from pyvista_vdi.model.camera import Camera as Camera
 from pyvista_vdi.model.cropping import Cropping as Cropping
 from pyvista_vdi.model.deferred import DeferredVDI as DeferredVDI

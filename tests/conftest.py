@@ -140,7 +140,8 @@ LENGTHY = {
     "raycast_oracle skipping",
     "reference": "reference",
     "series": "on_device series_files",
-    "volume": "bricks lighting picture_blocks projections sampling_functions volume_ends",
+    "volume": "ambient_occlusion bricks lighting picture_blocks projections sampling_functions "
+    "volume_ends",
     "vtk_pipeline": "copies events picking pipeline random_chains source vtk_files",
 }
 

@@ -207,7 +207,7 @@ def generation_cases() -> Cases:
     graded = {"gradient_opacities": (0.0, 0.2, 1.0, 0.7), "gradient_range": (0.0, 9.0)}
     yield from both("gradient", noise, graded)
     yield "volume/whole", lambda: pictured(noise(), early_termination=False)
-    # Lights, materials
+    # Lights, materials, ambient occlusion
     spot = pvdi.Light("scene", (30, -20, 40), (16, 10, 17), positional=True, cone_angle=25)
     lamp = pvdi.Light("camera", (0.5, 0.7, 1.0), ambient=(0.2, 0.1, 0.3), intensity=0.7)
     sun = pvdi.Light("scene", (100, 20, 300), specular=(0.3, 0.9, 0.4))
@@ -216,6 +216,10 @@ def generation_cases() -> Cases:
     yield from both("lit/lights", noise, shiny, lights=[spot, lamp, sun])
     yield from both("lit/one-sided", noise, shiny, lights=pvdi.Lights((sun,), two_sided=False))
     yield from both("lit/rgba", partial(noise, "rgba"), matt)
+    yield from both("occlusion/default", noise, ambient_occlusion=True)
+    strong = pvdi.AmbientOcclusion(4.0, 1.0, 64)
+    yield from both("occlusion/strong", noise, {**shiny, **graded}, ambient_occlusion=strong)
+    yield from both("occlusion/rgba", partial(noise, "rgba"), ambient_occlusion=True)
     # What a memory limit has brought to the device brick by brick
     shape, tight = (60, 90, 80), {"memory_limit": "2600 kB", "size": (24, 20)}
     for dtype in ("float32", "float64"):

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import pyvista_vdi as pvdi
 
 brain = pvdi.examples.load_brain()
-look = {"cmap": "mri-brain", "interpolation": "linear"}
+look = {"cmap": "mri-brain", "ambient_occlusion": True, "interpolation": "linear"}
 made_from = pvdi.Camera((265, 385, 210), brain.center, (0, 0, 1))
 view, size = made_from.azimuth(30), (360, 360)
 pictures = {"the volume": pvdi.render_volume(brain, view, size, **look)}

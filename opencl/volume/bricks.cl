@@ -117,14 +117,14 @@ __kernel void sample_steps(
     const Classified classified,
     __global const VOXEL_T *voxels, // slots of points cubed, each with a brick or not
     __global const float4 *table, __global const uchar *distances, __global const uchar *blanked,
-    __global const float *gradient, __global const float *lighting, const RaysOfView view,
-    __global const float *forms, __global const float *opaque_depth, __global const uchar *visible,
-    const Bricks bricks,
+    __global const float *gradient, __global const float *lighting, __global const float *ambient,
+    const RaysOfView view, __global const float *forms, __global const float *opaque_depth,
+    __global const uchar *visible, const Bricks bricks,
     __global const int *slots, // of each brick; negative where its steps are not to be sampled now
     __global float4 *samples)
 {
     const uint item = (uint)get_global_id(0);
-    Medium medium = {classified, voxels, table, distances, blanked, gradient, lighting};
+    Medium medium = {classified, voxels, table, distances, blanked, gradient, lighting, ambient};
     Walk walk;
     if (!begin_walk(&walk, item, &view, &classified, forms, opaque_depth))
         return;

@@ -14,6 +14,7 @@
 #include "lib/classification.cl"
 #include "volume/sampling.cl"
 #include "volume/shading.cl"
+#include "volume/occlusion.cl"
 #include "volume/blanking.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -24,6 +25,8 @@ typedef struct {
     int4 part_first; // the first point of a part of a grid
     float4 part_lower,
         part_upper;        // of its own cells, the upper ones excluded; infinite at the grid's ends
+    int4 nodes;            // of ambient occlusion, along x, y, z
+    float4 to_nodes;       // nodes per voxel along x, y, z; strength
     int entries;           // of the table
     float low, per_scalar; // scalar to table position
 } Classified;
@@ -37,14 +40,17 @@ typedef struct {
     __global const uchar *blanked;   // see volume/blanking.cl; 0: nothing is
     __global const float *gradient;  // see gradient_opacity
     __global const float *lighting;  // see lit
+    __global const float *ambient;   // see volume/occlusion.cl; 0: there is none
 } Medium;
 
 // A kernel's parameters that are a classified volume, and the medium of them.
 #define MEDIUM_PARAMETERS                                                                          \
     const Classified classified, __global const VOXEL_T *voxels, __global const float4 *table,     \
         __global const uchar *distances, __global const uchar *blanked,                            \
-        __global const float *gradient, __global const float *lighting
-#define MEDIUM_OF_PARAMETERS {classified, voxels, table, distances, blanked, gradient, lighting}
+        __global const float *gradient, __global const float *lighting,                            \
+        __global const float *ambient
+#define MEDIUM_OF_PARAMETERS                                                                       \
+    {classified, voxels, table, distances, blanked, gradient, lighting, ambient}
 
 // An index position of the grid in the part of it that is at hand.
 #define IN_PART(numbers, position, axis)                                                           \
@@ -83,7 +89,7 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
         sample.w =
             SELECT(sample.w, (Real)(0.0f), is_blank(medium->blanked, of->points.size, x, y, z));
     const Int visible = sample.w > 0.0f;
-    if (!(COMPONENTS > 1 || SHADED || GRADIENT_OPACITY) || !ANY(visible))
+    if (!(COMPONENTS > 1 || SHADED || GRADIENT_OPACITY || medium->ambient) || !ANY(visible))
         return sample;
     Real3 color = REAL3(sample.x, sample.y, sample.z);
     if (COMPONENTS > 1)
@@ -99,6 +105,10 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
         }
         if (SHADED)
             color = lit(color, differences, x, y, z, medium->lighting);
+    }
+    if (medium->ambient) {
+        const Real factor = ambient_factor(medium->ambient, of->nodes, of->to_nodes, x, y, z);
+        color = REAL3(color.x * factor, color.y * factor, color.z * factor);
     }
     return REAL4(SELECT(sample.x, color.x, visible), SELECT(sample.y, color.y, visible),
                  SELECT(sample.z, color.z, visible), sample.w);

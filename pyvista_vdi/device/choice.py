@@ -122,8 +122,7 @@ def describe_devices() -> str:
         f"{'*' if info is best else ' '} [{info.platform_index}:{info.device_index}] "
         f"{info.full_name}\n"
         f"    {info.kind}, {info.compute_units} compute units, {bytes_text(info.global_memory)} "
-        f"memory, {bytes_text(info.max_allocation)} per buffer, "
-        f"{'fp64' if info.has_fp64 else 'no fp64'}\n"
+        f"memory, {bytes_text(info.max_allocation)} per buffer\n"
         f"    {info.version}, driver {info.driver}, selector {info.selector!r}\n"
         f"    {'usable' if info.usable else f'not used: {info.reason}'}"
         for info in infos

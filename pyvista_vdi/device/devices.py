@@ -35,7 +35,7 @@ class DeviceInfo:
 
     Attributes
     ----------
-    name, platform, vendor, version, driver : str
+    name, platform, version, driver : str
         As the driver reports them; ``version`` is the device's OpenCL version.
     kind : str
         ``"GPU"``, ``"CPU"`` or ``"accelerator"``.
@@ -43,8 +43,6 @@ class DeviceInfo:
         Parallel compute units; hardware threads on a CPU.
     global_memory, max_allocation : int
         Bytes in all, and bytes that one buffer may have.
-    has_fp64 : bool
-        Whether kernels may use ``double``.
     usable : bool
         Whether the probe kernel ran on it and gave the right numbers.
     reason : str
@@ -59,14 +57,12 @@ class DeviceInfo:
 
     name: str
     platform: str
-    vendor: str
     version: str
     driver: str
     kind: str
     compute_units: int
     global_memory: int
     max_allocation: int
-    has_fp64: bool
     usable: bool = False
     reason: str = NOT_PROBED
     platform_index: int = 0
@@ -256,14 +252,12 @@ def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: in
     return DeviceInfo(
         name=device.name.strip(),
         platform=device.platform.name.strip(),
-        vendor=device.vendor.strip(),
         version=device.version.strip(),
         driver=device.driver_version.strip(),
         kind=next((name for bit, name in kinds.items() if device.type & bit), "accelerator"),
         compute_units=int(device.max_compute_units),
         global_memory=int(device.global_mem_size),
         max_allocation=int(device.max_mem_alloc_size),
-        has_fp64="cl_khr_fp64" in device.extensions.split(),
         platform_index=platform_index,
         device_index=device_index,
         unified_memory=bool(device.host_unified_memory),

@@ -157,9 +157,8 @@ class Runtime(Memory):
     """A device ready for work. Made by :func:`~pyvista_vdi.device.get_runtime`.
 
     Every method may be called from any thread. Commands run in the order in which they are
-    enqueued, one queue for all threads unless :meth:`queue_scope` gives a thread its own. What one
-    queue has written another sees when the first has been finished, see :meth:`finish`. Threads
-    must have ended before the interpreter does: drivers do not survive use at exit.
+    enqueued. Threads must have ended before the interpreter does: drivers do not survive use at
+    exit.
     """
 
     def __init__(self, info: DeviceInfo) -> None:

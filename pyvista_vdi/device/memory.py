@@ -1,10 +1,10 @@
-"""A device's command queues and its memory: buffers, checked before they are taken, and copies."""
+"""A device's command queue and its memory: buffers, checked before they are taken, and copies."""
 
 import contextlib
 import math
 import threading
 import weakref
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -102,7 +102,7 @@ def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
 
 
 class Memory(Turns):
-    """A device and a context on it, a command queue for all threads and for who asks, and buffers.
+    """A device, a context on it, a command queue for all threads, and buffers.
 
     ``cl`` is pyopencl; ``vector_floats`` the floats of the device's longest vectors; ``allocated``
     the bytes that buffers hold now, where arrays used in place count nothing, and
@@ -117,10 +117,9 @@ class Memory(Turns):
         self.info, self.is_cpu = info, info.kind == "CPU"
         self._device = devices.handles[info.selector]
         self.vector_floats = int(self._device.native_vector_width_float)
-        self._queues: list[Any] = []  # that of all threads first
         with self.failing("making a context and a command queue"):
             self._context = self.cl.Context([self._device])
-            self._queues.append(self.cl.CommandQueue(self._context, self._device))
+            self._queue = self.cl.CommandQueue(self._context, self._device)
         # Re-entrant: a garbage collection inside the lock may release other buffers
         self._ledger = threading.RLock()
         self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
@@ -164,58 +163,14 @@ class Memory(Turns):
 
     @property
     def queue(self) -> Any:
-        """The calling thread's queue; an error in a fork, where its driver would wait for ever."""
+        """The queue of all threads; an error in a fork, where its driver would wait for ever."""
         devices.require_drivers()
-        return self.thread.queue or self._queues[0]
-
-    @contextlib.contextmanager
-    def queue_scope(self) -> Iterator[None]:
-        """Open an in-order command queue of the calling thread's own for the ``with`` block.
-
-        What was enqueued before is finished first, and what is enqueued inside is finished at
-        the end, so buffers may cross the borders of the block.
-        """
-        self.finish()
-        outer = self.thread.queue
-        with self.failing("making a command queue"):
-            self._queues.append(inner := self.cl.CommandQueue(self._context, self._device))
-        self.thread.queue = inner
-        try:
-            yield
-        finally:
-            self.thread.queue = outer
-            try:
-                self._finish([inner])
-            finally:
-                self._queues.remove(inner)
-
-    def _finish(self, queues: Iterable[Any]) -> None:
-        """Finish queues where their driver is."""
-        with self.failing("waiting for enqueued work"):
-            for queue in () if devices.forked else queues:
-                queue.finish()
+        return self._queue
 
     def finish(self) -> None:
-        """Wait until all is done that was enqueued on the calling thread's queue.
-
-        Threads outside :meth:`queue_scope` share one. A buffer that a thread with a queue of its
-        own has written may be handed to another thread after this. DeviceError if a kernel failed.
-        """
-        self._finish([self.queue])
-
-    @contextlib.contextmanager
-    def background(
-        self,
-        cancelled: Callable[[], bool] = lambda: False,
-        paused: Callable[[], bool] = lambda: False,
-    ) -> Iterator[None]:
-        """Work as :meth:`Turns.background` has it, on a queue of the calling thread's own.
-
-        Its launches and copies are cut into pieces that take no longer than a turn; each is
-        finished when the call returns.
-        """
-        with self.queue_scope(), super().background(cancelled, paused):
-            yield
+        """Wait until all is done that was enqueued; DeviceError if a kernel failed."""
+        with self.failing("waiting for enqueued work"):
+            self.queue.finish()
 
     @property
     def in_place_alignment(self) -> int | None:
@@ -364,8 +319,8 @@ class Memory(Turns):
         with self._ledger:
             self.allocated, held.nbytes = self.allocated - held.nbytes, 0
         try:
-            if held.in_place:  # the array may go when the buffer has gone
-                self._finish([*self._queues])
+            if held.in_place and not devices.forked:  # the array may go when the buffer has gone
+                self.finish()
         finally:
             if held.memory is not None:
                 held.memory.release()

@@ -220,13 +220,10 @@ def _with_includes(name: str, text: str) -> str:
             lines.append(f'#line {number + 1} "{name}"')
 
     append(name, text)
-    constants = definitions({file.partition("/")[0] for file in seen})
-    return "\n".join([*constants, *lines]) + "\n"
+    return "\n".join([*definitions(), *lines]) + "\n"
 
 
 LOG_LINES_SHOWN = 30
-#: Seconds from which a driver that keeps programs itself is taken to be compiling.
-_SLOW = 2.0
 
 #: Called when a program begins to be compiled, which may take seconds; from any thread.
 on_compiling: set[Callable[[], object]] = set()
@@ -278,8 +275,8 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
     cl: Any = opencl()
     joined = " ".join(options)
     call = {"options": joined.encode(), "devices": [device]}
-    kept_by_driver = import_module("pyopencl.characterize").has_src_build_cache(device)
-    place = None if kept_by_driver else _place(device, joined, source)
+    kept = import_module("pyopencl.characterize").has_src_build_cache(device)  # by the driver
+    place = None if kept else _place(device, joined, source)
     binary = _read(place)
     if binary is not None:
         with contextlib.suppress(cl.Error):  # made for another processor of that name
@@ -288,12 +285,10 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
             return cl.Program(program)
 
     program = cl._cl._Program(context, source)
-    announcing = threading.Timer(_SLOW, _announce, [path])
-    announcing.daemon = True
-    if kept_by_driver:
-        announcing.start()
-    else:
-        _announce(path)
+    level = logging.INFO if next(_program_numbers) == 1 else logging.DEBUG
+    _logger.log(level, "compiling kernels: %s", path)
+    for tell in tuple(on_compiling):
+        tell()
     try:
         program._build(**call)
     except cl.Error as exc:
@@ -309,19 +304,9 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
             options=joined,
             source=source,
         ) from exc
-    finally:
-        announcing.cancel()
     _logger.debug("%s: %s", path, _log(program, device))
     _write(place, program)
     return cl.Program(program)
-
-
-def _announce(path: str) -> None:
-    """Tell that a program is being compiled."""
-    level = logging.INFO if next(_program_numbers) == 1 else logging.DEBUG
-    _logger.log(level, "compiling kernels: %s", path)
-    for tell in tuple(on_compiling):
-        tell()
 
 
 def _place(device: Any, options: str, source: str) -> Path | None:

@@ -128,6 +128,11 @@ def kept_range(
             "RGBA volumes have colours of their own, so that nothing is left to be classified "
             "afterwards: leave classification='deferred' out"
         )
+    if options.ambient_occlusion is not None:
+        raise UnsupportedError(
+            "ambient occlusion follows from opacities, which a deferred VDI does not have: leave "
+            "ambient_occlusion out, or classification='deferred'"
+        )
     asked = volume.finite_range() if deferral.value_range is None else deferral.value_range
     low, high = as_range(asked)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):

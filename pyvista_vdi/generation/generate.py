@@ -35,7 +35,9 @@ def generate_vdi(request: GenerationRequest) -> VDI:
     runtime = get_runtime(request.device)
     bring_to_host(runtime)  # what was made before
     slices = Slices(runtime, size, options)
-    medium = DeviceVolume(runtime, volume, request.transfer_function, options, room=slices.room)
+    medium = DeviceVolume(
+        runtime, volume, request.transfer_function, options, room=slices.room(volume)
+    )
     with (
         medium.giving_bricks_back(),
         Records(runtime, medium.rays, camera, size, slices, options) as records,
@@ -98,6 +100,8 @@ def made_from(
     }
     if transfer_function.shading is not None:
         made_by["lights"] = options.lights.to_dict()
+    if options.ambient_occlusion is not None:
+        made_by["ambient_occlusion"] = options.ambient_occlusion.to_dict(volume)
     return made_by
 
 

@@ -84,11 +84,10 @@ class Slices:
             first_row = number * self.rows
             yield Slice(number, first_row, min(self.rows, self._height - first_row))
 
-    @property
-    def room(self) -> Room:
-        """Return the room for a volume beside a slice."""
-        limit = self._options.memory_limit
-        return Room(limit, self.bytes, self.items * CHUNK_STEPS, self._text)
+    def room(self, volume: Volume) -> Room:
+        """Return the room for a volume beside a slice and the grid of an ambient occlusion."""
+        beside = self.bytes + self._options.occlusion_bytes(volume)
+        return Room(self._options.memory_limit, beside, self.items * CHUNK_STEPS, self._text)
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,8 @@ class Estimate:
         The VDI with every list full; most are far shorter.
     working : int
         Buffers on the device while a slice of rays is made.
+    occlusion : int
+        The grid of the ambient occlusion on the device, while it is computed.
     total : int
         All of these.
     """
@@ -110,11 +111,12 @@ class Estimate:
     volume: int
     vdi_worst_case: int
     working: int
+    occlusion: int = 0
 
     @property
     def total(self) -> int:
         """Sum of them all, bytes."""
-        return self.volume + self.vdi_worst_case + self.working
+        return self.volume + self.vdi_worst_case + self.working + self.occlusion
 
 
 def estimate(
@@ -136,9 +138,10 @@ def estimate(
     width, height = size = check_window_size(window_size)
     slices = Slices(get_runtime(device), size, options)
     nbytes = volume.array.size * voxel_bytes(volume, transfer_function)
-    on_device, samples = volume_bytes(volume, nbytes, slices.room)
+    on_device, samples = volume_bytes(volume, nbytes, slices.room(volume))
     return Estimate(
         volume=on_device,
         vdi_worst_case=width * height * (options.max_supersegments * SUPERSEGMENT_BYTES + 8) + 8,
         working=slices.bytes + samples,
+        occlusion=options.occlusion_bytes(volume),
     )

@@ -13,6 +13,7 @@ from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
@@ -134,11 +135,8 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     of_compressed = ("compression", "level") if compressions else ()
     _check_names("written", path, options, (*of_compressed, *found.write_options))
     compression = options.get("compression", next(iter(compressions), None))
-    if compressions and not (isinstance(compression, str) and compression in compressions):
-        known = f"one of {', '.join(compressions[:-1])} and " if compressions[1:] else ""
-        raise InvalidArgumentError(
-            f"compression of {path} must be {known}{compressions[-1]}; got {compression!r}"
-        )
+    if compressions:
+        one_of(compression, f"compression of {path}", compressions)
     check_level(options.get("level"))
     if options.get("precision") is not None:
         check_precision(options["precision"])

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,13 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import as_floats
 
 #: Arguments of ``skimage.metrics.structural_similarity``: Wang et al. 2004.
-SSIM_ARGUMENTS: MappingProxyType[str, Any] = MappingProxyType(
-    {
-        "data_range": 1.0,
-        "channel_axis": -1,
-        "gaussian_weights": True,
-        "sigma": 1.5,
-        "use_sample_covariance": False,
-    }
-)
+SSIM_ARGUMENTS: dict[str, Any] = {
+    "data_range": 1.0,
+    "channel_axis": -1,
+    "gaussian_weights": True,
+    "sigma": 1.5,
+    "use_sample_covariance": False,
+}
 
 #: Shortest edge of an image that has an SSIM, pixels: the window, 2 round(3.5 sigma) + 1.
 SSIM_WINDOW = 11

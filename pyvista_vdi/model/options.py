@@ -19,6 +19,7 @@ import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
 from pyvista_vdi.model import types
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import (
     Number,
@@ -115,6 +116,7 @@ _WORDS = {
     "LightsLike": "renderer, or sequence of Light, vtkLight or pyvista.Light",
     "MatrixLike": "array_like, shape (4, 4)",
     "MemoryLike": "int, float or str",
+    "OcclusionLike": "bool, float or AmbientOcclusion",
     "OpacityLike": "str or float or array_like",
     "Policy": '{"auto", "never"} or callable',
     "RangeLike": "float or (float, float)",
@@ -233,6 +235,13 @@ class MediumOptions(Options):
         check=Lights.from_any,
         takes="LightsLike | None",
     )
+    ambient_occlusion: AmbientOcclusion | None = option(
+        None,
+        "darken what is hidden from the light around it",
+        "``True``, or the radius up to which something hides, model units.",
+        check=AmbientOcclusion.from_any,
+        takes="OcclusionLike | None",
+    )
     memory_limit: int | None = option(
         None,
         "most memory to take on the device",
@@ -242,6 +251,12 @@ class MediumOptions(Options):
         takes="MemoryLike | None",
         setting=True,
     )
+
+    def occlusion_bytes(self, volume: Volume) -> int:
+        """Return what the grid of the ambient occlusion takes on the device, bytes."""
+        if self.ambient_occlusion is None:
+            return 0
+        return OcclusionGrid.of(volume, self.ambient_occlusion).nbytes
 
 
 @record

@@ -14,6 +14,7 @@ from pyvista_vdi.model.packing import Precision as Precision
 if TYPE_CHECKING:
     import os
 
+    from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
     from pyvista_vdi.model.camera import Camera
     from pyvista_vdi.model.collection import VDICollection
     from pyvista_vdi.model.cropping import Cropping
@@ -66,6 +67,7 @@ ShownLike: TypeAlias = Union["VDI", VTKObject, "VDICollection", "DeferredVDI"]
 AnyVolume: TypeAlias = VolumeLike | NDArray[Any] | ShownLike
 LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]
 CroppingLike: TypeAlias = Union["Cropping", VTKObject, Sequence[float], Sequence[object]]
+OcclusionLike: TypeAlias = Union[bool, float, "AmbientOcclusion"]
 #: Bytes, or a text such as ``"2 GiB"``.
 MemoryLike: TypeAlias = float | str
 #: A name or an index of the list of devices, or a device in use.

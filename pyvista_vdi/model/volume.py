@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.model.checks import as_floats, as_vector
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.host_memory import require_host_memory
@@ -102,9 +101,6 @@ VOXEL_TYPES: tuple[str, ...] = (
     "float64",
 )
 
-#: Numbers that float64 must have from voxel to voxel, so that rounding is not seen.
-_PLACES_IN_A_STEP = 256
-
 #: Attributes by which arrays in files say that their values are others than those that are stored.
 _PACKING = ("scale_factor", "add_offset", "_Unsigned")
 #: Attributes with numbers that stand for nothing, and what xarray writes for NaN in zarr 3.
@@ -184,18 +180,6 @@ class Volume(Geometry):
             raise InvalidVolumeError(
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
-            )
-        # Warn where float64 rounds the places of voxels by more than pictures bear
-        farthest = np.abs(self.bounds).reshape(3, 2).max(axis=1)
-        rounded = np.abs(self.direction.T) @ [math.ulp(at) for at in farthest]  # along each axis
-        worst = int(np.argmax(rounded / self.spacing))
-        rounding, step = rounded[worst], self.spacing[worst]
-        if rounding * _PLACES_IN_A_STEP > step:
-            warn_external(
-                f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
-                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} "
-                "apart: pictures are off by that share of a voxel; move its origin, and the "
-                "camera with it, towards 0"
             )
 
     @staticmethod

@@ -8,6 +8,7 @@ import time
 import traceback
 import weakref
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from typing import Any
 
 from pyvista_vdi.device import Runtime, get_runtime
@@ -28,27 +29,24 @@ Work = Callable[[Runtime, Callable[[float], None]], Any]
 TRIAL_SIZE = 8
 
 
+@dataclass(eq=False)
 class Job:
     """Work that is done in pieces, between frames that are drawn inside ``Runtime.foreground``."""
 
-    def __init__(self, work: Work, device: Any, key: Hashable = None) -> None:
-        self.key = key
-        self.progress = 0.0
-        self.cancelled = threading.Event()
-        self._work = work
-        self._device = device
+    work: Work
+    device: Any
+    key: Hashable = None
+    progress: float = 0.0
+    cancelled: threading.Event = field(default_factory=threading.Event)
 
     def done(self, paused: Callable[[], bool] = lambda: False) -> Any:
         """Do the work on a queue of this thread's own, and return its result."""
-        runtime = get_runtime(self._device)
+        runtime = get_runtime(self.device)
         with runtime.background(self.cancelled.is_set, paused):
-            return self._work(runtime, self._report)
-
-    def _report(self, fraction: float) -> None:
-        self.progress = fraction
+            return self.work(runtime, lambda fraction: setattr(self, "progress", fraction))
 
 
-class Worker:
+class BackgroundThread:
     """Where one thread, which draws, puts jobs, and another lays what it has made of them.
 
     The thread begins with a job and ends when there is none, on :meth:`close`, and at the
@@ -136,21 +134,18 @@ class Worker:
                 job = self.job
                 if job is None or not self._working:
                     return
-            self._do(job)
-
-    def _do(self, job: Job) -> None:
-        made, failed = None, None
-        try:
-            made = job.done(lambda: time.monotonic() < self._paused_until)
-        except Cancelled:
-            return
-        except BaseException as error:  # take() raises it where somebody can act on it
-            traceback.clear_frames(error.__traceback__)  # they hold buffers
-            failed = error
-        # Keep what became of the job, unless it is out of date
-        with self._lock:
-            if job is self.job:
-                self._made, self._error = made, failed
+            made, failed = None, None
+            try:
+                made = job.done(lambda: time.monotonic() < self._paused_until)
+            except Cancelled:
+                continue
+            except BaseException as error:  # take() raises it where somebody can act on it
+                traceback.clear_frames(error.__traceback__)  # they hold buffers
+                failed = error
+            # Keep what became of the job, unless it is out of date
+            with self._lock:
+                if job is self.job:
+                    self._made, self._error = made, failed
 
 
 def vdi_job(
@@ -170,7 +165,7 @@ def vdi_job(
     return Job(make, request.device, key)
 
 
-_workers: weakref.WeakSet[Worker] = weakref.WeakSet()
+_workers: weakref.WeakSet[BackgroundThread] = weakref.WeakSet()
 _workers_lock = threading.Lock()  # a set that grows cannot be walked
 
 

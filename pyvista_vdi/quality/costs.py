@@ -63,18 +63,9 @@ class Costs:
         what the VDI loses. Until both have told what they take it is the VDI, and what was drawn
         last stays unless the other is better by more than predictions are wrong by.
 
-        Parameters
-        ----------
-        angle : float
-            Between the view and the generating view, degrees.
-        pixels : float
-            Rays of the full frame that may meet the volume.
-        seconds : float or None
-            What its rays may take; ``None`` at rest, where all pixels are drawn.
-        ssim : float or None
-            Estimate for the VDI from this view.
-        bound : float
-            Least SSIM that does at rest.
+        The view is ``angle`` degrees from the generating view, ``pixels`` rays of the full frame
+        may meet the volume, and they may take ``seconds``, ``None`` at rest, where all are drawn.
+        ``ssim`` is the VDI's estimate for this view, and ``bound`` the least that does at rest.
         """
         own = _UNKNOWN_LOSS * min(1.0, angle / _LOST_FROM) if ssim is None else max(0.0, 1 - ssim)
         if seconds is None and own > 1 - bound:

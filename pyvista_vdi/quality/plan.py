@@ -8,12 +8,12 @@ picture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.costs import Costs, RenderMode
-from pyvista_vdi.quality.pictures import FINE_ENOUGH, SIMILAR, Estimate, Made, Pictures
 
 #: Estimated SSIM below which a view at rest gets a VDI of its own. Over the measured views a VDI
 #: of 20 supersegments keeps .96 to .99 when it is only turned; zooming in by two, or looking past
@@ -30,6 +30,95 @@ _ANOTHER_ESTIMATE = 0.005
 #: Pixels as wide as one list from which on a VDI without its volume is said to be too coarse, and
 #: the share of rays below which it is said to cover too little: corners of bounds are often empty.
 _TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
+#: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn where the volume is at
+#: hand, and by what share the contrast within 4 x 4 pixels may differ, where nobody said otherwise.
+SIMILAR, _SAME_CONTRAST = 0.98, 0.1
+#: Pixels as wide as one list from which on a picture has less detail than its pixels could show.
+FINE_ENOUGH = 1.25
+#: Degrees from the VDI's view beyond which the volume's picture takes no longer than its own.
+_FASTER_WITHIN = 10.0
+#: Estimates that are remembered.
+_ESTIMATES = 64
+#: Rays that an estimate casts, 16 tiles of 24 x 24 by the VDI and by the volume: a VDI of no more
+#: pixels takes no longer to be made.
+_JUDGED = 2 * 16 * 24**2
+#: An estimate holds for pictures of views as near as this to its own (about radians).
+_ANOTHER_JUDGEMENT = 0.02
+
+
+@dataclass(frozen=True)
+class Made:
+    """A VDI that is there, as a view shows it; see :mod:`pyvista_vdi.quality.view_error`."""
+
+    number: int  # by which it is known
+    bounds: tuple[float, ...]  # of the volume, model frame
+    content: Any = None  # of what it was made, and for which view
+    screen: Any = None
+    angle: float = 0.0
+    magnification: float = 1.0
+    coverage: float = 1.0
+    pixels: float = 0.0  # in which it may be seen
+    options: Any = None  # how it is drawn (clipping planes in world coordinates), compared by ==
+
+
+@dataclass(frozen=True)
+class ViewEstimate:
+    """What the SSIM of a VDI's picture was found to be."""
+
+    vdi: int
+    view: View
+    ssim: float
+    contrast: float = 1.0
+    options: Any = None
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What pictures that are kept have told; it is the same in every run."""
+
+    vdi: int | None = None  # of which the estimates are
+    judged: tuple[ViewEstimate, ...] = ()
+    poor_from: float = math.inf  # degrees, of the nearest view that the VDI fails
+
+    def serves(
+        self,
+        made: Made,
+        view: View,
+        judged: ViewEstimate | Literal[False] | None,
+        bound: float | None,
+        *,
+        joint: bool,
+        alone: bool,
+    ) -> tuple[Pictures, bool | None]:
+        """Return whether a VDI's picture of a view does; ``None`` where an estimate has to tell.
+
+        ``judged`` is what that has told, ``alone`` whether a VDI of this very view would be kept.
+        """
+        known = self
+        if known.vdi != made.number:
+            known = replace(known, vdi=made.number, judged=(), poor_from=math.inf)
+        if bound is None and made.magnification > FINE_ENOUGH:
+            return known, False
+        # What fails near the generating view fails farther away: the loss comes at once
+        within = 180.0 if joint else _FASTER_WITHIN
+        if made.angle > within or made.angle >= known.poor_from or made.coverage < 1:
+            return known, False
+        at_home = made.screen == view
+        if judged is False or (joint and alone and not at_home and made.pixels <= _JUDGED):
+            return known, False
+        if judged is not None and judged not in known.judged:
+            known = replace(known, judged=(*known.judged[1 - _ESTIMATES :], judged))
+        same = [each for each in known.judged if each.options == made.options]
+        apart = [view.distance(each.view, made.bounds) for each in same]
+        if not apart or min(apart) > _ANOTHER_JUDGEMENT:
+            return known, None
+        error = same[apart.index(min(apart))]
+        does = error.ssim >= (SIMILAR if bound is None else bound)
+        if bound is None:
+            does = does and abs(error.contrast - 1) <= _SAME_CONTRAST
+        if not does and made.magnification <= FINE_ENOUGH:
+            known = replace(known, poor_from=made.angle)
+        return known, does
 
 
 @dataclass(frozen=True)
@@ -51,7 +140,6 @@ class Seen:
 
     view: View  # between the eyes
     content: Any = None
-    bounds: tuple[float, ...] = ()  # of the volume, model frame
     screen: View | None = None  # for which view the source would make the next VDI
     chosen: bool = False  # whether somebody has chosen that one: before the first VDI, and since
     # What the user asks for
@@ -72,8 +160,8 @@ class Seen:
     made: Made | None = None  # the VDI made last, as the view shows it
     making: Making | None = None
     estimating: bool = False
-    estimate: Estimate | None = None  # the last one made in the background
-    judged: Estimate | Literal[False] | None = None  # that of this very frame; False: none can be
+    estimate: ViewEstimate | None = None  # the last one made in the background
+    judged: ViewEstimate | Literal[False] | None = None  # of this very frame; False: none can be
     failed: bool = False  # whether making a VDI has failed, and nothing has changed since
     volume: Literal["whole", "bricks", "none"] = "whole"  # how the device can draw it
     late: bool = False  # whether the volume's own full frames miss the rate
@@ -162,7 +250,7 @@ def _kept(seen: Seen) -> Plan:
     """Plan a picture that is kept, the same in every run: told by the view, never by time.
 
     A VDI is drawn where it has all that the view shows, at its detail, and where an estimate says
-    that the picture is like the volume's; near a view of many pictures one is made.
+    that the picture is like the volume's.
     """
     made, again = seen.made, not seen.failed
     if seen.draw == "vdi" or (made is None and seen.regenerate == "ask"):
@@ -173,7 +261,7 @@ def _kept(seen: Seen) -> Plan:
         return _planned(seen, "vdi", view="take", update=True)
     if seen.content is None:
         return _planned(seen, "trouble")
-    pictures = seen.pictures.of(seen.content)
+    pictures = seen.pictures
     if made is not None and not seen.stale:
         pictures, does = pictures.serves(
             made,
@@ -191,10 +279,6 @@ def _kept(seen: Seen) -> Plan:
     by_vdi = _planned(seen, "vdi", view=follow, update=again, pictures=pictures)
     if seen.joint:  # merged by the lists of VDIs
         return _planned(seen, "exact", view=follow, pictures=pictures) if auto else by_vdi
-    if seen.one_view and seen.first_look and auto and seen.own_pixels:
-        if pictures.deserve_vdi(seen.view, seen.bounds):
-            return _planned(seen, "vdi", view="take", update=True, pictures=pictures)
-        pictures = pictures.drawn_by_volume(seen.view)
     if seen.volume == "none":
         return by_vdi
     of = seen.content
@@ -266,7 +350,7 @@ def _better(seen: Seen, made: Made) -> RenderMode:
 
 
 def ssim_of(
-    pictures: Pictures, estimate: Estimate | None, vdi: int | None, view: View | None
+    pictures: Pictures, estimate: ViewEstimate | None, vdi: int | None, view: View | None
 ) -> float | None:
     """Return what was estimated for a VDI: of this very picture, or else last in the background."""
     for each in reversed(pictures.judged):
@@ -280,24 +364,16 @@ def lacking(seen: Made, cone: float, remedy: str) -> list[tuple[str, str]]:
 
     ``cone`` degrees about its generating view are what it was to serve.
     """
-    back, found = "its own view is plotter.camera = vdi.camera.to_pyvista()", []
+    back = "its own view is plotter.camera = vdi.camera.to_pyvista()"
+    found = []
     if seen.angle > cone:
-        what = (
-            f"the view is {seen.angle:.0f} degrees from the VDI's generating view, which was to "
-            f"serve {cone:.0f}: it shows less, and less of what was hidden; {back}"
-        )
-        found.append(("angle", what))
+        what = f"the view is {seen.angle:.0f} degrees from the VDI's generating view, which was to "
+        found.append(("angle", f"{what}serve {cone:.0f}: it shows less; {back}"))
     if seen.coverage < _TOO_LITTLE:
-        what = (
-            f"{1 - seen.coverage:.0%} of the view's rays through the volume leave what the VDI "
-            f"covers: there it shows nothing; {back}"
-        )
-        found.append(("coverage", what))
+        what = f"{1 - seen.coverage:.0%} of the view's rays through the volume leave what the VDI "
+        found.append(("coverage", f"{what}covers: there it shows nothing; {back}"))
     if seen.magnification > _TOO_COARSE:
-        what = (
-            f"{seen.magnification:.1f} pixels of the view are as wide as one of the VDI's lists: "
-            "it shows no finer detail"
-        )
-        found.append(("magnification", what))
+        what = f"{seen.magnification:.1f} pixels of the view are as wide as one of the VDI's "
+        found.append(("magnification", f"{what}lists: it shows no finer detail"))
     end = f"{remedy}; regenerate='never' takes this as it is"
     return [(cause, f"{what}; {end}") for cause, what in found]

@@ -10,8 +10,6 @@ import statistics
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.quality.costs import RenderMode
 
 #: Frames whose mean rate is reported (paper section 5), and those that the cost is estimated from:
@@ -19,9 +17,9 @@ from pyvista_vdi.quality.costs import RenderMode
 RECENT_FRAMES, _MEMORY = 5, 8
 #: Fewest samples by default, as a share of the full frame: a quarter of its pixels along each edge.
 FLOOR = 1 / 16
-#: Share of the threshold within which nothing changes. The rest is room for what the mean learns
-#: too late, so that frames keep within the threshold while the cost drifts.
-_DEAD_BAND = 0.5
+#: Relative deviation from the target within which nothing changes. Frames are to keep within twice
+#: as much: the rest is room for what the mean learns too late.
+_DEAD_BAND = 0.05
 #: A frame this many times slower or faster than expected is believed when the next one is, too.
 _STALL = 2.0
 #: Share of a frame's time that the work gets where all else alone misses the rate: a blurred
@@ -56,48 +54,22 @@ class FrameRate:
     A sample is any unit in proportion to which a frame's work grows, such as the rays of an image
     with fewer pixels. Each method returns the record that follows.
 
-    Parameters
-    ----------
-    target_fps : float
-        Frames per second to be kept.
-    threshold : float
-        Relative deviation from the target that frames should keep within.
-    floor : float
-        Fewest samples, as a share of the full frame.
-
-    Raises
-    ------
-    InvalidArgumentError
-        If one is out of its range.
-
-    Notes
-    -----
     The paper divides the mean time of the last five frames by their samples and adjusts the samples
     where that mean misses the target by more than the threshold. Here a frame's time is
     ``overhead + seconds_per_sample * samples``, whose two numbers are means of the last eight
     frames: dividing the overhead by the samples as well would make every correction too small.
-    Nothing changes within half the threshold. A frame that takes more than twice, or less than
-    half, of what was expected is set aside, and dropped as a stall unless the next is off in the
-    same sense: then the two are the new truth. Where the overhead alone misses the target, the work
+    Nothing changes within a twentieth of the target. A frame that takes more than twice, or less
+    than half, of what was expected is set aside, and dropped as a stall unless the next is off in
+    the same sense: then the two are the new truth. Where the overhead alone misses the target, the work
     gets a quarter of the frame's time.
     """
 
-    target_fps: float = 30.0
-    threshold: float = 0.1
-    floor: float = FLOOR
+    target_fps: float = 30.0  # to be kept
+    floor: float = FLOOR  # fewest samples, as a share of the full frame
     durations: tuple[float, ...] = ()  # seconds, stalls included
     frames: tuple[_Frame, ...] = ()  # what the estimate is made of, oldest first
     doubtful: _Frame | None = None  # set aside until the next frame
     choice: int | None = None  # None: full
-
-    def __post_init__(self) -> None:
-        rate, threshold, floor = map(as_float, (self.target_fps, self.threshold, self.floor))
-        if not (0 < rate < math.inf and 0 < threshold < 1 and 0 < floor <= 1):
-            raise InvalidArgumentError(
-                "target_fps must be a number of frames per second above 0, threshold a deviation "
-                "between 0 and 1, and floor a share of the full frame, above 0 and at most 1; got "
-                f"{self.target_fps!r}, {self.threshold!r} and {self.floor!r}"
-            )
 
     @property
     def fps(self) -> float:
@@ -111,7 +83,7 @@ class FrameRate:
         overhead, each = self._cost()
         aim = 1 / self.target_fps
         aim = overhead / (1 - _LEAST_WORK) if overhead >= aim else max(aim, 1.1 * overhead)
-        band = max(_DEAD_BAND * self.threshold * aim, each)  # no closer than a sample
+        band = max(_DEAD_BAND * aim, each)  # no closer than a sample
         fitting, expected = (aim - overhead) / each, overhead + each * self.chosen(full)
         if self.choice is None and expected <= aim + band:
             return self

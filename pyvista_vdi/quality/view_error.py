@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
+from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
@@ -33,6 +32,8 @@ from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import picture_room, raycast_medium
 
 Floats: TypeAlias = NDArray[np.float64]
+#: Along x and y.
+Pair: TypeAlias = tuple[int, int]
 #: Premultiplied RGBA, float32 (height, width, 4).
 Picture: TypeAlias = NDArray[np.float32]
 
@@ -62,7 +63,6 @@ class ViewError:
     """What is known of a VDI's error in a view."""
 
     ssim: float  # predicted, of the VDI's picture against the volume's; NaN below 11 pixels
-    standard_error: float  # of that, from how much the tiles differ from what was guessed
     angle: float  # degrees, see angle_from_generating_view()
     magnification: float  # pixels per list, see magnification()
     tiles: int  # that were rendered; 0 where the volume is not in view
@@ -72,27 +72,11 @@ class ViewError:
 class ViewErrorEstimator:
     """Estimates the error of VDIs of one volume; keeps the volume on the device.
 
-    Parameters
-    ----------
-    volume : Volume
-        What the VDIs stand for.
-    transfer_function : TransferFunction
-        How it is to look.
-    medium : MediumOptions, optional
-        How the volume is sampled: as it was when the VDIs were generated, but for the lights,
-        which are those of the view that is judged.
-    tiles : int
-        Tiles of an estimate, at least 2. All there are, if that is fewer.
-    tile_size : int
-        Edge of a tile in pixels, at least 11. What SSIM compares around a pixel reaches five
-        pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
-    device : optional
-        See :func:`pyvista_vdi.list_devices`.
-    **changes
-        Options by name, in place of those in ``medium``.
+    The volume is sampled as ``medium`` and ``changes`` of its options say: as it was when the VDIs
+    were generated, but for the lights, which are those of the view that is judged. An estimate
+    takes ``tiles`` of ``tile_size`` pixels along each edge; what SSIM compares around a pixel
+    reaches five pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
 
-    Notes
-    -----
     The picture is cut into cells as large as what a tile tells, inside the rectangle around the
     bounds (elsewhere both pictures are empty, and SSIM is 1). Both pictures are rendered at a
     fifth of the pixels along each edge to guess each cell's loss, 1 - SSIM, up to a factor. A
@@ -114,10 +98,9 @@ class ViewErrorEstimator:
         **changes: Any,
     ) -> None:
         options = MediumOptions.of(medium, changes)
-        self._tiles = _whole("tiles", tiles, 2)
-        self._edge = _whole("tile_size", tile_size, SSIM_WINDOW) - 2 * REACH
+        self._tiles, self._edge = tiles, tile_size - 2 * REACH
         self._runtime = get_runtime(device)
-        edge = max(int(tile_size), math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
+        edge = max(tile_size, math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
         room = picture_room((edge, edge), options.memory_limit)
         self._medium = DeviceVolume(self._runtime, volume, transfer_function, options, room=room)
 
@@ -126,34 +109,29 @@ class ViewErrorEstimator:
         vdi: VDI,
         camera: Any,
         window_size: Sequence[int] | None = None,
-        *,
-        clipping_planes: ArrayLike | None = None,
-        cropping: Any = None,
-        opacity_multiplier: float = 1.0,
+        options: RenderOptions | None = None,
         background: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> ViewError:
         """Estimate how similar the VDI's picture of a view is to the volume's.
 
         The view's ``model_transform`` says where volume and VDI are now, ``window_size`` (width,
-        height) is that of the whole picture, by default the VDI's own, and ``background`` the RGB
-        that both pictures are blended over before they are compared; planes, cropping and
-        multiplier are as for :func:`pyvista_vdi.render`, of both. InvalidArgumentError if an
-        argument cannot be used.
+        height) is that of the whole picture, by default the VDI's own, ``options`` are those that
+        both are drawn with, and ``background`` is the RGB that both are blended over before they
+        are compared. InvalidArgumentError if an argument cannot be used.
         """
         camera = Camera.from_any(camera)
         size = check_window_size(vdi.window_size if window_size is None else window_size)
-        shown = RenderOptions(clipping_planes, cropping, opacity_multiplier)
-        request = FrameRequest(camera, size, shown, device=self._runtime)
+        request = FrameRequest(camera, size, options or RenderOptions(), device=self._runtime)
         where = (angle_from_generating_view(vdi, camera), magnification(vdi, camera, size))
         if min(size) < SSIM_WINDOW:
-            return ViewError(math.nan, math.nan, *where, 0)
+            return ViewError(math.nan, *where, 0)
         sample = self.sample(vdi, request, background)
         if sample is None:
-            return ViewError(1.0, 0.0, *where, 0)
+            return ViewError(1.0, *where, 0)
         old, new = self.tiles(sample, request, vdi), self.tiles(sample, request)
-        ssim, error = sample.infer(tiles_ssim(old, new, background))
+        ssim = sample.infer(tiles_ssim(old, new, background))
         contrast = contrast_ratio(old, new, 1 / sample.chances, background)
-        return ViewError(ssim, error, *where, len(new), contrast)
+        return ViewError(ssim, *where, len(new), contrast)
 
     def sample(
         self, vdi: VDI, request: FrameRequest, background: Sequence[float] = (0.0, 0.0, 0.0)
@@ -167,13 +145,13 @@ class ViewErrorEstimator:
         region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
-        cells = Cells(region, size, self._edge)
+        cells = Cells(*region, size, self._edge)
         n = len(cells.corners)
         if n <= self._tiles:
             return cells.sample(np.ones(n), self._tiles)
         # Draw coarse pictures of the region both ways, in bands
-        columns, rows = (-(-extent // COARSE) for extent in region.extent)
-        left, top = region.first
+        (left, top), extents = region
+        columns, rows = (-(-extent // COARSE) for extent in extents)
         band = max(1, _COARSE_LAUNCH // columns)
         pictures: tuple[list[Picture], list[Picture]] = ([], [])
         for row in range(0, rows, band):
@@ -181,49 +159,34 @@ class ViewErrorEstimator:
             corner = (left, top + row * COARSE)
             lens = camera.tile(size, corner, (columns * COARSE, high * COARSE))
             part = request.replace(camera=lens, size=(columns, high))
-            for drawn, of in zip(pictures, (vdi, None), strict=True):
-                drawn.append(self._picture(part, of))
+            pictures[0].append(render_vdi(vdi, part))
+            pictures[1].append(raycast_medium(self._medium, part))
         old, new = (over_background(np.concatenate(each), background) for each in pictures)
         return cells.sample(cells.guess(old, new), self._tiles)
 
     def tiles(
-        self,
-        sample: TileSample,
-        request: FrameRequest,
-        vdi: VDI | None = None,
-        lit_from: Camera | None = None,
+        self, sample: TileSample, request: FrameRequest, vdi: VDI | None = None
     ) -> list[Picture]:
-        """Return the pictures of a view's tiles, by a VDI or, without one, by the volume.
-
-        ``lit_from`` is the view whose light falls on the volume, in place of the picture's.
-        """
+        """Return the pictures of a view's tiles, by a VDI or, without one, by the volume."""
         pictures = []
         for column, row in sample.corners.tolist():
             lens = request.camera.tile(request.size, (column, row), sample.size)
             tile = request.replace(camera=lens, size=sample.size)
-            pictures.append(self._picture(tile, vdi, lit_from))
+            drawn = raycast_medium(self._medium, tile) if vdi is None else render_vdi(vdi, tile)
+            pictures.append(drawn)
         return pictures
-
-    def _picture(
-        self, request: FrameRequest, vdi: VDI | None, lit_from: Camera | None = None
-    ) -> Picture:
-        if vdi is not None:
-            return render_vdi(vdi, request)
-        return raycast_medium(self._medium, request, lit_from=lit_from)
 
 
 # Where a view stands
 
 
 def angle_from_generating_view(vdi: VDI, camera: Any) -> float:
-    """Return by how much a view has turned about the VDI's model since it was generated.
+    """Return by how much a view has turned about the VDI's model, degrees from 0 to 180.
 
-    It is the angle, degrees from 0 to 180, between the directions from the centre of the bounds to
-    the two eyes, each taken to the model frame by its own camera's model transform, and compared as
-    that of the VDI's ``camera`` shows them. Moving the eye towards the centre, turning it about its
-    own place and moving the model along with the camera are no turn. In parallel projection the eye
-    is infinitely far against the direction of projection; that also stands in for an eye at the
-    very centre.
+    It is the angle between the directions from the centre of the bounds to the two eyes, each taken
+    to the model frame by its own camera's model transform, and compared as that of the VDI's
+    ``camera`` shows them. In parallel projection the eye is infinitely far against the direction of
+    projection; that also stands in for an eye at the very centre.
     """
     shown = vdi.camera.model_transform[:3, :3]
     old, new = (
@@ -316,15 +279,12 @@ class TileSample:
     guessed: float
     share: float
 
-    def infer(self, ssim: Floats) -> tuple[float, float]:
-        """Return the SSIM of the whole picture, and its standard error, from the tiles'."""
-        losses, chances, guess = 1.0 - ssim, self.chances, self.guess
-        seen, expected = float((losses / chances).sum()), float((guess / chances).sum())
-        ratio = seen / expected if expected > 0 else 0.0
-        residuals, n = (losses - ratio * guess) / chances, len(losses)
-        variance = n / max(1, n - 1) * float(((1 - chances) * residuals**2).sum())
-        total = seen + ratio * (self.guessed - expected)
-        return float(1.0 - self.share * total), float(self.share * math.sqrt(variance))
+    def infer(self, ssim: Floats) -> float:
+        """Return the SSIM of the whole picture from the tiles'."""
+        losses, guess = (1.0 - ssim) / self.chances, self.guess / self.chances
+        ratio = losses.sum() / guess.sum() if guess.any() else 0.0
+        total = losses.sum() + ratio * (self.guessed - guess.sum())
+        return float(1.0 - self.share * total)
 
 
 def tiles_ssim(
@@ -333,12 +293,11 @@ def tiles_ssim(
     """Return the mean SSIM of the inner pixels of pairs of tiles of one size, float64 (k,)."""
     from skimage.metrics import structural_similarity  # loads SciPy
 
-    height, width = new[0].shape[:2]
     # One above the other: a call for each would take five times as long
     pair = (over_background(np.concatenate(tiles), background) for tiles in (old, new))
     _, ssim = structural_similarity(*pair, full=True, **SSIM_ARGUMENTS)
     inner = slice(REACH, -REACH)
-    by_tile = ssim.reshape(len(new), height, width, 3)[:, inner, inner]
+    by_tile = ssim.reshape(len(new), *new[0].shape[:2], 3)[:, inner, inner]
     return np.asarray(by_tile.mean(axis=(1, 2, 3)))
 
 
@@ -363,32 +322,23 @@ def contrast_ratio(
     return sums[0] / sums[1] if sums[1] > 0 else 1.0
 
 
-@dataclass(frozen=True)
-class Region:
-    """A rectangle of pixels: first column and row from the top left, and how many."""
-
-    first: tuple[int, int]
-    extent: tuple[int, int]
-
-
 class Cells:
-    """A region of a window cut into cells, each the part of a tile whose SSIM the tile tells.
+    """A rectangle of a window cut into cells, each the part of a tile whose SSIM the tile tells.
 
     ``corners``: int64 (n, 2), column and row of each **tile's** first pixel, along a space-filling
     curve. ``tile_size``: width and height of a tile, pixels.
     """
 
-    def __init__(self, region: Region, size: tuple[int, int], edge: int) -> None:
-        self._region = region
-        self._size = size
+    def __init__(self, first: Pair, extent: Pair, size: Pair, edge: int) -> None:
+        self._first, self._size = first, size
         self._edges = [min(edge, s - 2 * REACH) for s in size]
-        axes = zip(region.first, region.extent, self._edges, size, strict=True)
+        axes = zip(first, extent, self._edges, size, strict=True)
         columns, rows = self._starts = [_cell_starts(f, n, e, s - REACH) for f, n, e, s in axes]
         self._order = _along_curve(len(columns), len(rows))
         column, row = self._order.T
         self.corners = np.stack([columns[column], rows[row]], axis=1) - REACH
         self.tile_size = (self._edges[0] + 2 * REACH, self._edges[1] + 2 * REACH)
-        self.area = math.prod(max(n, e) for n, e in zip(region.extent, self._edges, strict=True))
+        self.area = math.prod(max(n, e) for n, e in zip(extent, self._edges, strict=True))
 
     def guess(self, old: Floats, new: Floats) -> Floats:
         """Guess each cell's loss, up to a factor, from coarse pictures of the region.
@@ -431,7 +381,7 @@ class Cells:
         """Mean over each cell of values at coarse pixels of the region, float64 (n,)."""
         # Find the shares of coarse pixels in cells along each axis; those of a cell add up to 1
         shares = []
-        axes = zip(self._starts, self._edges, self._region.first, coarse.shape[::-1], strict=True)
+        axes = zip(self._starts, self._edges, self._first, coarse.shape[::-1], strict=True)
         for starts, edge, first, count in axes:
             begin = first + COARSE * np.arange(count)
             low = np.maximum(begin[None], starts[:, None])
@@ -443,30 +393,29 @@ class Cells:
 
 
 def seen_region(
-    camera: Camera, size: tuple[int, int], boxes: Sequence[Sequence[float]]
-) -> Region | None:
-    """Pixels whose SSIM the boxes can change; None if there are none.
+    camera: Camera, size: Pair, boxes: Sequence[Sequence[float]]
+) -> tuple[Pair, Pair] | None:
+    """Return the rectangle of pixels whose SSIM the boxes can change: its first, and how many.
 
-    The whole picture where a box reaches behind the eye. SSIM is not told within five pixels of
-    the picture's border.
+    The whole picture where a box reaches behind the eye, but for the five pixels along its border,
+    of which no SSIM is told; ``None`` if there are none.
     """
     corners = np.concatenate([bounds_corners(box) for box in boxes])
     points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
-    depth, edges = points[:, 2], np.asarray(size)
+    depth = points[:, 2]
     if not camera.parallel_projection and depth.max() <= 0:
         return None
-    first, last = np.zeros(2), edges.astype(np.float64)
+    first, last = np.zeros(2), np.array(size, np.float64)
     if camera.parallel_projection or depth.min() > rays.NEAREST_DEPTH * depth.max():
         viewport = points @ camera.viewport_matrix(size).T
-        u, v = viewport[:, :2].T / viewport[:, 3]
-        pixels = (np.stack([u, -v], axis=1) + 1) / 2 * edges
+        pixels = (viewport[:, :2] / viewport[:, 3:] * (1, -1) + 1) / 2 * size
         first, last = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0))
-    low = np.clip(first - REACH, REACH, edges - REACH).astype(int)
-    high = np.clip(last + REACH, REACH, edges - REACH).astype(int)
+    low = np.clip(first - REACH, REACH, np.subtract(size, REACH)).astype(int)
+    high = np.clip(last + REACH, REACH, np.subtract(size, REACH)).astype(int)
     if (high <= low).any():
         return None
     (left, top), (width, height) = low.tolist(), (high - low).tolist()
-    return Region((left, top), (width, height))
+    return (left, top), (width, height)
 
 
 def _cell_starts(first: int, extent: int, edge: int, end: int) -> NDArray[np.int64]:
@@ -506,10 +455,3 @@ def _contrast(picture: Floats) -> Floats:
     beside = (across, ((0, 0), (0, 1))), (across, ((0, 0), (1, 0)))
     above = (down, ((0, 1), (0, 0))), (down, ((1, 0), (0, 0)))
     return np.asarray(np.max([np.pad(step, by) for step, by in (*beside, *above)], axis=0))
-
-
-def _whole(name: str, value: Any, least: int) -> int:
-    number = as_whole(value)
-    if not number >= least:
-        raise InvalidArgumentError(f"{name} must be a whole number from {least} on; got {value!r}")
-    return int(number)

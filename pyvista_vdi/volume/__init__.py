@@ -1,1 +1,1 @@
-"""Classified volumes on a device: upload, bricks, light, volume rendering."""
+"""Classified volumes on a device: upload, bricks, light, ambient occlusion, volume rendering."""

@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, padded
+from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
 from pyvista_vdi.device.constants import GROUP
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import held_unit_distance, summation
 from pyvista_vdi.model.options import MediumOptions
@@ -27,6 +29,7 @@ from pyvista_vdi.volume.kernels import (
     MACROCELL_VISIBILITY,
     SCALAR_MEDIA,
 )
+from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
 from pyvista_vdi.volume.rays import GridPart, GridRays, Variant, checked_sample_distance
 from pyvista_vdi.volume.upload import (
     ENTRY_BYTES,
@@ -58,12 +61,14 @@ class DeviceVolume:
     """A classified volume as kernel arguments.
 
     The volume is uploaded once per device and kept as long as the object lives; the transfer
-    function's table, a few kilobytes, each time. ``options``, and ``changes`` of them, say how it
-    is sampled; ``skip_empty`` passes by macrocells that the transfer function makes transparent,
-    with the same samples; ``by_scalar`` looks up the medium of each scalar where that can be done.
-    With ``part``, the volume's points lie in a grid of which they are a part: marches go along the
-    whole grid's rays, and take the steps that belong to the part. A volume for which ``room`` is
-    too little is held brick by brick; without it in one piece or refused.
+    function's table, a few kilobytes, each time; ambient occlusion is computed once for a
+    classification. ``options``, and ``changes`` of them, say how it is sampled; ``skip_empty``
+    passes by macrocells that the transfer function makes transparent, with the same samples;
+    ``by_scalar`` looks up the medium of each scalar where that can be done. With ``part``, the
+    volume's points lie in a grid of which they are a part: marches go along the whole grid's rays,
+    and take the steps that belong to the part; ``ambient``, float32 (nz, ny, nx), is then the mean
+    transmittance around the nodes of the whole grid's occlusion. A volume for which ``room`` is too
+    little is held brick by brick; without it in one piece or refused.
 
     Rays are marched through ``grid``, the volume or what it is a part of. ``bricks`` are on the
     device where the whole volume is not: steps must be sampled by a
@@ -83,6 +88,7 @@ class DeviceVolume:
         skip_empty: bool = True,
         by_scalar: bool = True,
         part: GridPart | None = None,
+        ambient: NDArray[np.float32] | None = None,
         room: Room | None = None,
         **changes: Any,
     ) -> None:
@@ -134,16 +140,32 @@ class DeviceVolume:
             octants, name = volume.blanked, f"what is blank of volume {volume.name!r}"
             kept = uploads_of(volume).kept
             blanked = kept(runtime, "blanked", None, lambda: runtime.upload(octants, name))
+        asked = options.ambient_occlusion
+        occlusion = None if asked is None else OcclusionGrid.of(self.grid, asked)
+        strength = 0.0 if asked is None else asked.strength
         self._arguments: dict[str, Any] = {
-            "classified": _numbers(volume, table, part),
+            "classified": _numbers(volume, table, part, occlusion, strength),
             "voxels": voxels.buffer,
             "table": table.buffer,
             "distances": distances,
             "blanked": blanked,
             "gradient": gradient,
             "lighting": None,
+            "ambient": None,
         }
         self._lit: tuple[Camera, DeviceBuffer] | None = None
+        if asked is not None and occlusion is not None:
+            if voxels.buffer is None:
+                raise DeviceMemoryError(
+                    f"ambient occlusion needs the volume {volume.name!r} in one piece, "
+                    f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
+                    "ambient_occlusion out, or use another device"
+                )
+            self._arguments["ambient"] = (
+                self._occluded(asked, occlusion)
+                if ambient is None
+                else runtime.upload(ambient, "ambient occlusion")
+            )
         # Last: nothing that fails then keeps them for as long as somebody looks at the error
         self.bricks: DeviceBricks | None = None
         if voxels.buffer is None:
@@ -178,6 +200,44 @@ class DeviceVolume:
             table = lighting_table(self.grid, camera, self._looks.shading, self._lights)
             self._lit = (camera, self.runtime.upload(table, "lights"))
         return {**self._arguments, "lighting": self._lit[1]}
+
+    def _occluded(self, occlusion: AmbientOcclusion, grid: OcclusionGrid) -> DeviceBuffer:
+        """Return the mean transmittances around the occlusion's nodes, made once and kept."""
+        # Colours and shading have no part in it
+        looks = self._looks
+        opacity = looks.replace(colors=np.zeros_like(looks.colors), shading=None)
+        radius, directions = occlusion.radius_in(self.volume), occlusion.directions
+        key = (opacity, radius, directions, self.sample_distance)
+        return uploads_of(self.volume).kept(
+            self.runtime,
+            "occlusion",
+            key,
+            lambda: ambient_transmittances(self.runtime, grid, **self._opacity_arguments()),
+        )
+
+    def part_opacities(
+        self,
+        grid: OcclusionGrid,
+        first: tuple[int, int, int],
+        nodes: tuple[int, int, int],
+    ) -> NDArray[np.float32]:
+        """Return what this part of a volume has of the opacities of its occlusion's nodes.
+
+        ``first``: the first of ``nodes``, both along x, y and z; float32 (nz, ny, nx).
+        """
+        points = self.grid.dimensions
+        return opacities_of_part(
+            self.runtime, grid, points, first, nodes, **self._opacity_arguments()
+        )
+
+    def _opacity_arguments(self) -> dict[str, Any]:
+        """Return what the opacities of an occlusion's nodes are made of: lights have no part."""
+        names = ("classified", "voxels", "table", "blanked", "gradient")
+        return {
+            "medium": {**{k: self._arguments[k] for k in names}, "visible": self._visible},
+            "variant": replace(self.variant, shaded=0, compensated=0, sharp=False),
+            "lengths": (self.sample_distance, self.unit_distance),
+        }
 
 
 @dataclass(frozen=True)
@@ -259,9 +319,16 @@ def _numbers(
     volume: Volume,
     table: _Table,
     part: GridPart | None,
+    occlusion: OcclusionGrid | None,
+    strength: float,
 ) -> dict[str, Any]:
     """Return the numbers of a classified volume as kernels take them."""
     infinite, size = (math.inf,) * 4, (*volume.dimensions, 0)
+    nodes: tuple[float, ...] = (0,) * 4
+    to_nodes: tuple[float, ...] = (0,) * 4
+    if occlusion is not None:
+        nodes = (*occlusion.nodes, 0)
+        to_nodes = (*(1 / edge for edge in occlusion.cell), strength)
     return {
         "size": size,
         "held": size,
@@ -269,6 +336,8 @@ def _numbers(
         "part_first": (0,) * 4 if part is None else (*part.first, 0),
         "part_lower": infinite if part is None else (*part.lower, 0),
         "part_upper": infinite if part is None else (*part.upper, 0),
+        "nodes": nodes,
+        "to_nodes": to_nodes,
         "entries": table.entries,
         "low": table.low,
         "per_scalar": table.per_scalar,

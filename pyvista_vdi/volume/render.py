@@ -73,7 +73,7 @@ def raycast_volume(
     generates VDIs.
     """
     sampling = sampling or MediumOptions()
-    room = picture_room(request.size, sampling.memory_limit)
+    room = picture_room(request.size, sampling.memory_limit, sampling.occlusion_bytes(volume))
     medium = DeviceVolume(
         get_runtime(request.device),
         volume,
@@ -86,11 +86,11 @@ def raycast_volume(
         return raycast_medium(medium, request)
 
 
-def picture_room(size: tuple[int, int], memory_limit: int | None) -> Room:
-    """Return the room for a volume beside an image."""
+def picture_room(size: tuple[int, int], memory_limit: int | None, occlusion: int = 0) -> Room:
+    """Return the room for a volume beside an image and so many bytes of an occlusion's grid."""
     width, height = size
     items = block_items(width, _rows_of_part(size, memory_limit))
-    working = width * height * _PIXEL_BYTES + items * _STATE_BYTES
+    working = width * height * _PIXEL_BYTES + items * _STATE_BYTES + occlusion
     rays = f"an image of {width} x {height} pixels"
     return Room(memory_limit, working, items * _PART_STEPS, rays)
 
@@ -230,6 +230,7 @@ def _refuse_light(
         "RGBA values": volume.rgba,
         "shade": transfer_function.shading is not None,
         "gradient opacity": transfer_function.gradient_opacities is not None,
+        "ambient_occlusion": sampling.ambient_occlusion is not None,
         "opacity_multiplier": request.options.opacity_multiplier != 1.0,
         "memory_limit": sampling.memory_limit is not None,
     }

@@ -25,6 +25,7 @@ PACKAGE = Path(pyvista_vdi.__file__).parent
 #: Modules that names in annotations are imported from; else it is where the class is.
 HOMES = (collections.abc, typing, npt, types)
 CLASSES = {
+    "AmbientOcclusion": "model.ambient_occlusion",
     "DeferredVDI": "model.deferred",
     "Estimate": "generation.slices",
     "Pick": "raycasting.picking",

@@ -56,7 +56,7 @@ ENTRIES = {
         TABLED,
         [
             *("opaque_depth", "clipping_planes", "cropping", "lights"),
-            *("early_termination", "opacity_multiplier", "settings"),
+            *("early_termination", "ambient_occlusion", "opacity_multiplier", "settings"),
         ],
     ),
     "Settings": lambda vdi: (pvdi.Settings, {}, None),
@@ -71,7 +71,7 @@ ENTRIES = {
     "generate_series": lambda vdi: (
         pvdi.generate_series,
         {"volumes": [VOLUME], "camera": CAMERA, "window_size": SIZE, "transfer_function": TABLE},
-        ["times", "progress", "precision", "quality", "max_supersegments"],
+        ["times", "progress", "max_supersegments"],
     ),
     "generate_set": lambda vdi: (
         pvdi.generate_set,
@@ -92,7 +92,7 @@ ENTRIES = {
     ),
     **{
         name: lambda vdi, name=name: (getattr(pvdi, name), {}, None)
-        for name in ("Light", "Lights", "Shading")
+        for name in ("Light", "Lights", "Shading", "AmbientOcclusion")
     },
     "VDISeries": lambda vdi: (pvdi.VDISeries, {"steps": [vdi], "times": [0]}, None),
     "VDI": lambda vdi: (

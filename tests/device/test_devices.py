@@ -13,9 +13,9 @@ from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError
 
 
 def fake(platform: str, name: str, kind: str, index: tuple[int, int], **more) -> ocl.DeviceInfo:
-    names = {"name": name, "platform": platform, "vendor": "V", "version": "OpenCL 3.0"}
+    names = {"name": name, "platform": platform, "version": "OpenCL 3.0"}
     sizes = {"compute_units": 4, "global_memory": 2**33, "max_allocation": 2**31}
-    state = {"driver": "1", "kind": kind, "has_fp64": True, "usable": True, "reason": ""}
+    state = {"driver": "1", "kind": kind, "usable": True, "reason": ""}
     place = {"platform_index": index[0], "device_index": index[1]}
     return ocl.DeviceInfo(**{**names, **sizes, **state, **place, **more})
 

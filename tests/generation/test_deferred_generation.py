@@ -136,6 +136,7 @@ def test_generate_returns_one_and_bakes_by_default(runtime):
     [
         ({"cmap": "bone"}, InvalidArgumentError, "give cmap to classified"),
         ({"shade": True}, UnsupportedError, "shade"),
+        ({"ambient_occlusion": True}, UnsupportedError, "ambient_occlusion"),
         ({"quality": "fast"}, UnsupportedError, "give max_supersegments"),
         ({"blending": "maximum"}, UnsupportedError, "blending"),
         ({"value_range": "all"}, InvalidArgumentError, "value_range must be"),

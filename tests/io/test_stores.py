@@ -16,6 +16,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVolumeError,
+    MissingDependencyError,
     UnsupportedError,
 )
 

@@ -151,7 +151,7 @@ def archive_with(text):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 5, "written_by": "pyvista-vdi 9.0"}, r"5, .* 9\.0'; .* up to version 4: upgr"),
+        ({"version": 5, "written_by": "pyvista-vdi 9.0"}, r"5, .* 9\.0'; .* versions 2 to 4: upgr"),
         ({"version": 1}, "version 1, which is not read any more .*anew"),
         ({"version": 2, "codec": "deflate"}, "version 2 has no codec 'deflate'"),
     ],

@@ -96,7 +96,8 @@ def test_nifti_is_placed_by_its_sform_then_its_quaternion_then_from_the_origin(t
     half = 0.25  # of the angle about z
     by_quaternion = (0, 0, np.sin(half), *ORIGIN)
     volume = pvdi.read_volume(nifti(tmp_path / "a.nii", quaternion=by_quaternion, unit=3))
-    check(volume, scan(), placed(turned()), "um")
+    micrometres = placed(turned(), SPACING / 1000, ORIGIN / 1000)
+    check(volume, scan(), micrometres, "mm")
     flipped = pvdi.read_volume(nifti(tmp_path / "a.nii", quaternion=by_quaternion, qfac=-1.0))
     check(flipped, scan(), placed(turned() @ np.diag([1, 1, -1])), "mm")
     other = placed(turned() @ turned())
@@ -127,8 +128,8 @@ def test_nrrd(tmp_path):
         (
             {
                 "metadata": {"axes": "ZYX", "PhysicalSizeXUnit": "mm", "PhysicalSizeYUnit": "mm"}
-                | {"PhysicalSizeZUnit": "µm", "PhysicalSizeX": 1, "PhysicalSizeY": 1.5}
-                | {"PhysicalSizeZ": 2500.0},
+                | {"PhysicalSizeZUnit": "mm", "PhysicalSizeX": 1, "PhysicalSizeY": 1.5}
+                | {"PhysicalSizeZ": 2.5},
                 "ome": True,
             },
             *(True, "mm"),

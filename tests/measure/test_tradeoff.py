@@ -76,7 +76,7 @@ def test_the_command_writes_figures_a_table_and_a_plot(shell, tmp_path, capsys, 
     assert cli.main([*run, "--sweep", "sides=2"]) == 1
     assert "--sweep knows no 'sides'" in capsys.readouterr().err
     assert cli.main([*run, "--sweep", "lists=many"]) == 1
-    assert "--sweep lists takes a number; got 'many'" in capsys.readouterr().err
+    assert "--sweep lists takes numbers; got 'many'" in capsys.readouterr().err
 
 
 def test_noise_is_not_taken_for_dominance():

@@ -165,7 +165,7 @@ def test_convert_and_render_classify_and_say_what_is_missing(tmp_path, capsys):
     path, seen, page = (tmp_path / name for name in ("kept.vdi", "seen.vdi", "kept.html"))
     deferred().save(path)
     assert main(["info", str(path)]) == 0
-    assert "values from 100 to 300, classified afterwards" in capsys.readouterr().out
+    assert '"value_range": [100.0, 300.0]' in capsys.readouterr().out
     assert main(["convert", str(path), "--cmap", "bone", "-o", str(seen)]) == 0
     assert isinstance(pvdi.read(seen), pvdi.VDI)
     # A page keeps values, and begins with a look

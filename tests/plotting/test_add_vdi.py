@@ -269,12 +269,14 @@ def test_settings_reach_the_generator(plotter):
         "tolerance": 0.01,
         "view_cone": 30.0,
     }
-    chosen = pvdi.Settings(**settings)
-    actor = plotter.add_vdi(soft_ball(), max_supersegments=3, settings=chosen)
+    actor = plotter.add_vdi(
+        soft_ball(), max_supersegments=3, ambient_occlusion=0.4, settings=pvdi.Settings(**settings)
+    )
     shown(plotter)
     made_by = actor.vdi.metadata
     assert actor.vdi.counts.max() <= 3
     assert {name: made_by[name] for name in settings} == settings
+    assert made_by["ambient_occlusion"]["radius"] == 0.4
     assert made_by["scalars"] == "v"
 
 

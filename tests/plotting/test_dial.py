@@ -11,7 +11,7 @@ from watched_windows import finish, small_vdi
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.model.options import QualityTarget
-from pyvista_vdi.quality.background import Worker, vdi_job
+from pyvista_vdi.quality.background import BackgroundThread, vdi_job
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.quality.targets import LADDER
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
@@ -148,7 +148,7 @@ def test_what_is_made_in_the_background_is_chosen_there():
     source = ready_source()
     source.SetDial("balanced")
     request = source.MakeRequest()
-    background = Worker("pyvista-vdi generation")
+    background = BackgroundThread("pyvista-vdi generation")
     background.put(vdi_job(request.generation, request.target))
     finish()
     made = background.take()

@@ -44,6 +44,8 @@ ARGUMENTS = {
     "unit distance": ({"opacity_unit_distance": -1.0}, "opacity_unit_distance.*got -1.0"),
     "preference": ({"preference": "face"}, "preference.*'face'"),
     "interpolation": ({"interpolation": "cubic"}, "'nearest' or 'linear'"),
+    "occlusion": ({"ambient_occlusion": "strong"}, "must be True, a radius.*got 'strong'"),
+    "occlusion's radius": ({"ambient_occlusion": 0.0}, "radius of ambient occlusion.*got 0"),
     "culling": ({"culling": "sideways"}, "culling must be False or one of.*got 'sideways'"),
     "mapper": ({"mapper": "cpu"}, "mapper='cpu' is none of"),
     "no supersegments": ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
@@ -151,6 +153,7 @@ def test_a_block_that_is_refused_takes_those_before_it_along(plotter):
         {"cmap": "bone"},
         {"clim": (0, 1), "opacity": "linear_r"},
         {"max_supersegments": 5},
+        {"ambient_occlusion": True},
         {"camera": pvdi.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0))},
         {"scalars": np.zeros(3)},
     ],
@@ -185,8 +188,8 @@ def test_damaged_image_of_a_vdi_is_refused(plotter):
     [
         *(("SetBlendMode", mode, "only composite blending") for mode in (1, 2, 3, 4)),
         ("SetMaskInput", VOLUME, "cannot be masked"),
-        ("SetGlobalIlluminationReach", 0.5, "SetShade"),
-        ("SetVolumetricScatteringBlending", 0.5, "SetShade"),
+        ("SetGlobalIlluminationReach", 0.5, "SetAmbientOcclusion"),
+        ("SetVolumetricScatteringBlending", 0.5, "SetAmbientOcclusion"),
         ("SetComputeNormalFromOpacity", True, "gradient of its scalars"),
     ],
 )

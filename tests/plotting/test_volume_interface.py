@@ -169,7 +169,7 @@ REFUSED = {
     "sample distance": (lambda a: a.mapper.SetSampleDistance(-1.0), "sample_distance.*got -1.0"),
     "mask": (lambda a: a.mapper.SetMaskInput(image()), "set masked voxels"),
     "normals": (lambda a: a.mapper.SetComputeNormalFromOpacity(1), "ComputeNormalFromOpacity"),
-    "scattering": (lambda a: a.mapper.SetVolumetricScatteringBlending(0.5), "SetShade"),
+    "scattering": (lambda a: a.mapper.SetVolumetricScatteringBlending(0.5), "ambient_occlusion"),
     "another mapper": (
         lambda a: setattr(a, "mapper", pv.plotting.mapper.SmartVolumeMapper()),
         "needs a VDIMapper; got SmartVolumeMapper",

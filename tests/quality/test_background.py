@@ -21,7 +21,7 @@ from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.generation import generate
 from pyvista_vdi.quality import background
-from pyvista_vdi.quality.background import Worker, vdi_job
+from pyvista_vdi.quality.background import BackgroundThread, vdi_job
 from pyvista_vdi.raycasting import raycast
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.volume.upload import uploads_of
@@ -72,7 +72,7 @@ def cancel(generator):
 
 
 def new_generator(runtime):
-    generator = Worker(THREAD_NAME)
+    generator = BackgroundThread(THREAD_NAME)
     generator.device = runtime
     return generator
 
@@ -311,8 +311,8 @@ import numpy as np
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.options import GenerationRequest
-from pyvista_vdi.quality.background import Worker, vdi_job
-generator = Worker("pyvista-vdi generation")
+from pyvista_vdi.quality.background import BackgroundThread, vdi_job
+generator = BackgroundThread("pyvista-vdi generation")
 volume = Volume(np.random.default_rng(0).random((100, 100, 100)).astype("f4"))
 transfer = TransferFunction(np.eye(3), [0.0, 0.3, 0.6], (0, 1))
 camera = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0))

@@ -10,8 +10,7 @@ import pytest
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.costs import Costs
-from pyvista_vdi.quality.pictures import Estimate, Made, Pictures
-from pyvista_vdi.quality.plan import Making, Plan, Seen, lacking, plan
+from pyvista_vdi.quality.plan import Made, Making, Plan, Seen, ViewEstimate, lacking, plan
 
 BOUNDS = (-1.0, 1.0) * 3
 HOME = View(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), (320, 180))
@@ -23,9 +22,9 @@ def turned(degrees):
 
 MADE = Made(1, BOUNDS, "a", HOME, pixels=1e4)
 #: A frame that somebody watches, at rest, of a volume whose VDI is that of this view.
-SEEN = Seen(HOME, "a", BOUNDS, HOME, watched=True, made=MADE, seconds=0.03)
+SEEN = Seen(HOME, "a", HOME, watched=True, made=MADE, seconds=0.03)
 AWAY = replace(SEEN, view=turned(40), made=replace(MADE, angle=40.0))
-POOR = replace(AWAY, estimate=Estimate(1, turned(40), 0.5))
+POOR = replace(AWAY, estimate=ViewEstimate(1, turned(40), 0.5))
 
 
 def of(seen=SEEN, **changes):
@@ -92,7 +91,7 @@ def test_a_view_at_rest_is_estimated_and_gets_a_vdi_if_it_is_poor():
     assert of(POOR).make is None, "the volume's own frames keep the rate"
     assert of(POOR, late=True).make == turned(40)
     assert of(POOR, draw="vdi", bound=0.4).make is None
-    good = replace(POOR, estimate=Estimate(1, turned(40), 0.97), draw="vdi")
+    good = replace(POOR, estimate=ViewEstimate(1, turned(40), 0.97), draw="vdi")
     assert (plan(good).make, plan(good).estimate) == (None, None)
     assert of(good, view=turned(43)).estimate == "background", "it was of another view"
     assert of(AWAY, regenerate="ask", wish=True).make == turned(40)
@@ -160,25 +159,11 @@ def test_one_picture_is_the_volumes_and_no_vdi_is_made():
     assert not of(KEPT, made=None, draw="vdi", failed=True).update
 
 
-def test_many_pictures_of_nearly_one_view_make_a_vdi():
-    pictures, drawn = Pictures(), []
-    for k in range(14):
-        found = of(KEPT, made=None, view=turned(0.2 * k), pictures=pictures)
-        pictures = found.pictures
-        drawn.append((found.show, found.view))
-    assert drawn == [("volume", None)] * 12 + [("vdi", "take")] * 2
-    for again in range(3):  # the same picture once more costs nothing
-        pictures = of(KEPT, made=None, view=turned(90), pictures=pictures).pictures
-        assert len(pictures.by_volume) == 13, again
-    apart = [turned(15 * k) for k in range(24)]
-    assert not Pictures("a", by_volume=tuple(apart)).deserve_vdi(turned(7), BOUNDS)
-
-
 def test_a_vdi_draws_pictures_that_are_like_the_volumes():
     near = replace(KEPT, view=turned(3), made=replace(MADE, angle=3.0))
     assert plan(near).estimate == "now"
     for ssim, contrast, show in ((0.99, 1.0, "vdi"), (0.9, 1.0, "volume"), (0.99, 0.8, "volume")):
-        judged = Estimate(1, turned(3), ssim, contrast)
+        judged = ViewEstimate(1, turned(3), ssim, contrast)
         found = of(near, judged=judged)
         assert (found.show, found.estimate) == (show, None)
         # It holds for views that are as near; what fails fails farther away
@@ -188,7 +173,7 @@ def test_a_vdi_draws_pictures_that_are_like_the_volumes():
             far = of(near, pictures=found.pictures, made=replace(MADE, angle=5.0), view=turned(5))
             assert (far.show, far.estimate) == ("volume", None)
     assert of(near, judged=False).show == "volume"
-    assert of(near, judged=Estimate(1, turned(3), 0.9), bound=0.8).show == "vdi"
+    assert of(near, judged=ViewEstimate(1, turned(3), 0.9), bound=0.8).show == "vdi"
     assert of(near, made=replace(MADE, angle=12.0)).show == "volume"
     assert of(near, made=replace(MADE, angle=3.0, magnification=2.0)).show == "volume"
     assert of(near, made=replace(MADE, angle=3.0, coverage=0.9)).show == "volume"

@@ -3,13 +3,15 @@
 Written from docs/dev/conventions.md and from nothing in the kernels, it defines what is correct.
 :func:`render` gives the exact image of any VDI from any view, :func:`render_joint` that of several
 together, :func:`render_range` and :func:`render_joint_range` what float32 arithmetic may make of a
-ray, :func:`volume_image` the direct volume rendering, and :func:`build_vdi` a plain VDI.
+ray, :func:`volume_image` the direct volume rendering, :func:`build_vdi` a plain VDI, and
+:func:`ambient_transmittance` what ambient occlusion stands for.
 """
 
 from __future__ import annotations
 
 from reference.generate import (
     RaySamples,
+    ambient_transmittance,
     build_vdi,
     samples,
     volume_image,
@@ -20,6 +22,7 @@ from reference.raycast import render, render_pixels
 
 __all__ = [
     "RaySamples",
+    "ambient_transmittance",
     "build_vdi",
     "render",
     "render_joint",

@@ -2,13 +2,14 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.lighting import Lights
@@ -18,9 +19,11 @@ from pyvista_vdi.model.volume import Volume
 from reference.compositing import Segment, composite, merge
 from reference.raycast import HalfSpace, Ray, clip, inside_box, pixel_ray
 from reference.shading import (
+    NodeOcclusion,
     cut_where_unlike,
     gradient_factors,
     lit_colors,
+    mean_transmittance,
     trilinear,
 )
 
@@ -58,6 +61,7 @@ def samples(
     transfer_function: TransferFunction,
     sample_distance: float | None = None,
     lights: Lights | None = None,
+    ambient_occlusion: AmbientOcclusion | None = None,
 ) -> Iterator[RaySamples]:
     """Yield the samples of every pixel's ray, bottom row first, from left to right.
 
@@ -75,6 +79,7 @@ def samples(
             f"sample_distance must be a positive length in model units; got {sample_distance!r}"
         )
     to_index = np.linalg.inv(volume.index_to_model)
+    occlusion = node_occlusion(volume, transfer_function, ambient_occlusion, step)
     for y in range(height):
         row = []
         for x in range(width):
@@ -94,6 +99,7 @@ def samples(
             np.concatenate(lengths),
             camera,
             lights,
+            occlusion,
         )
         ends = np.cumsum([len(length) for length in lengths])[:-1]
         media = zip(*(np.split(values, ends) for values in medium), strict=True)
@@ -108,6 +114,7 @@ def volume_image(
     transfer_function: TransferFunction,
     sample_distance: float | None = None,
     lights: Lights | None = None,
+    ambient_occlusion: AmbientOcclusion | None = None,
 ) -> Array:
     """Return the direct volume rendering: all samples composited, nothing ended early.
 
@@ -115,7 +122,10 @@ def volume_image(
     """
     width, height = check_window_size(window_size)
     image = np.zeros((height, width, 4))
-    for ray in samples(volume, camera, window_size, transfer_function, sample_distance, lights):
+    rays = samples(
+        volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
+    )
+    for ray in rays:
         x, y = ray.pixel
         image[height - 1 - y, x] = composite(ray.color, ray.optical_depth)
     return image
@@ -132,6 +142,7 @@ def build_vdi(
     criterion: str = "least-error",
     weighting: str = "transmittance",
     lights: Lights | None = None,
+    ambient_occlusion: AmbientOcclusion | None = None,
 ) -> VDI:
     """Return a plain VDI: neighbouring samples merged, or cut, until the budget is kept.
 
@@ -158,7 +169,10 @@ def build_vdi(
         )
     depth_origin = near_depth(volume.bounds, camera)
     lists = []
-    for ray in samples(volume, camera, window_size, transfer_function, sample_distance, lights):
+    rays = samples(
+        volume, camera, window_size, transfer_function, sample_distance, lights, ambient_occlusion
+    )
+    for ray in rays:
         runs = [
             Segment(float(t0), float(t1), color, float(tau))
             for t0, t1, color, tau in zip(
@@ -189,6 +203,7 @@ def medium_at(
     length: Array,
     camera: Camera | None = None,
     lights: Lights | None = None,
+    occlusion: NodeOcclusion | None = None,
 ) -> tuple[Array, Array]:
     """Return colour and optical depth of steps whose midpoints have given grid coordinates.
 
@@ -196,7 +211,7 @@ def medium_at(
     ``position``: grid coordinates (x, y, z), in points, float64 (n, 3); transparent outside [0,
     dimensions - 1]. ``length``: of each step, float64 (n,), model units. ``camera``: the view; a
     shaded volume needs one. ``lights``: what a shaded volume is lit by; one headlight by default.
-    Returns: ``color``, straight RGB, float64
+    ``occlusion``: what :func:`node_occlusion` returned. Returns: ``color``, straight RGB, float64
     (n, 3). Returns: ``optical_depth``, float64 (n,): ``-log1p(-a) length / U``; where a is 1, no
     less than 30. A gradient opacity g makes of the opacity alpha of this g alpha. Raises
     InvalidArgumentError if the volume is shaded and there is no camera.
@@ -233,6 +248,8 @@ def medium_at(
             color = lit_colors(
                 volume, camera, transfer_function.shading, lights, inside, differences, color
             )
+    if occlusion is not None:
+        color = color * occlusion.factors(inside)[:, None]
     unseen = outside | np.isnan(scalar)
     if volume.blanked is not None:
         # Leave out what lies in blank octants
@@ -241,6 +258,56 @@ def medium_at(
         x, y, z = nearest.T
         unseen |= (volume.blanked[z, y, x] >> octant & 1).astype(bool)
     return color, np.where(unseen, 0.0, tau)
+
+
+def node_occlusion(
+    volume: Volume,
+    transfer_function: TransferFunction,
+    ambient_occlusion: AmbientOcclusion | None,
+    sample_distance: float | None = None,
+) -> NodeOcclusion | None:
+    """Return the occlusion on a coarse grid, as the device computes it; ``None`` for none.
+
+    ``volume``, ``transfer_function``: what is occluded, by itself. ``ambient_occlusion``: radius,
+    directions and strength. ``sample_distance``: length of the volume's own steps, model units;
+    half the smallest spacing by default.
+    """
+    if ambient_occlusion is None:
+        return None
+    step = min(volume.spacing) / 2 if sample_distance is None else sample_distance
+    grid = OcclusionGrid.of(volume, ambient_occlusion)
+    depth = _optical_depth(volume, transfer_function)
+    return NodeOcclusion(volume, grid, depth, step, ambient_occlusion.strength)
+
+
+def ambient_transmittance(
+    volume: Volume,
+    transfer_function: TransferFunction,
+    position: Array,
+    radius: float,
+    directions: int = 1024,
+    step: float | None = None,
+) -> Array:
+    """Return the mean transmittance around points, by its definition and without a grid: 0 to 1.
+
+    ``position`` are grid coordinates (x, y, z) in points, float64 (n, 3); ``radius`` how far to
+    look and ``step`` the length of a step (half the smallest spacing by default), model units;
+    ``directions`` how many of them the mean is taken over.
+    """
+    step = min(volume.spacing) / 2 if step is None else step
+    depth = _optical_depth(volume, transfer_function)
+    return mean_transmittance(volume, depth, position, radius, directions, step)
+
+
+def _optical_depth(
+    volume: Volume, transfer_function: TransferFunction
+) -> Callable[[Array, float], Array]:
+    unlit = transfer_function.replace(shading=None)
+
+    def optical_depth(position: Array, length: float) -> Array:
+        return medium_at(volume, unlit, position, np.full(len(position), length))[1]
+
+    return optical_depth
 
 
 def classify(transfer_function: TransferFunction, scalar: Array) -> tuple[Array, Array]:

@@ -34,10 +34,10 @@ def own_block(volume, rank):
 
 
 def same(folder):
-    """Write the VDI of four blocks, with gradients, which need others' points."""
+    """Write the VDI of four blocks, with gradients and occlusion, which need others' points."""
     volume = volume_of("uint8")
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
-    options = {"max_supersegments": 8, "precision": "exact"}
+    options = {"max_supersegments": 8, "ambient_occlusion": 8.0, "precision": "exact"}
     options |= {"transfer_function": function, "comm": COMM}
     camera = VIEWS["all of it"](volume)
     with InSitu(folder / "mpi.vdis", camera, WINDOW, volume.dimensions, **options) as show:
@@ -84,7 +84,7 @@ def mistakes(folder, every=8):
     making = {"path": folder / "m.vdis", "camera": camera, "window_size": (8, 6)}
     making |= {"dimensions": (16,) * 3, "comm": COMM, "overwrite": True, "clim": (0, 1)}
     others = ("spacing", "origin", "every", "device", "append", "cmap", "opacity", "nobody")
-    others += ("max_supersegments", "precision", "sample_distance", "lights")
+    others += ("max_supersegments", "precision", "ambient_occlusion", "sample_distance", "lights")
     others += ("transfer_function", "tolerance", "classification")
     showing = {"values": right, "first": at, "at": 0.0}
 

@@ -32,6 +32,7 @@ def test_it_executes_only_when_something_has_changed():
     for name, value in (
         ("Camera", camera_at(5, 4, 3)),
         ("MaxSupersegments", 20),
+        ("AmbientOcclusion", False),
         ("Lights", other),
         ("Metadata", {"a": 1}),
         ("SampleDistance", None),
@@ -53,6 +54,8 @@ def test_it_executes_only_when_something_has_changed():
         lambda: prop.SetScalarOpacityUnitDistance(0.3),
         lambda: source.SetCamera(camera_at(5, 5, 5)),
         lambda: source.SetMaxSupersegments(5),
+        lambda: source.SetAmbientOcclusion(True),
+        lambda: source.SetAmbientOcclusion(pvdi.AmbientOcclusion(0.3, strength=0.5)),
         lambda: volume.GetPointData().GetScalars().Modified(),
     ]
     for count, change in enumerate(changes, start=2):

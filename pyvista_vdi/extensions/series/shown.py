@@ -17,7 +17,7 @@ from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.background import Job, Worker
+from pyvista_vdi.quality.background import Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
@@ -32,10 +32,8 @@ class Decoding(Job):
     """Work beside the frames, and not in turns with them: what it makes is what they wait for."""
 
     def done(self, paused: Callable[[], bool] = lambda: False) -> Any:
-        """Do the work on a queue of this thread's own, and return its result."""
-        runtime = get_runtime(self._device)
-        with runtime.queue_scope():
-            return self._work(runtime, self._report)
+        """Do the work, and return its result."""
+        return self._work(get_runtime(self._device), self._report)
 
 
 class SeveralInput(Input):
@@ -55,7 +53,7 @@ class SeveralInput(Input):
         self._ready: dict[int, VDI] = {}  # by index
         self._broken: set[int] = set()
         self._unsaid: list[Exception] = []  # why they are
-        self._worker = Worker(thread)
+        self._worker = BackgroundThread(thread)
 
     def classified_by(self, prop: Any) -> Input:
         """Set the property that classifies the values of all VDIs from now on."""

@@ -238,6 +238,6 @@ def _locked(folder: Path) -> IO[bytes]:
 
 def _view_and_look(vdi: Any) -> dict[str, Any]:
     """Return what is the same in all steps of a series that is continued."""
-    said = {n: vdi.metadata.get(n) for n in ("transfer_function", "lights")}
+    said = {n: vdi.metadata.get(n) for n in ("transfer_function", "lights", "ambient_occlusion")}
     names = ("camera", "window_size", "value_range", "importance")
     return {n: getattr(vdi, n, None) for n in names} | json.loads(to_json(said))  # type: ignore[no-any-return]

@@ -42,5 +42,5 @@ half_angle  DEGREES  from the camera's direction within which they are (default:
 lists       X        lists per pixel along an edge (default: 1)
 max_supersegments sample_distance memory_limit
 camera: the view that the volume fills; it tells distance, lens, up and a cone's axis
-table:
+table: occlusion:
 """

@@ -24,7 +24,7 @@ from pyvista_vdi.extensions.web.page import html_page
 from pyvista_vdi.extensions.web.source import BadMessageError, Source, Wish, wish_after
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.types import DeviceLike, MemoryLike, VolumeLike
+from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web
@@ -289,6 +289,7 @@ def serve(
     lists: int = 1280 * 720,
     max_supersegments: int = 8,
     sample_distance: float | None = None,
+    ambient_occlusion: OcclusionLike | None = None,
     memory_limit: MemoryLike | None = None,
     max_clients: int = 256,
     device: DeviceLike | None = None,
@@ -316,7 +317,7 @@ def serve(
         Names, besides ``localhost`` and addresses, by which browsers may call this server.
     lists : int
         Most lists of a VDI; fewer where fewer of the page's pixels show the volume.
-    max_supersegments, sample_distance, memory_limit
+    max_supersegments, sample_distance, ambient_occlusion, memory_limit
         As for :func:`pyvista_vdi.generate`; shorter lists by default, which are sent sooner.
     max_clients : int
         Most pages at once.
@@ -344,6 +345,7 @@ def serve(
     options = GenerationOptions.checked(
         max_supersegments=max_supersegments,
         sample_distance=sample_distance,
+        ambient_occlusion=ambient_occlusion,
         memory_limit=memory_limit,
         precision="8-byte",
     )

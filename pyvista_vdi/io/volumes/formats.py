@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
-from pyvista_vdi.io.axes import in_one_unit, one_unit, to_world
+from pyvista_vdi.io.axes import one_unit, to_world
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.dicom import dicom
 from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of, stack
 
-#: Units of length in NIfTI, and what OME and ImageJ call a micrometre.
-_UNITS = {1: "m", 2: "mm", 3: "um"}
+#: What OME and ImageJ call a micrometre.
 _MICRONS = ("um", "µm", "\\u00b5m", "micron", "microns")
 
 
@@ -67,9 +66,8 @@ def itk(file: Path) -> list[VolumeInFile]:
 
 
 def nifti(file: Path) -> list[VolumeInFile]:
-    """Return the volume of a NIfTI or Analyze file, in its own frame: right, front, head."""
+    """Return the volume of a NIfTI or Analyze file, in its own frame: right, front, head; mm."""
     array, axes, place = _by_itk(file)
-    # Take from the header what ITK rounds, brings to millimetres or decides otherwise
     head = head_of(file.with_name(re.sub(r"(?i)\.img(?=$|\.)", ".hdr", file.name)))
     order = "<" if head[:4] == b"\x5c\x01\0\0" else ">"
     real, short = (partial(np.frombuffer, head, f"{order}{kind}") for kind in ("f4", "i2"))
@@ -86,18 +84,11 @@ def nifti(file: Path) -> list[VolumeInFile]:
     slope, shift = real(2, 112)
     if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
         array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled
-    steps, (quaternion, sform) = np.abs(real(3, 80).astype(np.float64)), short(2, 252)
-    steps[steps == 0] = 1.0
-    if head[344:347] not in (b"n+1", b"ni1"):
-        return [VolumeInFile(array, axes, to_world(steps), unit="mm")]
-    if sform > 0:
-        place[:3] = real(12, 280).reshape(3, 4)
-    elif quaternion > 0:
-        turn = np.diag([-1, -1, 1]) @ place[:3, :3] / np.linalg.norm(place[:3, :3], axis=0)
-        place = to_world(turn * steps, real(3, 268))
+    if head[344:347] in (b"n+1", b"ni1") and short(2, 252).any():  # it is placed by a form
+        place = np.diag([-1, -1, 1, 1]) @ place
     else:
-        place = to_world(steps)
-    return [VolumeInFile(array, axes, place, unit=_UNITS.get(head[123] & 7, ""))]
+        place = to_world(np.linalg.norm(place[:3, :3], axis=0))
+    return [VolumeInFile(array, axes, place, unit="mm")]
 
 
 def numpy(file: Path) -> list[VolumeInFile]:
@@ -157,7 +148,7 @@ def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, l
         units = [of_ome[0].get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
         names = [channel.get("Name", "") for channel in of_ome[0].findall("{*}Channel")]
         if x:
-            size, unit = in_one_unit([float(x), float(y or 1), float(z or 1)], units)
+            size, unit = [float(x), float(y or 1), float(z or 1)], one_unit(units)
         if x and not z:
             said = f"{opened.filename} says that pixels are {x} x {y}, and not how far apart slices"
             warn_external(f"{said} are: spacing is taken as 1; give spacing=(x, y, z)")

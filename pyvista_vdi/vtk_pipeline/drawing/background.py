@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.background import TRIAL_SIZE, Job, Worker, vdi_job
-from pyvista_vdi.quality.pictures import Estimate
+from pyvista_vdi.quality.background import TRIAL_SIZE, BackgroundThread, Job, vdi_job
+from pyvista_vdi.quality.plan import ViewEstimate
 from pyvista_vdi.quality.rate import FLOOR, reduced
 from pyvista_vdi.quality.view_error import ViewError, ViewErrorEstimator
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
@@ -44,15 +44,10 @@ class Estimators:
                 request.volume, request.transfer_function, request.options, device=runtime
             )
             self._content = request.content
-        return self._estimator.estimate(
-            vdi,
-            view.camera,
-            view.size,
-            clipping_planes=shown.clipping_planes or None,
-            cropping=shown.cropping,
-            opacity_multiplier=shown.opacity_multiplier,
-            **more,
+        options = RenderOptions(
+            shown.clipping_planes or None, shown.cropping, shown.opacity_multiplier
         )
+        return self._estimator.estimate(vdi, view.camera, view.size, options, **more)
 
 
 class Background:
@@ -68,9 +63,9 @@ class Background:
 
     def __init__(self) -> None:
         self.request: Request | None = None
-        self._generation = Worker("pyvista-vdi generation")
-        self._estimation = Worker("pyvista-vdi estimate")
-        self._preparation = Worker("pyvista-vdi stand-in")
+        self._generation = BackgroundThread("pyvista-vdi generation")
+        self._estimation = BackgroundThread("pyvista-vdi estimate")
+        self._preparation = BackgroundThread("pyvista-vdi stand-in")
         self._workers = (self._generation, self._estimation, self._preparation)
         self._estimators = Estimators()
         self._prepared = False
@@ -124,11 +119,11 @@ class Background:
         """Estimate the error of a VDI in a view, in place of the estimate before."""
         estimators = self._estimators
 
-        def judge(runtime: Runtime, _: Callable[[float], None]) -> Estimate:
+        def judge(runtime: Runtime, _: Callable[[float], None]) -> ViewEstimate:
             with runtime.aside():  # loads SciPy, the first time: a quarter of a second
                 from skimage.metrics import structural_similarity  # noqa: F401
             error = estimators.estimate(request, runtime, vdi, view, shown)
-            return Estimate(number, view, error.ssim, error.contrast)
+            return ViewEstimate(number, view, error.ssim, error.contrast)
 
         self._estimation.put(Job(judge, request.device))
 
@@ -171,6 +166,6 @@ class Background:
         self.forget_volume()
 
 
-def _clear(workers: tuple[Worker, ...]) -> None:
+def _clear(workers: tuple[BackgroundThread, ...]) -> None:
     for worker in workers:
         worker.clear()

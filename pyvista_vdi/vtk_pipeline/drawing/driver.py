@@ -22,8 +22,18 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.costs import Costs
-from pyvista_vdi.quality.pictures import Estimate, Made, Pictures
-from pyvista_vdi.quality.plan import SETTLED, Making, Plan, Seen, lacking, plan, ssim_of
+from pyvista_vdi.quality.plan import (
+    SETTLED,
+    Made,
+    Making,
+    Pictures,
+    Plan,
+    Seen,
+    ViewEstimate,
+    lacking,
+    plan,
+    ssim_of,
+)
 from pyvista_vdi.quality.rate import reduced
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick
@@ -118,7 +128,7 @@ class Driver:
         self._wanted: tuple[Any, Request | None, Exception | None] | None = None  # and the stamp
         self._refused: tuple[Any, str] | None = None  # a content that the device cannot draw
         self._making: Making | None = None
-        self._estimate: Estimate | None = None
+        self._estimate: ViewEstimate | None = None
         self._pictures, self._costs = Pictures(), Costs()
         self._seen: Seen | None = None  # the last frame that somebody watched
         self._stamp: Any = None  # of all that it depended on
@@ -479,7 +489,6 @@ class Driver:
         seen = Seen(
             view=view,
             content=content,
-            bounds=bounds,
             screen=None if wanted is None else wanted.screen,
             chosen=source.view_is_chosen(wanted, request),
             draw=settings.draw,
@@ -639,7 +648,7 @@ class Driver:
 
     def _judged(
         self, source: SourceInput, frame: Frame, sighted: Frame | None
-    ) -> Estimate | Literal[False]:
+    ) -> ViewEstimate | Literal[False]:
         """Estimate the error of the VDI in the frame's view now; False if it cannot be."""
         made = source.source.GetCurrentRequest()
         assert sighted is not None and sighted.vdi is not None and frame.view is not None  # noqa: PT018
@@ -648,7 +657,7 @@ class Driver:
         of = (number_of(vdi), frame.view)
         detail = magnification(vdi, frame.camera, frame.full_size)
         if made.screen == frame.view and detail <= 1 + ROUNDING:
-            return Estimate(*of, ssim=1.0, options=options)
+            return ViewEstimate(*of, ssim=1.0, options=options)
         runtime, background = get_runtime(made.device), frame.renderer.GetBackground()
         try:
             error = self._estimators.estimate(
@@ -657,7 +666,7 @@ class Driver:
         except VDIError:  # no memory for it, say: the volume's picture is right
             _log.debug("the error of a view cannot be estimated", exc_info=True)
             return False
-        return Estimate(*of, ssim=error.ssim, contrast=error.contrast, options=options)
+        return ViewEstimate(*of, ssim=error.ssim, contrast=error.contrast, options=options)
 
     # Between frames
 

@@ -64,7 +64,9 @@ class VolumePicture:
         self.shaded = request.transfer_function.shading is not None
         self.pictures = 0
         volume, sampling = request.volume, request.options
-        room = picture_room(request.screen.size, sampling.memory_limit)
+        room = picture_room(
+            request.screen.size, sampling.memory_limit, sampling.occlusion_bytes(volume)
+        )
         runtime = get_runtime(request.device)
         look = request.transfer_function
         medium = DeviceVolume(runtime, volume, look, sampling, room=room)

@@ -14,8 +14,8 @@ _COMPOSITE = (
     "the volume itself by one of VTK's mappers for another"
 )
 _LIT = (
-    "it lights a volume while it is drawn, and a VDI is lit when it is generated: use shade "
-    "(SetShade of the property) and lights"
+    "it lights a volume while it is drawn, and a VDI is lit when it is generated: use "
+    "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
 )
 _GRADIENT = (
     "a VDI is shaded by the gradient of its scalars, and when it is generated: leave "
@@ -92,7 +92,8 @@ OF_SHADERS: Mapping[str, str] = {
 #: meshes after it; and the volumes' own peeling. What of their effect cannot be had.
 _EFFECTS: Mapping[str, str] = {
     "vtkSSAOPass": "screen-space ambient occlusion (enable_ssao) does not see the VDI, which is "
-    "as dark as what is behind it. VTK's error that volumes must be shaded is about its mappers",
+    "as dark as what is behind it; ambient_occlusion= of add_vdi (VDISource.SetAmbientOcclusion) "
+    "is its own. VTK's error that volumes must be shaded is about its own mappers",
     "vtkShadowMapPass": "shadows (enable_shadows) are drawn with their meshes after the VDI, as "
     "after every volume: it is missing where a mesh is behind it, and casts no shadow",
     "vtkDepthOfFieldPass": "depth of field (enable_depth_of_field) does not see the VDI, which is "

@@ -16,7 +16,7 @@ from PIL import Image
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.extensions.insitu import InSitu
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.quality.targets import turned
@@ -51,7 +51,7 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
     camera = VIEWS["all of it"](volume)
     arguments = (volume, camera, WINDOW, function)
-    options = {"max_supersegments": 8, "device": default_runtime}
+    options = {"max_supersegments": 8, "ambient_occlusion": 8.0, "device": default_runtime}
     # Before, so that not each rank compiles the kernels
     expected = generate_in_blocks(*arguments, chunks=(24, 41, 27), **options)
     run(4, PROGRAM, "failing,same", tmp_path)
@@ -141,6 +141,7 @@ def test_one_rank_keeps_the_values_of_one_piece(tmp_path, scene):
     for wrong, error, says in (
         ({"value_range": None}, InvalidArgumentError, "value_range=.* is missing"),
         ({"cmap": "bone"}, InvalidArgumentError, "cmap"),
+        ({"ambient_occlusion": True}, UnsupportedError, "ambient occlusion"),
     ):
         with pytest.raises(error, match=says):
             simulate(tmp_path / "other.vdis", scene, [0.0], **{**options, "clim": None, **wrong})

@@ -141,6 +141,20 @@ def test_runs_are_joined_at_faces_where_they_are_alike(interpolation, behind, ex
     np.testing.assert_array_equal(found, of_whole)
 
 
+def test_occlusion_is_that_of_one_piece(default_runtime):
+    """What is out of sight darkens what is seen."""
+    volume = volume_of("uint8")
+    camera = VIEWS["all of it"](volume)
+    arguments = (volume, camera, transfer_for(volume, "linear"))
+    bare = generate_vdi(volume, camera, WINDOW, arguments[-1])
+    whole, vdi = both_ways(*arguments, (12, 10, 9), ambient_occlusion=6.0)
+    without, expected, found = (pvdi.render(each, camera) for each in (bare, whole, vdi))
+    assert np.abs(without - expected).max() > 0.1
+    # Opacities in the last cell before a neighbour are those of the last point: 0.3 / 255 measured
+    assert np.abs(found - expected).max() <= 1 / 255
+    assert vdi.metadata["ambient_occlusion"] == whole.metadata["ambient_occlusion"]
+
+
 @pytest.mark.parametrize("limit", [700_000, 1_600_000])
 def test_no_more_memory_is_taken_than_allowed(runtime, limit):
     values = np.random.default_rng(1).integers(0, 255, (96, 96, 96)).astype(np.float32)

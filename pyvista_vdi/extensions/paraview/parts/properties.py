@@ -160,6 +160,9 @@ Ambient!        Double 0  -
 Diffuse!        Double 1  -
 Specular!       Double 0  -
 SpecularPower!  Double 1  -
+AmbientOcclusion:SetOcclusion  Int 0  bool  {_sentence("ambient_occlusion")}
+AmbientOcclusionRadius:SetOcclusionRadius!  Double 0  0..  How far around it that is looked for, \
+in the volume's units. 0: the default radius.
 Classification             Int 0       (baked|deferred)  {_sentence("classification")}
 ValueRange@Classification  Double 0 0  -                 {_sentence("value_range", ". 0 0: all")}
 {_IMPORTANCE}

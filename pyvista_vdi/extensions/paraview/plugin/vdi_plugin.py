@@ -89,6 +89,8 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
         super().__init__()
         self._azimuth = self._elevation = 0.0
         self._kind = "point"
+        self._occluded = False
+        self._occlusion_radius = 0.0
         self._looks = Looks()
         self._deferred = False
         self._value_range: tuple[float, float] | None = None
@@ -126,6 +128,16 @@ class VDISource(Looking, Functions, vtk_pipeline.VDISource):
         """Begin anew."""
         self._importance.clear()
         self.Modified()
+
+    def SetOcclusion(self, occluded: int) -> None:
+        """Choose whether what is hidden from the light around it is darkened."""
+        self._occluded = bool(occluded)
+        self.SetOcclusionRadius(self._occlusion_radius)
+
+    def SetOcclusionRadius(self, radius: float) -> None:
+        """Set how far around a point that is looked for; 0 is the default radius."""
+        self._occlusion_radius = radius
+        self.SetAmbientOcclusion((radius or True) if self._occluded else None)
 
     def SetStep(self, distance: float) -> None:
         """Set the length of a step along a ray; 0 is the default one."""

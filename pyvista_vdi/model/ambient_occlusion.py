@@ -1,0 +1,209 @@
+"""Ambient occlusion: how much of the light from all around reaches a point of a volume.
+
+The paper's supersegments hold colours "potentially determined with global lighting techniques,
+such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Ambient occlusion".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.checks import as_number, as_whole
+from pyvista_vdi.model.volume import Geometry
+
+#: Radius by default, as a share of the bounds' diagonal.
+DEFAULT_RADIUS = 0.05
+#: Directions that may be asked for.
+DIRECTIONS = (12, 4096)
+
+#: Steps that a radius is cut into at least.
+_LEAST_STEPS = 8
+#: Cells along an axis that are not made coarser, however large the radius is.
+_LEAST_CELLS = 32
+
+
+@dataclass(frozen=True)
+class AmbientOcclusion:
+    """Darkening of what is hidden from the light around it.
+
+    Light comes from all around, from the distance ``radius``, and the medium in between takes some
+    of it: A is the mean over all directions of the transmittance along ``radius``. What takes it is
+    not black, but as bright as the sample is itself, but for the share ``strength`` that it
+    swallows: the sample's colour is multiplied by f = A + (1 - strength) (1 - A) f, so that
+    f = A / (A + strength (1 - A)).
+
+    Attributes
+    ----------
+    radius : float, optional
+        How far something hides, model units; by default 0.05 of the bounds' diagonal.
+    strength : float
+        Share of the light that what hides swallows, 0 to 1. 0 darkens nothing; 1 is a sky over
+        black matter: an even opaque surface then keeps 0.15 of its colour, and 0.53 at the default.
+    directions : int
+        How many directions the mean is taken over, 12 to 4096.
+
+    Notes
+    -----
+    That what surrounds a point is as bright as the point itself is how A. J. Stewart and
+    M. S. Langer ("Toward accurate recovery of shape from shading under diffuse lighting", IEEE
+    Transactions on Pattern Analysis and Machine Intelligence 19(9), 1997) account for the light
+    that surfaces throw on each other. Without it every dense volume would be dark, because
+    what is seen of it lies inside it.
+    """
+
+    radius: float | None = None
+    strength: float = 0.1
+    directions: int = 32
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        radius, strength = as_number(self.radius), as_number(self.strength)
+        if self.radius is not None:
+            if not 0 < radius < math.inf:
+                raise InvalidArgumentError(
+                    "the radius of ambient occlusion must be a positive length in model units; "
+                    f"got {self.radius!r}"
+                )
+            put(self, "radius", radius)
+        if not 0 <= strength <= 1:
+            raise InvalidArgumentError(
+                f"the strength of ambient occlusion must be from 0 to 1; got {self.strength!r}"
+            )
+        put(self, "strength", strength)
+        least, most = DIRECTIONS
+        directions = as_whole(self.directions)
+        if not least <= directions <= most:
+            raise InvalidArgumentError(
+                f"ambient occlusion takes a whole number of directions from {least} to {most}; "
+                f"got {self.directions!r}"
+            )
+        put(self, "directions", int(directions))
+
+    @classmethod
+    def from_any(cls, value: Any) -> AmbientOcclusion | None:
+        """Return what a user calls ambient occlusion; ``None`` where there is none.
+
+        ``None`` and ``False`` are none, ``True`` is the default, a number is a radius.
+        InvalidArgumentError if it is none of these.
+        """
+        if value is None or value is False:
+            return None
+        if value is True:
+            return cls()
+        if isinstance(value, int | float | np.number):
+            return cls(value)  # type: ignore[arg-type]
+        if isinstance(value, cls):
+            return value if value.strength > 0 else None
+        raise InvalidArgumentError(
+            "ambient_occlusion must be True, a radius in model units or a "
+            f"pyvista_vdi.AmbientOcclusion; got {value!r}"
+        )
+
+    def radius_in(self, volume: Geometry) -> float:
+        """Return the radius in a volume, model units; beyond its diagonal nothing occludes."""
+        radius = DEFAULT_RADIUS * volume.length if self.radius is None else self.radius
+        return min(radius, volume.length)
+
+    def to_dict(self, volume: Geometry) -> dict[str, Any]:
+        """Return what can be written to JSON, with the radius in this volume."""
+        return {**asdict(self), "radius": self.radius_in(volume)}
+
+
+@dataclass(frozen=True)
+class OcclusionGrid:
+    """The grid on which the occlusion of a volume is computed, and the marches from its nodes.
+
+    Node (i, j, k) lies at the volume's index position ``(i, j, k) * cell``. Occlusion changes over
+    lengths of the radius, so cells are an eighth of it where that is more than a voxel.
+
+    ``cell``: voxels from node to node along x, y and z. ``nodes``: nodes along x, y and z; the last
+    of them may lie beyond the volume. ``step``: length of a step, model units. ``offsets``:
+    midpoints of the steps from the node along each direction, in cells; float64 (directions, steps,
+    3).
+    """
+
+    cell: tuple[int, int, int]
+    nodes: tuple[int, int, int]
+    step: float
+    offsets: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, volume: Geometry, occlusion: AmbientOcclusion) -> OcclusionGrid:
+        """Return the grid for a volume."""
+        radius = occlusion.radius_in(volume)
+        spacing, points = np.array(volume.spacing), np.array(volume.dimensions)
+        wanted = np.floor(radius / _LEAST_STEPS / spacing * (1 + 1e-9))
+        coarsest = np.maximum((points - 1) // _LEAST_CELLS, 1)
+        cell = np.clip(wanted, 1, coarsest).astype(int)
+        steps = max(_LEAST_STEPS, math.ceil(radius / (cell * spacing).min() * (1 - 1e-9)))
+        to_cells = np.linalg.inv(volume.direction * (spacing * cell))
+        along = (np.arange(steps) + 0.5) * (radius / steps)
+        directions = spread_directions(occlusion.directions) @ to_cells.T
+        nodes = -(-(points - 1) // cell) + 1
+        return cls(
+            _triple(cell),
+            _triple(nodes),
+            radius / steps,
+            directions[:, None, :] * along[None, :, None],
+        )
+
+    def nodes_around(
+        self, lower: Sequence[float], upper: Sequence[float]
+    ) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
+        """Return the first node, and nodes, along x, y and z, whose boxes meet part of the volume.
+
+        ``lower``, ``upper``: index positions between which it lies.
+        """
+        cell = np.array(self.cell)
+        first = np.clip(np.ceil(np.array(lower) / cell - 0.5), 0, None)
+        last = np.clip(np.floor(np.array(upper) / cell + 0.5), None, np.array(self.nodes) - 1)
+        return _triple(first.astype(int)), _triple((last - first).astype(int) + 1)
+
+    @property
+    def margin(self) -> tuple[int, int, int]:
+        """Cells that the marches reach beyond the nodes, along x, y and z, either way."""
+        return _triple(np.floor(np.abs(self.offsets).max(axis=(0, 1))).astype(int) + 1)
+
+    @property
+    def padded(self) -> tuple[int, int, int]:
+        """Nodes along x, y and z with the margin on both sides."""
+        return _triple(np.array(self.nodes) + 2 * np.array(self.margin))
+
+    @property
+    def samples(self) -> tuple[int, int, int]:
+        """Samples along each edge of the box around a node whose mean opacity the node gets.
+
+        Half a voxel apart, as marches by default, in cells of one or two voxels; then no more.
+        """
+        return _triple(np.minimum(2 * np.array(self.cell), 4))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes on a device while the occlusion is computed; what stays is the nodes' float32."""
+        return 4 * (math.prod(self.padded) + math.prod(self.nodes))
+
+
+def spread_directions(n: int) -> NDArray[np.float64]:
+    """Return n unit vectors spread evenly over all directions, float64 (n, 3); always the same.
+
+    A spherical Fibonacci lattice: bands of equal area, from one to the next turned by the golden
+    angle (R. Swinbank, R. J. Purser, "Fibonacci grids", Quarterly Journal of the Royal
+    Meteorological Society 132(619), 2006).
+    """
+    i = np.arange(n)
+    z = 1 - (2 * i + 1) / n
+    angle = i * math.pi * (3 - math.sqrt(5))
+    radius = np.sqrt(1 - z**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+
+
+def _triple(values: NDArray[Any]) -> tuple[int, int, int]:
+    x, y, z = (int(v) for v in values)
+    return x, y, z
