@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
-
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "medium_functions.cl"
 
@@ -69,13 +67,6 @@ def test_ends_are_the_end_entries_to_the_last_bit(call):
         assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
 
 
-def test_nan_is_transparent(call):
-    table = np.ones((4, 4), np.float32)
-    for low, high in ((0.0, 1.0), (0.5, 0.5)):
-        found = classified(call, [np.nan, -np.nan, 0.5], table, low, high)
-        np.testing.assert_array_equal(found, [[0] * 4, [0] * 4, [1] * 4])
-
-
 def test_step_optical_depth(call):
     rng = np.random.default_rng(7)
     below_one = 1 - 2.0**-24
@@ -90,12 +81,6 @@ def test_step_optical_depth(call):
     assert (np.abs(found - exact) <= 6 * EPS * exact).all()
     assert found[0] == 0
     assert found[4] == pytest.approx(24 * np.log(2) * units[4], rel=6 * EPS)
-
-
-def test_an_opaque_sample_is_opaque_whatever_the_step(call):
-    units = np.float32([0, 1e-30, 1e-3, 1, 30, 31, 1e6])
-    found = call(FILE, "step_optical_depths", 7, np.ones(7, np.float32), units, call.empty(7))
-    np.testing.assert_array_equal(found, np.maximum(np.float32(OPAQUE_OPTICAL_DEPTH), units))
 
 
 @pytest.mark.parametrize("lanes", [1, 16])
