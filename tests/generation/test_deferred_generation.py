@@ -79,20 +79,6 @@ def test_what_is_outside_the_range_ends_a_supersegment_and_is_no_part_of_it(runt
         assert one.spread[rows] == 0
 
 
-def test_supersegments_are_cut_where_the_importance_tells_values_apart(runtime):
-    """Noise of no weight is not cut, a step of little height but all the weight is."""
-    array = np.random.default_rng(5).uniform(0.4, 0.9, EDGES[::-1]).astype(np.float32)
-    array[:11], array[11:22] = 0.1, 0.2
-    weights = [(0, 1), (0.3, 1), (0.3001, 1e-6), (1, 1e-6)]
-    deferred = kept(runtime, array, (0, 1), weights, max_supersegments=3)
-    for _, _, rows in inner(deferred):
-        assert deferred.mean[rows][1:] == pytest.approx([0.2, 0.1], abs=1e-5)
-        assert deferred.spread[rows][0] > 0.1
-    # Of weight 0 nothing is kept
-    empty = kept(runtime, array, (0, 1), [(0, 1), (0.3, 1), (0.3001, 0), (1, 0)])
-    assert empty.values.max() < 0.3
-
-
 @pytest.mark.parametrize("seed", [1, 3])
 def test_the_device_classifies_as_float64_does(runtime, seed):
     rng = np.random.default_rng(seed)

@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 
 from pyvista_vdi import AmbientOcclusion, Volume, api
-from pyvista_vdi.model.ambient_occlusion import OcclusionGrid, spread_directions
+from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 
 
 def grid_of(shape, radius, spacing=(1, 1, 1), direction=None):
     volume = Volume(np.zeros(shape[::-1], np.uint8), spacing, direction=direction)
     return volume, OcclusionGrid.of(volume, AmbientOcclusion(radius))
-
-
-@pytest.mark.parametrize("n", [12, 32, 129])
-def test_directions_are_spread_evenly(n):
-    directions = spread_directions(n)
-    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
-    np.testing.assert_array_equal(directions, spread_directions(n))
-    # As many on one side as on another, and no two together: the mean distance to the nearest is
-    # sqrt(4 pi / n) for a square lattice
-    assert np.linalg.norm(directions.mean(axis=0)) < 2 / n
-    apart = np.linalg.norm(directions[:, None] - directions, axis=2) + 9 * np.eye(n)
-    assert apart.min() > 0.75 * math.sqrt(4 * math.pi / n)
 
 
 def test_every_voxel_lies_between_nodes_and_every_step_within_the_margin():

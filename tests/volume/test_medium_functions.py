@@ -51,22 +51,6 @@ def test_linear_between_entries_and_clamped_outside(call, entries, span):
     assert (found <= 1 + 2 * EPS).all()
 
 
-def test_ends_are_the_end_entries_to_the_last_bit(call):
-    table = random_table(np.random.default_rng(5), 7)
-    found = classified(call, [-3e38, -np.inf, 2.0, 3.0, 3e38, np.inf], table, 2.0, 3.0)
-    np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
-    # mix(x, y, 1) is x + (y - x), a rounding of the difference and one of the sum
-    assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
-    # A range of one scalar is a step: at or below it the first entry, above it the last
-    for at in (0.0, 7.0, -1e6, 3e-5):
-        near = np.float32(at)
-        above = np.nextafter(near, np.float32(np.inf)) if at else np.float32(1e-30)
-        below = np.nextafter(near, np.float32(-np.inf))
-        found = classified(call, [-1e30, below, near, above, 1e30], table, near, near)
-        np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
-        assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
-
-
 def test_step_optical_depth(call):
     rng = np.random.default_rng(7)
     below_one = 1 - 2.0**-24
