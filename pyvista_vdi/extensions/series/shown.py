@@ -17,7 +17,7 @@ from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.background import Job
+from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
@@ -33,7 +33,7 @@ class Decoding(Job):
 
     def done(self, paused: Callable[[], bool] = lambda: False) -> Any:
         """Do the work, and return its result."""
-        return self._work(get_runtime(self._device), self._report)
+        return self.work(get_runtime(self.device), lambda fraction: None)
 
 
 class SeveralInput(Input):

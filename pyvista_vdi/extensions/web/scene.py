@@ -83,9 +83,9 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
             vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
             if vdi is None:
                 continue
-            where = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
+            placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
             file = None if actor is None else bare_file(vdi)
-            vdis.append({**where, "opacity": prop.opacity_multiplier, "file": file})
+            vdis.append({**placed, "opacity": prop.opacity_multiplier, "file": file})
             boxes.append(np.reshape(prop.GetBounds(), (3, 2)).T)
             if actor is None:
                 actor, shown = prop, vdi if several is None else several

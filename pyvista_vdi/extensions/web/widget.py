@@ -206,8 +206,9 @@ class VDIWidget(anywidget.AnyWidget):
         shown = of_viewers.as_shown(vdi)
         self._file = self._sent(shown)
         self._vdi = shown
-        series = isinstance(shown, VDISeries)
-        self.time = shown.times[shown.nearest(self.time or 0.0)] if series else None
+        before, self.time = self.time, None
+        if isinstance(shown, VDISeries):
+            self.time = shown.times[shown.nearest(before or 0.0)]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vdi!r})"
