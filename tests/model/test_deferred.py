@@ -13,7 +13,6 @@ from pyvista_vdi.cli import main
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
-    UnsupportedError,
 )
 from pyvista_vdi.model.classify_values import spread_of_values
 from pyvista_vdi.model.deferred import lengths_of
@@ -106,22 +105,6 @@ def test_classification_is_the_mean_over_values_of_that_mean_and_spread():
     assert at == vdi.n_supersegments
     assert kinds == {(False, False), (True, False), (False, True)}
     assert vdi.metadata["transfer_function"] == LOOKS.to_dict()
-
-
-@pytest.mark.parametrize(
-    ("look", "error", "says"),
-    [
-        ({"shade": True}, UnsupportedError, "shading needs gradients"),
-        ({"blending": "maximum"}, UnsupportedError, "blending"),
-        ({"interpolation": "linear"}, InvalidArgumentError, "interpolation was said"),
-        ({"scalars": "a"}, InvalidArgumentError, "scalars was said"),
-        ({"colour": "bone"}, TypeError, "classified"),
-    ],
-)
-def test_what_no_list_knows_is_refused(look, error, says):
-    pytest.importorskip("pyvista")
-    with pytest.raises(error, match=says):
-        deferred().classified(**look)
 
 
 def test_render_takes_the_look(default_runtime):
