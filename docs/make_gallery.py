@@ -29,8 +29,7 @@ LARGEST_FILE = 100 * 1024
 LARGEST_PHOTO = 150 * 1024
 
 #: Examples whose pictures are on the site, those that hold text wide.
-SHOWN = ("occlusion", "overlap", "picking", "tradeoff", "transfer_function")
-WIDE = ("tradeoff",)
+SHOWN = ("occlusion", "overlap", "picking", "transfer_function")
 
 COMPARISON = ("brain", "steep", "320x180")
 
@@ -53,7 +52,7 @@ def main(names: list[str]) -> None:
         for example in (examples / f"{stem}.py" for stem in SHOWN):
             picture = folder / f"{example.stem}.png"
             run(environment, str(example), str(picture))
-            width = SHEET_WIDTH if example.stem in WIDE else WIDTH
+            width = WIDTH
             keep(picture, TARGET / picture.name, width)
         volume, look, size = COMPARISON
         options = ("--example", volume, "--tf", look, "--size", size, "--repeats", "1")

@@ -62,14 +62,14 @@ def compare(options: argparse.Namespace) -> int:
 
 
 def tradeoff(options: argparse.Namespace) -> int:
-    """Measure what each setting costs and gives, and write JSON, tables and a plot."""
+    """Measure what each setting costs and gives, and write JSON and tables."""
     look = classification(options)
     Classification.composited(look, "tradeoff")  # refused before the volume is read
     # With --quick the last of an axis's usual values
     quick = bool(options.quick)
     usual = {n: values[-1:] if quick else values for n, values in AXES.items()}
     axes = dict(_axis(text, usual) for text in options.sweep or DEFAULT_AXES)
-    settings = sweep(axes, pairs=not quick)
+    settings = sweep(axes)
     name = options.name or volume_name(options)
     if Path(name).name != name:
         raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
@@ -90,7 +90,7 @@ def tradeoff(options: argparse.Namespace) -> int:
         "angles": options.angles or _ANGLES[quick],
     }
     with (
-        output_files(options, f"tradeoff-{name}", "json", "md", "png") as files,
+        output_files(options, f"tradeoff-{name}", "json", "md") as files,
         measuring("tradeoff") as bar,
     ):
         found = measure_tradeoff(volume, settings, vtk=vtk, name=name, progress=bar, **how, **look)
@@ -100,10 +100,6 @@ def tradeoff(options: argparse.Namespace) -> int:
         print(f"dominated: {worse} (by {better[0]})")
     write_text(files["json"], json.dumps(as_json(asdict(found)), indent=1) + "\n")
     write_text(files["md"], found.table())
-    if find_spec("matplotlib") is None or not found.points:
-        del files["png"]
-    else:
-        found.save_plot(files["png"])
     say_written(files.values())
     return 0
 

@@ -62,16 +62,14 @@ def measure(
     """Render one volume in every way, compare the pictures and time the frames.
 
     ``classification`` has arguments of :func:`pyvista_vdi.generate`. ``window_size`` is that of the
-    VDI and of all frames, ``angles`` are degrees of ``Azimuth`` from V_O. ``sample_distance`` is
-    the accuracy step, model units; ``repeats`` are timed frames of each candidate and view, of
-    which 0 compares pictures and times nothing. ``progress`` is called with the finished fraction.
+    VDI and of all frames, ``angles`` are degrees of ``Azimuth`` from V_O, ``sample_distance`` is
+    the accuracy step, model units, and ``repeats`` are timed frames of each candidate and view;
+    with 0 nothing is timed.
 
     Returns the figures, what was generated from V_O, and the pictures by angle and by the keys of
     :data:`NAMES`, float32 (H, W, 3 or 4) over black. Each of the figures' ``views`` has ``near``,
-    the comparisons by names such as "vdi_to_raycaster", ``seconds`` by candidate, and
-    ``ratio_to_vtk``, the VDI's seconds over those of the faster of VTK's mappers.
-    Raises MissingDependencyError or DeviceError if VTK takes part and cannot be loaded, or draws
-    nothing, or the OpenCL device fails; InvalidArgumentError if nothing is to be seen.
+    the comparisons, ``seconds`` by candidate, and ``ratio_to_vtk``, the VDI's seconds over those of
+    the faster of VTK's mappers.
     """
     measuring.check_plan(angles, least=0, repeats=repeats)
     looks = Classification.composited(classification, "compare")

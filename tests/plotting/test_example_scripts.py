@@ -46,7 +46,6 @@ ARGUMENTS = {
     "plotter.py": [],
     "series.py": [],
     "sets.py": [],
-    "tradeoff.py": [],
     "transfer_function.py": ["picture.png"],
     "web_page.py": ["page.html"],
     "web_scene.py": ["scene.html"],
@@ -161,15 +160,6 @@ def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
     assert (size, len(frames)) == ((200, 150), 24)
     for k in (0, 7, 12, 23):  # from every side there is a knot
         assert 0.02 < (frames[k].mean(axis=2) < 128).mean() < 0.5
-
-
-@pytest.mark.slow
-def test_tradeoff_example_draws_its_fronts(tmp_path):
-    said, target = run_example("tradeoff.py", tmp_path)
-    assert all(f"{kind}: " in said for kind in ("frame", "memory", "generation"))
-    picture = imread(target)[..., :3].astype(int)
-    panels = [half for row in np.array_split(picture, 2) for half in np.array_split(row, 2, axis=1)]
-    assert all(np.ptp(panel) > 100 for panel in panels)
 
 
 @pytest.mark.parametrize(
